@@ -7,6 +7,7 @@ else
 BIN := $(VENV)/bin
 endif
 STAMP := $(VENV)/.installed
+READY := $(VENV)/.overlay
 
 # As on a user's machine: processes keep what they compile, which makes thousands of them start faster, and buffer their output.
 unexport PYTHONDONTWRITEBYTECODE PYTHONUNBUFFERED
@@ -37,16 +38,16 @@ help:
 	@echo "make release  build sdist and wheel into dist/, check them, try the wheel on every Python found"
 	@echo "make clean    remove the environment and all that was generated"
 
-demo: $(STAMP)
+demo: $(READY)
 	@$(BIN)/minirospy demo
 
 check: lint
 	@$(BIN)/python -m pytest -q -n 2 --dist worksteal $(CHECKED)
 
-test: $(STAMP)
+test: $(READY)
 	@$(BIN)/python -m pytest -n 3 --dist worksteal --ignore=tests/interop --ignore=tests/windows
 
-interop: $(STAMP)
+interop: $(READY)
 	@sh tests/interop/install_ros.sh
 	@$(BIN)/python -m pip install -q foxglove-sdk || echo "foxglove-sdk cannot be installed: its server is not compared"
 	@$(BIN)/python -m pytest -n 2 --dist worksteal tests/interop --ignore=tests/interop/test_interop_ros2.py
@@ -57,51 +58,51 @@ interop: $(STAMP)
 WINDOWS_TESTS := tests/core/wire tests/core/graph tests/core/idl/test_parse.py tests/base/test_child_lifetime.py tests/base/test_signal_dispatch.py \
   tests/base/test_names.py tests/base/test_times.py tests/base/test_clock.py tests/base/test_environment.py tests/base/test_open_files.py tests/board \
   tests/runtime/node/test_topics.py
-windows: $(STAMP)
+windows: $(READY)
 	@sh tests/windows/install_wine.sh
 	@$(BIN)/python tests/windows/windows.py setup
 	@$(BIN)/python -m pytest tests/windows
 	@$(BIN)/python tests/windows/windows.py test $(WINDOWS_TESTS)
 
-pythons: $(STAMP)
+pythons: $(READY)
 	@$(BIN)/python tools/pythons.py $(PYTHONS) -- $(CHECKED)
 
 # Without the peers over Zenoh, whose installation takes minutes.
-ros2-core: $(STAMP)
+ros2-core: $(READY)
 	@$(BIN)/python -m tests.interop.install_ros2
 	@$(BIN)/python -m pytest tests/interop/test_interop_ros2.py
 
-ros2: $(STAMP)
+ros2: $(READY)
 	@$(BIN)/python -m tests.interop.install_ros2
 	@$(BIN)/python -m tests.interop.install_zenoh_peers
 	@$(BIN)/python -m pytest tests/interop/test_interop_ros2.py tests/interop/test_interop_ros2_zenoh.py
 
-guard: $(STAMP)
+guard: $(READY)
 	@$(BIN)/python benchmarks/guard.py
 
-bench: $(STAMP)
+bench: $(READY)
 	@$(BIN)/python benchmarks/run.py
 	@$(BIN)/python benchmarks/messages.py
 
-fuzz: $(STAMP)
+fuzz: $(READY)
 	@$(BIN)/python tests/fuzz.py
 	@$(BIN)/python tests/fuzz_bridge.py
 	@$(BIN)/python tests/fuzz_readers.py
 
-lint: $(STAMP)
+lint: $(READY)
 	@$(BIN)/python -m ruff check .
 	@$(BIN)/python -m ruff format --check .
 	@$(BIN)/python -m mypy
 	@$(BIN)/python tools/check_page.py
 
-mutants: $(STAMP)
+mutants: $(READY)
 	@$(BIN)/python tests/mutants.py
 
-site: $(STAMP)
+site: $(READY)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[docs]"
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --clean
 
-release: $(STAMP)
+release: $(READY)
 	@$(BIN)/python -m pip install -q twine
 	@$(BIN)/python tools/release.py
 
@@ -115,3 +116,8 @@ $(STAMP): pyproject.toml $(wildcard hatch_build.py minirospy/cli/registry.py min
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[dev]"
 	@$(PYTHON) -c "open('$(STAMP)', 'w').close()"
+
+# Written again when a module that programs import changes what it offers.
+$(READY): $(STAMP) $(wildcard minirospy/ros/*.py minirospy/ros/*/*/*.py minirospy/ros/*/*/*/*.py minirospy/workspace/elsewhere.py)
+	@$(BIN)/python -m minirospy.ros.overlay_modules
+	@$(PYTHON) -c "open('$(READY)', 'w').close()"

@@ -1,4 +1,4 @@
-"""Build hooks: addresses, console scripts and PyPI's README; ``msgs/`` as modules, rqt's packages, and the wheel's other files.
+"""Build hooks: addresses, console scripts and PyPI's README; ``overlay/``, rqt's packages, and the wheel's other files.
 
 An editable install needs only the modules: its path lines (``dev-mode-dirs`` in pyproject.toml) point into the
 checkout, where everything else already is.
@@ -153,7 +153,7 @@ class DescribeProject(MetadataHookInterface):
 
 
 class CompileDefinitions(BuildHookInterface[BuilderConfig]):
-    """Compiles the definitions, and writes the packages of rqt's windows, before each build of a wheel."""
+    """Writes `overlay/` and the packages of rqt's windows before each build of a wheel."""
 
     PLUGIN_NAME = "custom"
 
@@ -167,9 +167,11 @@ class CompileDefinitions(BuildHookInterface[BuilderConfig]):
             from minirospy.cli.windows import write_packages
             from minirospy.core.idl.load import Catalogue, write_package
             from minirospy.core.idl.own_packages import COMPILED_AHEAD
+            from minirospy.ros.overlay_modules import write_overlay
         finally:
             sys.path.remove(self.root)
         overlay = root / "minirospy" / "overlay"
+        modules = write_overlay(overlay)
         catalogue = Catalogue.below(root / "msgs")
         for package in catalogue.packages:
             write_package(catalogue, package, overlay, on_demand=package not in COMPILED_AHEAD)
@@ -177,6 +179,7 @@ class CompileDefinitions(BuildHookInterface[BuilderConfig]):
         if version == "editable":
             return
         build_data["artifacts"] += [f"minirospy/ros/{package}/**" for package in windows]
+        build_data["artifacts"] += [f"minirospy/overlay/{path}" for path in modules]
         for package in catalogue.packages:
             build_data["artifacts"] += [
                 f"minirospy/overlay/{package}/**/*.py",

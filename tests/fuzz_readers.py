@@ -190,7 +190,7 @@ def xml_readers() -> dict[str, Reader]:
     from minirospy.ros.roslaunch.launcher.load import load_text
     from minirospy.ros.roslib.roslib.manifest import ManifestException
     from minirospy.ros.roslib.roslib.manifest import parse as parse_old
-    from minirospy.ros.rostest.runner import junit
+    from minirospy.ros.rosunit.runner import junit
     from minirospy.ros.urdfdom_py.urdf_parser_py.urdf import URDF
     from minirospy.ros.urdfdom_py.urdf_parser_py.xml_reflection import core
     from minirospy.workspace.manifest import parse_manifest

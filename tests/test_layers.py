@@ -5,6 +5,10 @@ from __future__ import annotations
 import ast
 import functools
 import graphlib
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
@@ -26,6 +30,45 @@ LAYERS = [
 ]
 UPWARDS = {("ros/rosbag/commands/rosbag_play.py", "web")}
 """Imports that go upwards all the same: `rosbag play --bridge` shows the bag in a browser."""
+OPTIONAL_PACKAGES = [
+    "ament_index_python", "angles", "camera_info_manager_py", "diagnostic_aggregator",
+    "diagnostic_updater", "dynamic_reconfigure", "foxglove_bridge", "image_geometry", "image_transport",
+    "interactive_markers", "joint_state_publisher", "joint_state_publisher_gui", "kdl_parser_py",
+    "laser_geometry", "map_server", "message_filters", "resource_retriever", "robot_pose_publisher",
+    "ros_numpy", "rosauth", "rosbridge_server", "rosclean", "rosserial_python",
+    "rospy_message_converter", "roswtf", "smach_ros", "sound_play", "teleop_twist_joy",
+    "teleop_twist_keyboard", "tf2_kdl", "tf2_py", "tf2_sensor_msgs", "tf2_tools", "tf_conversions",
+    "topic_tools", "turtle_tf", "turtle_tf2", "turtlesim", "two_link_arm", "urdf", "urdf_parser_plugin",
+    "urdfdom_py", "web_video_server", "xacro",
+]  # fmt: skip
+"""The ROS packages that no other package needs."""
+LEAVES = {"web", "fleet", "ros2", *(f"ros/{package}" for package in OPTIONAL_PACKAGES)}
+"""Rooms and ROS packages that can be deleted: nothing outside imports them, except for functions of `cli/`, which run one."""
+SYSTEM_PACKAGES = {"catkin", "python_orocos_kdl", "rospkg"}
+"""Real ROS has these from the system or for each package: a package.xml names them as rosdep does, or not at all."""
+UNNAMED = {
+    ("camera_info_manager_py", "camera_calibration_parsers"): "both read the files of cameras' calibrations",
+    ("catkin", "rosunit"): "run_tests runs the tests of all kinds",
+    ("diagnostic_aggregator", "rosparam"): "the real add_analyzers imports it, too",
+    ("image_transport", "cv_bridge"): "has the codecs of compressed_image_transport, which names it",
+    ("laser_geometry", "tf2_ros"): "for types; the real one names tf, which needs tf2_ros",
+    ("ros_numpy", "cv_bridge"): "both convert images",
+    ("roslib", "genmsg"): "its modules are old names of genmsg's",
+    ("roslib", "genpy"): "its modules are old names of genpy's",
+    ("roslib", "rosgraph"): "its modules are old names of rosgraph's",
+    ("rosmaster", "rosout"): "the command `roscore` runs both in one process",
+    ("rosmaster", "rospy"): "validators have the same errors",
+    ("rospy", "rosconsole"): "rospy.rosconsole has the command's function",
+    ("rospy", "rosservice"): "the real rospy.logger_level_service_caller imports it, too",
+    ("rostest", "roslib"): "rosunit, which it names, needs roslib",
+    ("rostopic", "rosgraph"): "rospy, which it names, needs rosgraph",
+    ("rosunit", "roslaunch"): "rosunit.pmon is roslaunch.pmon",
+    ("rosunit", "rostest"): "the parsers of both commands are in one module",
+    ("tf2_kdl", "tf2_geometry_msgs"): "both transform with PyKDL",
+    ("tf2_py", "tf2_ros"): "the buffer is in tf2_ros",
+    ("tf2_sensor_msgs", "tf2_geometry_msgs"): "both transform with PyKDL",
+}
+"""(package, imported package) that the package.xml of the real package does not name -> the reason for the import."""
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 BYTES_ONLY = [PACKAGE / "runtime", PACKAGE / "core" / "wire"]
 PURE = {"core"}
@@ -62,7 +105,6 @@ PURE_FILES = (
             "parameter_values.py",
             "rules.py",
             "service_links.py",
-            "xxh3.py",
             "zenoh_keys.py",
         )
     }
@@ -172,6 +214,143 @@ def test_runtime_and_wire_know_no_messages(path: Path) -> None:
 @pytest.mark.parametrize("room", sorted(DEPTH))
 def test_no_room_has_an_import_cycle(room: str) -> None:
     list(graphlib.TopologicalSorter(graph_of_imports(room)).static_order())
+
+
+def ros_package_of(path: Path) -> str:
+    """Return the ROS package that a file belongs to, empty for a file of another room."""
+    parts = path.relative_to(PACKAGE).parts
+    return parts[1] if parts[0] == "ros" and len(parts) > 2 else ""
+
+
+def package_imports() -> dict[tuple[str, str], set[str]]:
+    """Return (package, imported package of `ros/`) -> the files; the package is empty outside of `ros/`."""
+    found: dict[tuple[str, str], set[str]] = {}
+    for path in FILES:
+        for module in imports(path):
+            parts = module.split(".")
+            other = parts[2] if parts[:2] == ["minirospy", "ros"] and len(parts) > 2 else ""
+            if other != ros_package_of(path) and other and (PACKAGE / "ros" / other).is_dir():
+                name = path.relative_to(PACKAGE).as_posix()
+                found.setdefault((ros_package_of(path), other), set()).add(name)
+    return found
+
+
+def named_dependencies(package: str) -> set[str]:
+    """Return what the package.xml names; nothing for a package that real ROS has from the system."""
+    folders = (PACKAGE / "ros" / package, PACKAGE.parent / "msgs" / package)
+    manifests = [folder / "package.xml" for folder in folders if (folder / "package.xml").exists()]
+    return {
+        (element.text or "").strip()
+        for manifest in manifests
+        for element in ET.parse(manifest).getroot()
+        if element.tag.endswith("depend")
+    }
+
+
+def test_ros_package_imports_what_its_manifest_names() -> None:
+    unnamed = {
+        (package, other): files
+        for (package, other), files in package_imports().items()
+        if package and other not in SYSTEM_PACKAGES and other not in named_dependencies(package)
+    }
+    assert {pair: files for pair, files in unnamed.items() if pair not in UNNAMED} == {}
+    # An exception that is needed no longer goes.
+    assert set(UNNAMED) - unnamed.keys() == set()
+
+
+def leaf_of(module: str) -> str:
+    """Return the leaf that a dotted name is in, or an empty string."""
+    parts = module.split(".")
+    if parts[0] != "minirospy":
+        return ""
+    return next((leaf for leaf in ("/".join(parts[1:2]), "/".join(parts[1:3])) if leaf in LEAVES), "")
+
+
+@functools.cache
+def imported_on_import(path: Path) -> frozenset[str]:
+    """Return what a file imports when it is imported: not in functions, not for types alone."""
+    found: set[str] = set()
+    blocks: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    while blocks:
+        node = blocks.pop()
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            blocks += node.orelse
+        elif not isinstance(node, (ast.expr, ast.FunctionDef, ast.AsyncFunctionDef)):
+            blocks += ast.iter_child_nodes(node)
+    return frozenset(found)
+
+
+def test_nothing_outside_imports_a_leaf() -> None:
+    upwards = []
+    for path in FILES:
+        relative = path.relative_to(PACKAGE).as_posix()
+        room = relative.partition("/")[0]
+        for module in imported_on_import(path) if room == "cli" else imports(path):
+            leaf = leaf_of(module)
+            if leaf and not relative.startswith(f"{leaf}/") and (relative, room_of(module)) not in UPWARDS:
+                upwards.append(f"{relative}: {module}")
+    assert upwards == []
+
+
+def test_each_leaf_exists() -> None:
+    assert [leaf for leaf in sorted(LEAVES) if not (PACKAGE / leaf).is_dir()] == []
+
+
+IMPORT_ALL = """
+import importlib, pkgutil, sys
+import minirospy
+
+def import_all(package):
+    for found in pkgutil.iter_modules(package.__path__, package.__name__ + "."):
+        if found.name.rpartition(".")[2] in ("__main__", "overlay"):
+            continue
+        try:
+            module = importlib.import_module(found.name)
+        except ImportError as error:
+            print(found.name, error)
+        except SystemExit:
+            pass  # a program that `rosrun` starts by its path
+        else:
+            if found.ispkg:
+                import_all(module)
+
+assert minirospy.__path__ == [sys.argv[1]], minirospy.__path__
+import_all(minirospy)
+"""
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a copy of the modules of the package, with the definitions of messages next to it."""
+    target = tmp_path_factory.mktemp("copy") / "minirospy"
+    for path in FILES:
+        copy = target / path.relative_to(PACKAGE)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, copy)
+    shutil.copytree(PACKAGE.parent / "msgs", target.with_name("msgs"))
+    return target
+
+
+@pytest.mark.parametrize("leaf", ["web", "fleet", "ros2", "ros"])
+def test_rest_can_be_imported_without_a_leaf(copied: Path, leaf: str) -> None:
+    """Without each room that is a leaf; without all ROS packages that are."""
+    gone = [each for each in LEAVES if each.split("/")[0] == leaf and (copied / each).exists()]
+    for each in gone:
+        (copied / each).rename(copied.parent / each.replace("/", " "))
+    try:
+        words = (sys.executable, "-c", IMPORT_ALL, str(copied))
+        done = subprocess.run(
+            words, cwd=copied.parent, capture_output=True, text=True, timeout=100, check=False
+        )
+    finally:
+        for each in gone:
+            (copied.parent / each.replace("/", " ")).rename(copied / each)
+    assert gone
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
 
 
 def test_every_room_has_its_place() -> None:

@@ -18,6 +18,7 @@ from types import CodeType
 import pytest
 
 from hatch_build import ADDRESS_VARIABLE, compress, lean, project_urls, without_comments
+from minirospy.ros.overlay_modules import overlay_files
 from tools.release import faults_of_metadata, unpack
 
 ROOT = Path(__file__).parents[1]
@@ -50,9 +51,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     left_out = shutil.ignore_patterns(".*", "__pycache__", "build", "dist")
     shutil.copytree(ROOT, source, ignore=left_out)
     shutil.copy(ROOT / ".gitignore", source)
-    for generated in (source / "minirospy" / "overlay").glob("*_msgs"):
-        if (ROOT / "msgs" / generated.name).exists():
-            shutil.rmtree(generated)
+    shutil.rmtree(source / "minirospy" / "overlay", ignore_errors=True)
     target = tmp_path_factory.mktemp("wheel")
     command = [
         sys.executable,
@@ -102,11 +101,7 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
     for name in (
         "minirospy_overlay.pth",
         "minirospy/py.typed",
-        "minirospy/overlay/rospy/__init__.py",
-        "minirospy/overlay/rospy/py.typed",
         "minirospy/overlay/std_msgs/py.typed",
-        "minirospy/overlay/tf2_geometry_msgs/__init__.py",
-        "minirospy/overlay/tf/transformations.py",
         "minirospy/overlay/tf/msg/_tfMessage.py",
         "minirospy/overlay/std_msgs/msg/_Bool.py",
         "minirospy/overlay/std_msgs/msg/__init__.pyi",
@@ -122,6 +117,7 @@ def test_wheel_is_pure_and_complete(wheel: Path) -> None:
         "minirospy/workspace/shell/ros.ps1",
     ):
         assert name in names
+    assert {f"minirospy/overlay/{name}" for name in overlay_files()} <= names
 
     assert wheel.stat().st_size < MAX_WHEEL_BYTES
     assert not [name for name in names if name.startswith(("tests/", "docs/")) or "__pycache__" in name]

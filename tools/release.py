@@ -22,6 +22,8 @@ from email import message_from_string
 from pathlib import Path
 
 from hatch_build import ADDRESS_VARIABLE, project_urls
+from minirospy.cli.windows import WINDOWS
+from minirospy.ros.overlay_modules import overlay_files
 from tools.sbom import SbomError, make_sbom
 
 ROOT = Path(__file__).parents[1]
@@ -145,8 +147,13 @@ def _is_expected(name: str, sources: Collection[str]) -> bool:
         if name.startswith(folder):
             return source + name.removeprefix(folder) in sources
 
-    # Generated from msgs/.
     _, _, module = name.partition("minirospy/overlay/")
+    if module in overlay_files() or any(
+        name.startswith(f"minirospy/ros/{window.package or window.command}/") for window in WINDOWS
+    ):
+        return True
+
+    # Generated from msgs/.
     package = module.partition("/")[0]
     return f"msgs/{package}/package.xml" in sources and name.endswith((".py", ".pyi", "/py.typed"))
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from minirospy.aio.raw import RawService
 from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.base.errors import MasterUnreachableError, RpcError, ServiceException
+from minirospy.base.heap import return_free_memory
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.fleet.clocks import ClockOffset, Ping, offset_of
@@ -24,7 +25,6 @@ from minirospy.fleet.presence import Presence
 from minirospy.fleet.rules import GatewayRules
 from minirospy.fleet.sender import Receiver, Sender
 from minirospy.introspect.snapshot import Snapshot, fetch
-from minirospy.runtime.master.heap import return_free_memory
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:

@@ -1,1 +1,1 @@
-"""Every ROS Python API that is emulated, one package each; `overlay/` re-exports them under ROS's names."""
+"""ROS packages, one folder each; `overlay_modules.py` offers their Python modules under ROS's names."""

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-from minirospy.ros2.xxh3 import xxh3_128
-
 __all__ = [
     "Entity",
     "Kind",
@@ -25,6 +23,7 @@ __all__ = [
     "parse_token",
     "reply_attachment",
     "tokens_pattern",
+    "xxh3_128",
 ]
 
 _SPACE = "@ros2_lv"
@@ -156,6 +155,14 @@ def _mangled(name: str) -> str:
 def gid_of(token: str) -> bytes:
     """Return the id of the entity that a token declares."""
     return xxh3_128(token.encode())
+
+
+def xxh3_128(data: bytes) -> bytes:
+    """Return the XXH3 hash with 128 bits as rmw_zenoh writes it, little-endian."""
+    # The extra `fleet` brings it; without it, the rest of this module works.
+    import xxhash
+
+    return xxhash.xxh3_128_intdigest(data).to_bytes(16, "little")
 
 
 # --- attachments

@@ -86,8 +86,8 @@ class ZenohNode:
     """A session with one node. ``graph``: the nodes and endpoints of other sessions."""
 
     def __init__(self, name: str, options: NetworkOptions) -> None:
-        """Open the session and wait for the router. Raise BridgeError."""
-        require_zenoh("ros2-bridge --zenoh")
+        """Open the session; waits for the router. Raise BridgeError."""
+        require_zenoh("ros2-bridge --zenoh", needs_hash=True)
         self.zenoh = importlib.import_module("zenoh")
         self.domain = parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
         self.session = self._opened(options)

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 from minirospy.aio.node import Node
 from minirospy.base.errors import BridgeError, MinirospyError, ROSInterruptException
 from minirospy.base.escape import escaped
+from minirospy.base.heap import return_large_blocks
 from minirospy.base.installation import install_command
 from minirospy.base.signal_dispatch import interrupt_signals
-from minirospy.runtime.master.heap import return_large_blocks
 from minirospy.runtime.transport.loop import new_event_loop
 
 if TYPE_CHECKING:

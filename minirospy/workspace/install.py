@@ -46,11 +46,6 @@ def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path
         for path in _files(built):
             yield modules / plan.name / path.relative_to(built), (path, False)
 
-    for file in plan.options:
-        header = workspace.devel / "include" / plan.name / f"{file.stem}Config.h"
-        if header.is_file():
-            yield workspace.install / "include" / plan.name / header.name, (header, False)
-
     if plan.has_setup:
         setup = read_python_setup(plan.folder)
         for name, folder in setup.packages.items():

@@ -1,4 +1,4 @@
-"""Run .cfg files, programs that describe a node's parameters; they write package.cfg.NAMEConfig, a C++ header and docs.
+"""Running .cfg files, programs that describe a node's parameters: package.cfg.NAMEConfig, and documents.
 
 Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfgFile.
 """
@@ -42,7 +42,6 @@ def make_options(plan: Plan, devel: Path) -> tuple[list[Path], tuple[str, ...]]:
             for path in (
                 module,
                 module.with_name("__init__.py"),
-                headers / f"{name}.h",
                 *(documents / "docs" / f"{name}{end}" for end in (".dox", ".wikidoc", "-usage.dox")),
             )
             if path.is_file()

@@ -235,19 +235,21 @@ def is_loopback_endpoint(endpoint: str) -> bool:
         return False
 
 
-def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False) -> None:
-    """Raise BridgeError with the install command if Zenoh's library is missing or incompatible.
+def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False, needs_hash: bool = False) -> None:
+    """Raise BridgeError with what to install if Zenoh's library is missing, or speaks another protocol.
 
-    ``who`` is the component that needs it. ``has_many_links``: peers will connect.
+    ``who`` needs it. ``has_many_links``: others will connect. ``needs_hash``: the library xxhash, too.
     """
     if has_many_links:
         # Set it before the import: Zenoh reads it once.
         os.environ.setdefault("ZENOH_RUNTIME", _THREADS)
     line = install_command("minirospy[fleet]", upgrade=True)
-    try:
-        importlib.import_module("zenoh.ext")
-    except ImportError as error:
-        raise BridgeError(f"{who} needs the library eclipse-zenoh: {line}") from error
+    libraries = {"eclipse-zenoh": "zenoh.ext"} | ({"xxhash": "xxhash"} if needs_hash else {})
+    for library, module in libraries.items():
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            raise BridgeError(f"{who} needs the library {library}: {line}") from error
     version = importlib.metadata.version("eclipse-zenoh")
     parts = [int(each) for each in re.findall(r"\d+", version)]
     if parts[0] != 1 or parts < [1, 5]:

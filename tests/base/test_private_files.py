@@ -18,7 +18,7 @@ from minirospy.base import private_files
 from minirospy.board.directory import BoardDirectory
 from minirospy.ros.roslaunch.launcher.output import Output
 from minirospy.ros.roslaunch.launcher.process import start_process
-from minirospy.ros.rostest.runner.junit import Result
+from minirospy.ros.rosunit.runner.junit import Result
 from minirospy.runtime.master.journal import Journal
 from minirospy.runtime.master.log_file import LogFile, LogFileHandler
 from tests.conftest import free_port

@@ -12,7 +12,7 @@ import pytest
 from minirospy.base.signal_dispatch import interrupt_signals
 from minirospy.command.command import run
 from minirospy.ros.rosmaster.commands import master
-from minirospy.ros.rostest.runner.bare import interrupt_noted
+from minirospy.ros.rosunit.runner.bare import interrupt_noted
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from minirospy.core.urdf.read import parse_robot
 from minirospy.ros.catkin.commands.test_results import read_counts
 from minirospy.ros.roslaunch.launcher.document import parse_document
 from minirospy.ros.roslib.roslib import manifest as old_manifest
-from minirospy.ros.rostest.runner import junit
+from minirospy.ros.rosunit.runner import junit
 from minirospy.ros.urdfdom_py.urdf_parser_py.urdf import URDF
 from minirospy.workspace.manifest import parse_manifest
 

@@ -9,7 +9,6 @@ from minirospy.core.idl.type_hash import type_hash
 from minirospy.ros2.definitions import Definitions
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.rules import BUILT_IN, parse_rules
-from minirospy.ros2.xxh3 import xxh3_128
 from minirospy.ros2.zenoh_keys import (
     Entity,
     Kind,
@@ -20,6 +19,7 @@ from minirospy.ros2.zenoh_keys import (
     gid_of,
     parse_token,
     reply_attachment,
+    xxh3_128,
 )
 from minirospy.ros2.zenoh_node import Graph
 from tests.ros2.ros2_definitions import catalogue
@@ -173,7 +173,7 @@ def test_attachments_are_two_numbers_and_an_id() -> None:
         (3000, "aa242c014767841b27fba92fe7b924d3"),
     ],
 )  # fmt: skip
-def test_xxh3_has_the_digests_of_xxhash(size: int, digest: str) -> None:
+def test_hash_is_that_of_rmw_zenoh(size: int, digest: str) -> None:
     assert xxh3_128(bytes(each % 251 for each in range(size))).hex() == digest
 
 

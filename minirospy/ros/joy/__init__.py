@@ -1,7 +1,4 @@
-"""Teleoperation: joysticks and keyboards, and the nodes that convert their input to Twist messages.
-
-Source: http://wiki.ros.org/joy, http://wiki.ros.org/teleop_twist_joy, http://wiki.ros.org/teleop_twist_keyboard.
-"""
+"""Joysticks as messages. Source: http://wiki.ros.org/joy."""
 
 from minirospy.base.ros1_imports import prefer_ros1
 

@@ -3,6 +3,6 @@
 
 import sys
 
-from minirospy.ros.joy.twist_keyboard import main
+from minirospy.ros.teleop_twist_keyboard.twist_keyboard import main
 
 sys.exit(main())

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import minirospy
 from minirospy.base.closing import close_all
 from minirospy.base.errors import MinirospyError, RpcError, RpcUnreachable
+from minirospy.base.heap import return_large_blocks
 from minirospy.base.steps import ALONE, Steps, finish
 from minirospy.core.graph.calls import Answer
 from minirospy.core.graph.master_api import MasterApi, Notice, nothing
@@ -27,7 +28,6 @@ from minirospy.core.graph.registry import NodeShutdown, PublisherUpdate, Registr
 from minirospy.core.wire.http import MAX_BODY
 from minirospy.core.wire.xmlrpc import Serialized, serialize_response_in_steps
 from minirospy.runtime.master.dead_nodes import find_dead
-from minirospy.runtime.master.heap import return_large_blocks
 from minirospy.runtime.master.notifier import Notifier
 from minirospy.runtime.master.replay import Replay, changes_to, forget_node
 from minirospy.runtime.rpc.async_client import AsyncRpcClient

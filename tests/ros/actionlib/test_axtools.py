@@ -12,8 +12,8 @@ from collections.abc import Iterator
 import pytest
 
 from minirospy.base.errors import MessageException
+from minirospy.command.form import ask_for, fields
 from minirospy.ros.actionlib.commands.axclient import progress
-from minirospy.ros.actionlib.commands.form import ask_for, fields
 from minirospy.workspace.packages import Packages
 
 SERVER = """

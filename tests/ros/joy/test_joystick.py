@@ -9,7 +9,7 @@ import pytest
 
 from minirospy.ros.joy.devices import state_events
 from minirospy.ros.joy.joystick import EVENT_AXIS, EVENT_BUTTON, EVENT_INIT, Event, Joystick, JoystickOptions
-from minirospy.ros.joy.twist_joy import JoyTeleop, read_options
+from minirospy.ros.teleop_twist_joy.twist_joy import JoyTeleop, read_options
 from tests.ros.joy.cases import OPTIONS, STATES, STEPS, TELEOPS
 
 RECORDED: dict[str, list[str]] = {}

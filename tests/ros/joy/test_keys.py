@@ -12,7 +12,7 @@ import pytest
 from geometry_msgs.msg import Twist, TwistStamped
 
 from minirospy import Node
-from minirospy.ros.joy.twist_keyboard import HELP, KeyTeleop
+from minirospy.ros.teleop_twist_keyboard.twist_keyboard import HELP, KeyTeleop
 from minirospy.workspace.packages import Packages
 from tests.ros.robot_state_publisher.conftest import SECONDS, Start
 

@@ -14,7 +14,7 @@ import pytest
 
 from minirospy.base.errors import MinirospyError
 from minirospy.ros.rostest.commands.rostest import rostest, rosunit
-from minirospy.ros.rostest.runner.bare import run_bare
+from minirospy.ros.rosunit.runner.bare import run_bare
 from tests.waiting import wait_until
 
 HERE = Path(__file__).parent

@@ -8,6 +8,8 @@ machine `update_result` -> simple_client `_handle_transition`, the user's callba
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from minirospy.ros.actionlib.actionlib.client import ActionClient
 from minirospy.ros.actionlib.actionlib.goal_id import GoalIDGenerator
 from minirospy.ros.actionlib.actionlib.handle import HandleTrackerDeleter, ServerGoalHandle, StatusTracker
@@ -26,6 +28,28 @@ from minirospy.ros.actionlib.actionlib.states import (
     get_name_of_constant,
 )
 
+if TYPE_CHECKING:
+    import threading as threading
+    import time as time
+    import traceback as traceback
+    import weakref as weakref
+
+    import rospy as rospy
+    from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
+    from std_msgs.msg import Header
+
+    from minirospy.ros.actionlib.actionlib import (
+        action_client,
+        action_server,
+        exceptions,
+        goal_id_generator,
+        handle_tracker_deleter,
+        server_goal_handle,
+        simple_action_client,
+        simple_action_server,
+        status_tracker,
+    )
+
 __all__ = [
     "INVALID_TRANSITION",
     "NO_TRANSITION",
@@ -35,16 +59,34 @@ __all__ = [
     "ClientGoalHandle",
     "CommState",
     "CommStateMachine",
+    "GoalID",
     "GoalIDGenerator",
     "GoalManager",
+    "GoalStatus",
+    "GoalStatusArray",
     "HandleTrackerDeleter",
+    "Header",
     "ServerGoalHandle",
     "SimpleActionClient",
     "SimpleActionServer",
     "SimpleGoalState",
     "StatusTracker",
     "TerminalState",
+    "action_client",
+    "action_server",
+    "exceptions",
     "g_goal_id",
     "get_name_of_constant",
+    "goal_id_generator",
+    "handle_tracker_deleter",
     "nop_cb",
+    "rospy",
+    "server_goal_handle",
+    "simple_action_client",
+    "simple_action_server",
+    "status_tracker",
+    "threading",
+    "time",
+    "traceback",
+    "weakref",
 ]

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
 from minirospy.base.errors import ROSException, UsageError
+from minirospy.command.form import ask_for, fields, flow
 from minirospy.command.parser import Parser
 from minirospy.command.verbs import Command
-from minirospy.ros.actionlib.commands.form import ask_for, fields, flow
 
 if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Action, Message

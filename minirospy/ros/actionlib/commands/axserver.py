@@ -10,10 +10,10 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from minirospy.command.form import ask_for
 from minirospy.command.parser import Parser
 from minirospy.command.verbs import Command
 from minirospy.ros.actionlib.commands.axclient import NodeParser, action_class, read_answer
-from minirospy.ros.actionlib.commands.form import ask_for
 
 if TYPE_CHECKING:
     from minirospy.ros.actionlib.actionlib import SimpleActionServer

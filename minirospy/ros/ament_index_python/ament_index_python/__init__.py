@@ -3,3 +3,24 @@
 xacro supports both ROS 1 and 2, and its PyPI release looks packages up as ROS 2 does. In an environment with ROS 2, the
 real module takes precedence.
 """
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from minirospy.ros.ament_index_python.ament_index_python import packages
+    from minirospy.ros.ament_index_python.ament_index_python.packages import (
+        PackageNotFoundError,
+        get_package_prefix,
+        get_package_share_directory,
+        get_package_share_path,
+        get_packages_with_prefixes,
+    )
+
+__all__ = [
+    "PackageNotFoundError",
+    "get_package_prefix",
+    "get_package_share_directory",
+    "get_package_share_path",
+    "get_packages_with_prefixes",
+    "packages",
+]

@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from math import fmod, pi
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from math import fabs
 
 __all__ = [
+    "_find_min_max_delta",
+    "fabs",
+    "fmod",
     "normalize_angle",
     "normalize_angle_positive",
+    "pi",
     "shortest_angular_distance",
     "shortest_angular_distance_with_large_limits",
     "shortest_angular_distance_with_limits",

@@ -32,7 +32,6 @@ __all__ = [
     "URL_invalid",
     "URL_package",
     "default_camera_info_url",
-    "filename_of",
     "genCameraName",
     "getPackageFileName",
     "loadCalibrationFile",

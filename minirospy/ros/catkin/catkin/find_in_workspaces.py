@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from minirospy.base.errors import NotFoundError
-from minirospy.ros.catkin.catkin.workspace import get_source_paths, get_workspaces
+from minirospy.ros.catkin.catkin.workspace import get_source_paths as get_source_paths
+from minirospy.ros.catkin.catkin.workspace import get_workspaces as get_workspaces
 from minirospy.workspace.packages import Packages
 
 __all__ = ["find_in_workspaces"]

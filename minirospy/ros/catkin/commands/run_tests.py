@@ -17,7 +17,7 @@ from minirospy.base.child_lifetime import guard_children
 from minirospy.base.errors import BuildError, MinirospyError, NotFoundError
 from minirospy.base.installation import install_command
 from minirospy.ros.catkin.commands.test_results import Counts, results_below
-from minirospy.ros.rostest.runner.bare import POLL_SECONDS, interrupt_noted
+from minirospy.ros.rosunit.runner.bare import POLL_SECONDS, interrupt_noted
 from minirospy.workspace.build import Workspace
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
 

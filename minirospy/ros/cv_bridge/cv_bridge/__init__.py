@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from minirospy.core.images.encodings import type_of_encoding
 from minirospy.ros.cv_bridge.cv_bridge.core import CvBridge, CvBridgeError
+
+if TYPE_CHECKING:
+    from minirospy.ros.cv_bridge.cv_bridge import core as core
 
 __all__ = ["CvBridge", "CvBridgeError", "getCvType"]
 

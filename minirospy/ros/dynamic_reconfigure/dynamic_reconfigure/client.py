@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dynamic_reconfigure.msg import Config as ConfigMsg
 from dynamic_reconfigure.msg import ConfigDescription
@@ -28,7 +28,11 @@ from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.encoding import (
     extract_params,
 )
 
-__all__ = ["Client"]
+if TYPE_CHECKING:
+    from dynamic_reconfigure.msg import ConfigDescription as ConfigDescrMsg
+    from dynamic_reconfigure.srv import Reconfigure as ReconfigureSrv
+
+__all__ = ["Client", "ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv"]
 
 _SLICE_SECONDS = 0.25  # seconds between checks for the node's shutdown while waiting
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from dynamic_reconfigure.msg import (
     BoolParameter,
@@ -25,8 +25,21 @@ from dynamic_reconfigure.msg import Config as ConfigMsg
 
 from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure import ConfigType, Entry, GroupTree, Values
 
+if TYPE_CHECKING:
+    from dynamic_reconfigure.msg import ConfigDescription as ConfigDescrMsg
+    from dynamic_reconfigure.msg import Group as GroupMsg
+
 __all__ = [
+    "BoolParameter",
     "Config",
+    "ConfigDescrMsg",
+    "ConfigMsg",
+    "DoubleParameter",
+    "GroupMsg",
+    "GroupState",
+    "IntParameter",
+    "ParamDescription",
+    "StrParameter",
     "decode_config",
     "decode_description",
     "encode_config",

@@ -1,28 +1,38 @@
 """dynamic_reconfigure.parameter_generator_catkin: the API with which a .cfg file, a Python program, defines parameters.
 
-catkin_make runs the .cfg file with four folders as arguments: that of dynamic_reconfigure, and the output folders for
-documents, C++ headers and Python modules.
+catkin_make runs it with four folders, as ROS does: of dynamic_reconfigure, and for documents, C++ headers and Python modules.
+No header is written: nothing here compiles C++.
 Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfgFile.
 """
 
 from __future__ import annotations
 
+import inspect as inspect
+import os as os
 import re
 import sys
+import textwrap as textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from string import Template
 from typing import Literal, TypeAlias
 
-from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure import Entry, Value, generated, header
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure import Entry, Value, generated
 
 __all__ = [
     "ParameterGenerator",
+    "Template",
     "bool_t",
     "check_description",
     "check_name",
     "double_t",
+    "inspect",
     "int_t",
+    "os",
+    "re",
     "str_t",
+    "sys",
+    "textwrap",
 ]
 
 str_t = "str"
@@ -51,7 +61,7 @@ See http://wiki.ros.org/dynamic_reconfigure/Tutorials"""
 
 
 def check_description(description: str) -> None:
-    """Raise Exception if a description contains a quote, which the C++ header does not allow."""
+    """Raise Exception if a description has a quote, as ROS does, whose C++ header cannot hold one."""
     if "'" in description or '"' in description:
         raise Exception(f"quotes not allowed in description string `{description}`")
 
@@ -257,7 +267,7 @@ class ParameterGenerator:
         return self.group.add_group(name, type, state)
 
     def generate(self, pkgname: str, nodename: str, name: str) -> None:
-        """Write NAMEConfig.py, NAMEConfig.h and documents; ``name`` is the name of the .cfg file."""
+        """Write NAMEConfig.py and documents; ``name`` is that of the .cfg file."""
         self.pkgname, self.nodename, self.name = pkgname, nodename, name
         self.msgname = f"{name}Config"
         print(f"Generating reconfiguration files for {name} in {pkgname}")
@@ -270,7 +280,6 @@ class ParameterGenerator:
                 documents / f"{self.msgname}-usage.dox",
                 generated.usage_document(self.group, pkgname, nodename),
             ),
-            (Path(self.cpp_gen_dir) / f"{self.msgname}.h", self._header()),
             (Path(self.py_gen_dir) / "cfg" / f"{self.msgname}.py", self._module()),
         ):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -280,12 +289,9 @@ class ParameterGenerator:
     def _module(self) -> str:
         return generated.python_module(self.pkgname, self.name, self.group.to_dict(), self.constants)
 
-    def _header(self) -> str:
-        return header.cpp_header(self.pkgname, self.name, self.group, self.constants)
-
 
 def _source_line() -> tuple[str, int]:
-    """Return the name of the .cfg file and its currently executed line, for comments in the headers."""
+    """Return the name of the .cfg file and the line in it that is running, which the description of each parameter has."""
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename == __file__:
         frame = frame.f_back

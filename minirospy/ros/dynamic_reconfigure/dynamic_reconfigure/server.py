@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 import threading
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from dynamic_reconfigure.msg import Config as ConfigMsg
 from dynamic_reconfigure.msg import ConfigDescription
@@ -32,7 +33,11 @@ from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.encoding import (
     initial_config,
 )
 
-__all__ = ["Server"]
+if TYPE_CHECKING:
+    from dynamic_reconfigure.msg import ConfigDescription as ConfigDescrMsg
+    from dynamic_reconfigure.srv import Reconfigure as ReconfigureSrv
+
+__all__ = ["ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv", "Server"]
 
 # Python types allowed by each parameter type; rosparam stores a double without a decimal point as an int.
 _TYPES: dict[str, tuple[type, ...]] = {

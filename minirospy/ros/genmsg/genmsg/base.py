@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from minirospy.base.errors import MessageException
+
 __all__ = [
     "COMMENTCHAR",
     "CONSTCHAR",
@@ -12,6 +14,7 @@ __all__ = [
     "SEP",
     "SRV_DIR",
     "InvalidMsgSpec",
+    "MsgGenerationException",
 ]
 
 SEP = "/"
@@ -25,4 +28,8 @@ IODELIM = "---"
 
 
 class InvalidMsgSpec(Exception):
-    """A definition cannot be parsed."""
+    """A definition does not parse."""
+
+
+class MsgGenerationException(MessageException):
+    """No class can be made from a definition."""

@@ -13,26 +13,51 @@ from minirospy.base.errors import DefinitionError
 from minirospy.core.idl import digest
 from minirospy.core.idl.parse import parse_message, parse_service
 from minirospy.core.idl.spec import MessageSpec, ServiceSpec
-from minirospy.ros.genmsg.genmsg.base import InvalidMsgSpec
+from minirospy.ros.genmsg.genmsg.base import (
+    COMMENTCHAR,
+    CONSTCHAR,
+    EXT_MSG,
+    EXT_SRV,
+    IODELIM,
+    SEP,
+    InvalidMsgSpec,
+)
 from minirospy.ros.genmsg.genmsg.msgs import (
+    DURATION,
+    DURATION_MSG,
+    HEADER,
     HEADER_FULL_NAME,
+    TIME,
+    TIME_MSG,
     Constant,
     MsgSpec,
     bare_msg_type,
     is_builtin,
+    is_valid_msg_field_name,
     resolve_type,
     why_invalid,
 )
+from minirospy.ros.genmsg.genmsg.names import package_resource_name
 from minirospy.ros.genmsg.genmsg.srvs import SrvSpec
-from minirospy.ros.genpy.genpy.base import MsgGenerationException
-from minirospy.ros.roslib.roslib.names import package_resource_name
 
 __all__ = [
+    "COMMENTCHAR",
+    "CONSTCHAR",
+    "DURATION",
+    "DURATION_MSG",
+    "EXT_MSG",
+    "EXT_SRV",
+    "HEADER",
+    "HEADER_FULL_NAME",
+    "IODELIM",
+    "SEP",
+    "TIME",
+    "TIME_MSG",
     "MsgContext",
-    "MsgGenerationException",
     "MsgNotFound",
     "get_msg_file",
     "get_srv_file",
+    "is_valid_msg_field_name",
     "load_depends",
     "load_msg_by_type",
     "load_msg_from_file",
@@ -40,8 +65,6 @@ __all__ = [
     "load_srv_by_type",
     "load_srv_from_file",
     "load_srv_from_string",
-    "lookup_in",
-    "parsed_message",
 ]
 
 _BETWEEN = re.compile(r"^---.*\n?", re.MULTILINE)

@@ -6,19 +6,23 @@ import ast
 import re
 from typing import NamedTuple
 
-from minirospy.ros.genmsg.genmsg.base import InvalidMsgSpec
+from minirospy.ros.genmsg.genmsg.base import EXT_MSG, MSG_DIR, SEP, InvalidMsgSpec
 
 __all__ = [
     "BUILTIN_TYPES",
     "DURATION",
     "DURATION_MSG",
+    "EXT_MSG",
     "HEADER",
     "HEADER_FULL_NAME",
+    "MSG_DIR",
     "PRIMITIVE_TYPES",
+    "SEP",
     "TIME",
     "TIME_MSG",
     "Constant",
     "Field",
+    "InvalidMsgSpec",
     "MsgSpec",
     "bare_msg_type",
     "is_builtin",
@@ -28,7 +32,6 @@ __all__ = [
     "is_valid_msg_type",
     "parse_type",
     "resolve_type",
-    "why_invalid",
 ]
 
 HEADER = "Header"

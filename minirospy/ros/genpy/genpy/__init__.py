@@ -1,1 +1,23 @@
-"""genpy: the names that generated message modules import."""
+"""genpy: what generated messages import."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from minirospy.base.times import Duration, Time, TVal
+    from minirospy.core.idl.message import DeserializationError, Message, MessageException, SerializationError
+    from minirospy.ros.genpy.genpy import base as base
+    from minirospy.ros.genpy.genpy import dynamic as dynamic
+    from minirospy.ros.genpy.genpy import message as message
+    from minirospy.ros.genpy.genpy import rostime as rostime
+    from minirospy.ros.genpy.genpy.message import struct_I
+
+__all__ = [
+    "DeserializationError",
+    "Duration",
+    "Message",
+    "MessageException",
+    "SerializationError",
+    "TVal",
+    "Time",
+    "struct_I",
+]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from minirospy.base.errors import MessageException
+from minirospy.ros.genmsg.genmsg.base import MsgGenerationException
 
 __all__ = ["SIMPLE_TYPES", "SIMPLE_TYPES_DICT", "MsgGenerationException", "is_simple"]
 
@@ -12,10 +12,6 @@ SIMPLE_TYPES_DICT = {
 }  # fmt: skip
 
 SIMPLE_TYPES = list(SIMPLE_TYPES_DICT)
-
-
-class MsgGenerationException(MessageException):
-    """No class can be generated from a definition."""
 
 
 def is_simple(type_: str) -> bool:

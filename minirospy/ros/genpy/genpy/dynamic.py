@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import DefinitionError
+from minirospy.ros.genpy.genpy.base import MsgGenerationException
 
 if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Message
 
-__all__ = ["generate_dynamic"]
+__all__ = ["MsgGenerationException", "generate_dynamic"]
 
 
 def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, type[Message]]:
@@ -34,7 +35,6 @@ def _as_genpy(core_type: str, msg_cat: str, error: DefinitionError) -> Exception
         load_depends,
         load_msg_from_string,
     )
-    from minirospy.ros.genpy.genpy.base import MsgGenerationException
 
     first, *others = msg_cat.split(f"\n{'=' * 80}\n")
     if not all(part.startswith("MSG:") for part in others):

@@ -30,6 +30,7 @@ __all__ = [
     "Generator",
     "MsgGenerator",
     "SrvGenerator",
+    "_remap_reserved",
     "compute_outfile_name",
     "compute_pkg_type",
     "compute_resource_name",

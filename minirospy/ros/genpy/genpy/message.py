@@ -10,15 +10,41 @@ import codecs
 import struct
 from typing import TYPE_CHECKING
 
+from minirospy.base.times import Duration, Time, TVal
+from minirospy.core.idl.message import (
+    DeserializationError,
+    Message,
+    MessageException,
+    SerializationError,
+    check_type,
+    fill_message_args,
+    get_printable_message_args,
+    strify_message,
+)
+from minirospy.ros.genpy.genpy.base import is_simple
+
 if TYPE_CHECKING:
-    from minirospy.core.idl.protocols import Message, ServiceClass
+    from minirospy.core.idl import protocols
+    from minirospy.core.idl.protocols import ServiceClass
 
 __all__ = [
+    "DeserializationError",
+    "Duration",
+    "Message",
+    "MessageException",
     "RosMsgUnicodeErrors",
+    "SerializationError",
+    "TVal",
+    "Time",
+    "_get_message_or_service_class",
+    "check_type",
+    "fill_message_args",
     "get_message_class",
+    "get_printable_message_args",
     "get_service_class",
+    "is_simple",
     "isstring",
-    "register_unicode_errors",
+    "strify_message",
     "struct_I",
 ]
 
@@ -53,8 +79,8 @@ def register_unicode_errors() -> None:
         codecs.register_error("rosmsg", RosMsgUnicodeErrors())
 
 
-def get_message_class(message_type: str, reload_on_error: bool = False) -> type[Message] | None:
-    """Return the class of ``pkg/Name``, or None. Raise ValueError for an invalid type name."""
+def get_message_class(message_type: str, reload_on_error: bool = False) -> type[protocols.Message] | None:
+    """Return the class of ``pkg/Name``, or None. Raise ValueError on an invalid type name."""
     from minirospy.core.idl import load
 
     return load.get_message_class(_checked(message_type))
@@ -74,8 +100,8 @@ def isstring(s: object) -> bool:
 
 def _get_message_or_service_class(
     type_str: str, message_type: str, reload_on_error: bool = False
-) -> type[Message] | ServiceClass | None:
-    """Return the class of a message or service (``kind``), or None. Raise ValueError for an invalid type name."""
+) -> type[protocols.Message] | ServiceClass | None:
+    """Return the class of a ``message`` or ``service``, or None. Raise ValueError on an invalid type name."""
     if type_str == "service":
         return get_service_class(message_type, reload_on_error)
     return get_message_class(message_type, reload_on_error)

@@ -22,7 +22,7 @@ from visualization_msgs.msg import (
 
 from minirospy import client as rospy
 
-__all__ = ["InteractiveMarkerServer", "MarkerContext", "UpdateContext"]
+__all__ = ["Header", "InteractiveMarkerServer", "MarkerContext", "UpdateContext"]
 
 Callback = Callable[[InteractiveMarkerFeedback], object]
 

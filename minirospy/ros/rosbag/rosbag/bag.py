@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any, TypedDict
 from minirospy.base.errors import BagCompressionError, BagError
 from minirospy.core.bag import compression as compressions
 from minirospy.core.bag import info
+from minirospy.core.bag.info import _human_frequency as _human_readable_frequency
+from minirospy.core.bag.info import _human_size as _human_readable_size
 from minirospy.core.bag.reader import ChunkedReader
 from minirospy.core.bag.reader12 import Reader12
 from minirospy.core.bag.repair import Repair
@@ -29,7 +31,11 @@ from minirospy.ros.rosbag.rosbag.exceptions import (
     as_ros_errors,
     raise_as_ros,
 )
+from minirospy.ros.rosbag.rosbag.internals import _ChunkHeader as _ChunkHeader
+from minirospy.ros.rosbag.rosbag.internals import _ChunkInfo as _ChunkInfo
 from minirospy.ros.rosbag.rosbag.internals import _ConnectionInfo, _get_message_type
+from minirospy.ros.rosbag.rosbag.internals import _IndexEntry as _IndexEntry
+from minirospy.ros.rosbag.rosbag.internals import _message_types as _message_types
 from minirospy.ros.rosbag.rosbag.opening import CLOSED, FileArgument, OpenedBag
 from minirospy.ros.rosbag.rosbag.private import (
     BagMessage,
@@ -53,6 +59,16 @@ __all__ = [
     "ROSBagException",
     "ROSBagFormatException",
     "ROSBagUnindexedException",
+    "_BagReader",
+    "_BagReader200",
+    "_ChunkHeader",
+    "_ChunkInfo",
+    "_ConnectionInfo",
+    "_IndexEntry",
+    "_get_message_type",
+    "_human_readable_frequency",
+    "_human_readable_size",
+    "_message_types",
     "found_lz4",
 ]
 

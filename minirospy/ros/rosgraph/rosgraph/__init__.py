@@ -2,11 +2,41 @@
 
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from minirospy.base.names import parse_arguments
 from minirospy.ros.submodules import on_first_use
 
-__all__ = ["myargv"]
+if TYPE_CHECKING:
+    from minirospy.ros.rosgraph.rosgraph import masterapi as masterapi
+    from minirospy.ros.rosgraph.rosgraph import names as names
+    from minirospy.ros.rosgraph.rosgraph import network as network
+    from minirospy.ros.rosgraph.rosgraph import rosenv as rosenv
+    from minirospy.ros.rosgraph.rosgraph.masterapi import Master, MasterError, MasterException, MasterFailure
+    from minirospy.ros.rosgraph.rosgraph.masterapi import is_online as is_master_online
+    from minirospy.ros.rosgraph.rosgraph.rosenv import (
+        ROS_HOSTNAME,
+        ROS_IP,
+        ROS_IPV6,
+        ROS_MASTER_URI,
+        ROS_NAMESPACE,
+        get_master_uri,
+    )
+
+__all__ = [
+    "ROS_HOSTNAME",
+    "ROS_IP",
+    "ROS_IPV6",
+    "ROS_MASTER_URI",
+    "ROS_NAMESPACE",
+    "Master",
+    "MasterError",
+    "MasterException",
+    "MasterFailure",
+    "get_master_uri",
+    "is_master_online",
+    "myargv",
+]
 
 __getattr__ = on_first_use("rosgraph", "roslogging", "xmlrpc")
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from minirospy.base.errors import MasterUnreachableError, RpcError, RpcRefused
 from minirospy.client.params import as_xmlrpc_client, check_sendable
-from minirospy.ros.rosgraph.rosgraph.names import make_caller_id
-from minirospy.ros.rosgraph.rosgraph.network import parse_http_host_and_port
+from minirospy.ros.rosgraph.rosgraph.names import make_caller_id as make_caller_id
+from minirospy.ros.rosgraph.rosgraph.network import parse_http_host_and_port as parse_http_host_and_port
 from minirospy.ros.rosgraph.rosgraph.rosenv import get_master_uri
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
@@ -24,6 +24,7 @@ __all__ = [
     "MasterException",
     "MasterFailure",
     "ROSMasterException",
+    "get_master_uri",
     "is_online",
 ]
 

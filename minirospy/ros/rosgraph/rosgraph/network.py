@@ -15,12 +15,15 @@ from minirospy.base.environment import Environment, is_local
 from minirospy.base.errors import WireError
 from minirospy.core.wire.framing import LENGTH_BYTES, parse_length
 from minirospy.core.wire.header import parse_header
-from minirospy.ros.rosgraph.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP
+from minirospy.ros.rosgraph.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP, ROS_IPV6
 
 if TYPE_CHECKING:
     from io import BytesIO
 
 __all__ = [
+    "ROS_HOSTNAME",
+    "ROS_IP",
+    "ROS_IPV6",
     "ROSHandshakeException",
     "create_local_xmlrpc_uri",
     "decode_ros_handshake_header",

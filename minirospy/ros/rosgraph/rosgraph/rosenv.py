@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from minirospy.base.environment import DEFAULT_MASTER_PORT
 
 __all__ = [
+    "DEFAULT_MASTER_PORT",
     "DEFAULT_MASTER_URI",
     "ROS_HOSTNAME",
     "ROS_IP",

@@ -5,7 +5,17 @@ from __future__ import annotations
 import logging
 import os
 
-__all__ = ["LoggingException", "RospyLogger", "configure_logging"]
+from minirospy.client.log_handlers import RosStreamHandler
+
+__all__ = [
+    "LoggingException",
+    "RosStreamHandler",
+    "RospyLogger",
+    "_color_reset",
+    "_defaultFormatter",
+    "_logging_to_rospy_names",
+    "configure_logging",
+]
 
 
 class LoggingException(Exception):

@@ -9,11 +9,19 @@ import logging
 import threading
 from collections.abc import Callable
 from socketserver import ThreadingMixIn
-from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+from xmlrpc.server import SimpleXMLRPCRequestHandler as SimpleXMLRPCRequestHandler
+from xmlrpc.server import SimpleXMLRPCServer as SimpleXMLRPCServer
 
+from minirospy.ros.ros_names import isstring
 from minirospy.ros.rosgraph.rosgraph.network import create_local_xmlrpc_uri, get_bind_address
 
-__all__ = ["SilenceableXMLRPCRequestHandler", "ThreadingXMLRPCServer", "XmlRpcHandler", "XmlRpcNode"]
+__all__ = [
+    "SilenceableXMLRPCRequestHandler",
+    "ThreadingXMLRPCServer",
+    "XmlRpcHandler",
+    "XmlRpcNode",
+    "isstring",
+]
 
 _log = logging.getLogger("xmlrpc")
 

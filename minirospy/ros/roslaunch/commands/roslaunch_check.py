@@ -14,7 +14,7 @@ from minirospy.base.errors import MinirospyError
 from minirospy.command.parser import Parser
 from minirospy.command.verbs import Command
 from minirospy.ros.roslaunch.launcher.check import faults_of, problem_line
-from minirospy.ros.rostest.runner.junit import failure_junit_xml, success_junit_xml
+from minirospy.ros.rosunit.runner.junit import failure_junit_xml, success_junit_xml
 from minirospy.workspace.packages import Packages, package_name
 
 __all__ = ["COMMAND", "main"]

@@ -5,11 +5,54 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from minirospy.base.environment import DEFAULT_MASTER_PORT
 from minirospy.base.private_files import open_text
 
-__all__ = ["NAME", "configure_logging", "main", "write_pid_file"]
+if TYPE_CHECKING:
+    from minirospy.ros.roslaunch.roslaunch import arg_dump as arg_dump
+    from minirospy.ros.roslaunch.roslaunch import config as config
+    from minirospy.ros.roslaunch.roslaunch import core as core
+    from minirospy.ros.roslaunch.roslaunch import core as roslaunch_core
+    from minirospy.ros.roslaunch.roslaunch import depends as depends
+    from minirospy.ros.roslaunch.roslaunch import launch as launch
+    from minirospy.ros.roslaunch.roslaunch import loader as loader
+    from minirospy.ros.roslaunch.roslaunch import node_args as node_args
+    from minirospy.ros.roslaunch.roslaunch import nodeprocess as nodeprocess
+    from minirospy.ros.roslaunch.roslaunch import param_dump as param_dump
+    from minirospy.ros.roslaunch.roslaunch import parent as parent
+    from minirospy.ros.roslaunch.roslaunch import pmon as pmon
+    from minirospy.ros.roslaunch.roslaunch import rlutil as rlutil
+    from minirospy.ros.roslaunch.roslaunch import scriptapi as scriptapi
+    from minirospy.ros.roslaunch.roslaunch import server as server
+    from minirospy.ros.roslaunch.roslaunch import substitution_args as substitution_args
+    from minirospy.ros.roslaunch.roslaunch import xmlloader as xmlloader
+    from minirospy.ros.roslaunch.roslaunch.config import ROSLaunchConfig
+    from minirospy.ros.roslaunch.roslaunch.core import Master, Node, RLException, Test
+    from minirospy.ros.roslaunch.roslaunch.launch import ROSLaunchRunner
+    from minirospy.ros.roslaunch.roslaunch.pmon import Process
+    from minirospy.ros.roslaunch.roslaunch.scriptapi import ROSLaunch
+    from minirospy.ros.roslaunch.roslaunch.xmlloader import XmlLoader, XmlParseException
+
+__all__ = [
+    "DEFAULT_MASTER_PORT",
+    "NAME",
+    "Master",
+    "Node",
+    "Process",
+    "RLException",
+    "ROSLaunch",
+    "ROSLaunchConfig",
+    "ROSLaunchRunner",
+    "Test",
+    "XmlLoader",
+    "XmlParseException",
+    "configure_logging",
+    "main",
+    "roslaunch_core",
+    "write_pid_file",
+]
 
 NAME = "roslaunch"
 

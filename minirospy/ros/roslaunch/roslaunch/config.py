@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from minirospy.base.environment import DISTRO, ROS_VERSION, Environment
+from minirospy.base.environment import DEFAULT_MASTER_PORT, DISTRO, ROS_VERSION, Environment
 from minirospy.base.errors import LaunchError
 from minirospy.ros.roslaunch.launcher.spec import LaunchSpec
 from minirospy.ros.roslaunch.launcher.summary import summary
@@ -24,10 +24,14 @@ from minirospy.ros.roslaunch.roslaunch.core import (
 from minirospy.ros.roslaunch.roslaunch.xmlloader import XmlLoader
 
 __all__ = [
-    "LaunchFile",
+    "DEFAULT_MASTER_PORT",
+    "Master",
+    "RLException",
     "ROSLaunchConfig",
     "get_roscore_filename",
+    "is_machine_local",
     "load_config_default",
+    "local_machine",
     "namespaces_of",
 ]
 

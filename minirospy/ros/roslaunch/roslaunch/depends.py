@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from minirospy.base.errors import MinirospyError
+from minirospy.ros.roslaunch.commands.roslaunch_deps import main as roslaunch_deps_main
 from minirospy.ros.roslaunch.launcher.depends import file_needs, missing_declarations, package_of
 from minirospy.ros.roslaunch.roslaunch.substitution_args import chosen_packages
 
-__all__ = ["NAME", "RoslaunchDeps", "RoslaunchDepsException", "roslaunch_deps"]
+__all__ = ["NAME", "RoslaunchDeps", "RoslaunchDepsException", "roslaunch_deps", "roslaunch_deps_main"]
 
 NAME = "roslaunch-deps"
 

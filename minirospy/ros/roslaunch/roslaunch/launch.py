@@ -14,21 +14,30 @@ from minirospy.ros.roslaunch.launcher.output import Output
 from minirospy.ros.roslaunch.launcher.process import Timeouts
 from minirospy.ros.roslaunch.launcher.runner import RunOptions
 from minirospy.ros.roslaunch.roslaunch.config import ROSLaunchConfig
-from minirospy.ros.roslaunch.roslaunch.core import Node, RLException, Test
+from minirospy.ros.roslaunch.roslaunch.core import Machine, Master, Node, Param, RLException, Test
 from minirospy.ros.roslaunch.roslaunch.pmon import (
     ApiLauncher,
     Process,
     ProcessListener,
     ProcessMonitor,
     init_signal_handlers,
+    start_process_monitor,
 )
+from minirospy.ros.roslaunch.roslaunch.pmon import ProcessListener as ROSLaunchListener
 
 __all__ = [
+    "Machine",
+    "Master",
+    "Node",
+    "Param",
+    "ProcessListener",
+    "RLException",
     "RLTestTimeoutException",
+    "ROSLaunchListener",
     "ROSLaunchRunner",
-    "master_options",
-    "replacement_of",
-    "unify_clear_params",
+    "Test",
+    "_unify_clear_params",
+    "start_process_monitor",
 ]
 
 _POLL_SECONDS = 0.05
@@ -214,3 +223,6 @@ def unify_clear_params(params: Iterable[str]) -> list[str]:
         for name in dict.fromkeys(names)
         if not any(name != other and name.startswith(other) for other in names)
     ]
+
+
+_unify_clear_params = unify_clear_params

@@ -8,7 +8,8 @@ from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError
 from minirospy.ros.roslaunch.launcher.command import node_command, node_environment
 from minirospy.ros.roslaunch.launcher.spec import NodeSpec
-from minirospy.ros.roslaunch.roslaunch.config import LaunchFile, ROSLaunchConfig, load_config_default
+from minirospy.ros.roslaunch.roslaunch.config import LaunchFile, ROSLaunchConfig
+from minirospy.ros.roslaunch.roslaunch.config import load_config_default as load_config_default
 from minirospy.ros.roslaunch.roslaunch.core import Machine, Node
 from minirospy.ros.roslaunch.roslaunch.substitution_args import chosen_packages
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-import yaml
+import yaml as yaml
 
 from minirospy.base.errors import MinirospyError
 from minirospy.ros.roslaunch.launcher.load import load_files

@@ -18,7 +18,7 @@ from minirospy.ros.roslaunch.roslaunch.launch import ROSLaunchRunner, master_opt
 from minirospy.ros.roslaunch.roslaunch.pmon import ProcessListener, ProcessMonitor
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
-__all__ = ["ROSLaunchParent"]
+__all__ = ["RLException", "ROSLaunchParent", "load_config_default"]
 
 
 class ROSLaunchParent:

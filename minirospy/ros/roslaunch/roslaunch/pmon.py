@@ -29,12 +29,11 @@ from minirospy.ros.roslaunch.roslaunch.node_args import NodeParamsException
 from minirospy.workspace.packages import Packages
 
 __all__ = [
-    "ApiLauncher",
     "Process",
     "ProcessListener",
     "ProcessMonitor",
-    "create_node_process",
-    "init_signal_handlers",
+    "RLException",
+    "_init_signal_handlers",
     "pmon_shutdown",
     "rl_signal",
     "shutdown_process_monitor",
@@ -391,6 +390,9 @@ def init_signal_handlers() -> None:
     for number in numbers:
         if number is not None and not isinstance(signal.getsignal(number), _Handler):
             _Handler(number)
+
+
+_init_signal_handlers = init_signal_handlers
 
 
 def rl_signal(sig: int, stackframe: FrameType | None) -> None:

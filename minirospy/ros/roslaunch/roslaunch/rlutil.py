@@ -18,6 +18,7 @@ from minirospy.ros.roslaunch.roslaunch.substitution_args import chosen_packages
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = [
+    "_wait_for_master",
     "change_terminal_name",
     "check_log_disk_usage",
     "check_roslaunch",

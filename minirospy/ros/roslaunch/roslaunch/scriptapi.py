@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from minirospy.ros.roslaunch.roslaunch.config import ROSLaunchConfig
-from minirospy.ros.roslaunch.roslaunch.core import Node, RLException
+from minirospy.ros.roslaunch.roslaunch.core import Master, Node, RLException
 from minirospy.ros.roslaunch.roslaunch.parent import ROSLaunchParent
 from minirospy.ros.roslaunch.roslaunch.pmon import Process
 from minirospy.ros.roslaunch.roslaunch.rlutil import get_or_generate_uuid
 from minirospy.ros.roslaunch.roslaunch.xmlloader import XmlLoader
 
-__all__ = ["ROSLaunch"]
+__all__ = ["Master", "Node", "RLException", "ROSLaunch"]
 
 
 class ROSLaunch:

@@ -18,10 +18,41 @@ from typing import TypeAlias
 from minirospy.base import names
 from minirospy.ros.catkin.catkin.find_in_workspaces import find_in_workspaces
 from minirospy.ros.roslaunch.launcher.substitution import convert
+from minirospy.ros.roslaunch.roslaunch.loader import convert_value
 from minirospy.ros.rospkg.rospkg.rospack import RosPack
 from minirospy.workspace.packages import Packages
 
-__all__ = ["ArgException", "SubstitutionException", "chosen_packages", "resolve_args"]
+__all__ = [
+    "ArgException",
+    "SubstitutionException",
+    "_DictWrapper",
+    "_anon",
+    "_arg",
+    "_collect_args",
+    "_dirname",
+    "_env",
+    "_eval",
+    "_eval_anon",
+    "_eval_arg",
+    "_eval_dict",
+    "_eval_dirname",
+    "_eval_env",
+    "_eval_find",
+    "_eval_optenv",
+    "_find",
+    "_find_executable",
+    "_find_resource",
+    "_get_executable_path",
+    "_get_rospack",
+    "_optenv",
+    "_resolve_args",
+    "_rospack",
+    "_sanitize_path",
+    "_separate_first_path",
+    "_split_command",
+    "convert_value",
+    "resolve_args",
+]
 
 Context: TypeAlias = dict[str, dict[str, str]]
 """The values of args and anonymous names, under the keys ``arg`` and ``anon``; ``filename`` is the launch file."""

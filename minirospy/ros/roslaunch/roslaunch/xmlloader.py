@@ -9,10 +9,24 @@ from minirospy.base import names
 from minirospy.base.errors import MinirospyError
 from minirospy.ros.roslaunch.launcher.load import STDIN, LaunchSource, load_sources
 from minirospy.ros.roslaunch.launcher.spec import LaunchSpec
-from minirospy.ros.roslaunch.roslaunch.core import RLException
-from minirospy.ros.roslaunch.roslaunch.substitution_args import chosen_packages
+from minirospy.ros.roslaunch.roslaunch.core import Machine, Node, Param, RLException, Test
+from minirospy.ros.roslaunch.roslaunch.substitution_args import (
+    ArgException,
+    SubstitutionException,
+    chosen_packages,
+)
 
-__all__ = ["XmlLoader", "XmlParseException"]
+__all__ = [
+    "ArgException",
+    "Machine",
+    "Node",
+    "Param",
+    "RLException",
+    "SubstitutionException",
+    "Test",
+    "XmlLoader",
+    "XmlParseException",
+]
 
 
 class XmlParseException(RLException):

@@ -1,8 +1,16 @@
 """roslib. Source: http://wiki.ros.org/roslib."""
 
+from typing import TYPE_CHECKING
+
 from minirospy.ros.submodules import on_first_use
 
-__all__ = ["is_interactive", "set_interactive"]
+if TYPE_CHECKING:
+    from minirospy.ros.roslib.roslib import exceptions as exceptions
+    from minirospy.ros.roslib.roslib import launcher as launcher
+    from minirospy.ros.roslib.roslib import packages as packages
+    from minirospy.ros.roslib.roslib.launcher import load_manifest
+
+__all__ = ["is_interactive", "load_manifest", "set_interactive"]
 
 __getattr__ = on_first_use("roslib", "manifest", "stacks")
 

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from xml.dom.minidom import Element
 
 __all__ = [
+    "MANIFEST_FILE",
     "Depend",
     "Export",
     "Manifest",
     "ManifestException",
     "ROSDep",
     "VersionControl",
-    "folders_with",
     "load_manifest",
     "manifest_file",
     "parse",

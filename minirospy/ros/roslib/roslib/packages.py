@@ -9,17 +9,21 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from minirospy.ros.rospkg.rospkg.common import ResourceNotFound
+from minirospy.ros.rospkg.rospkg.common import MANIFEST_FILE, PACKAGE_FILE, ResourceNotFound
 from minirospy.ros.rospkg.rospkg.rospack import RosPack, get_package_name
 from minirospy.workspace.packages import package_name
 
 __all__ = [
+    "MANIFEST_FILE",
+    "PACKAGE_FILE",
     "ROS_PACKAGE_PATH",
     "ROS_ROOT",
     "SRC_DIR",
     "InvalidROSPkgException",
     "MultipleNodesException",
     "ROSPkgException",
+    "_find_resource",
+    "_get_pkg_subdir_by_dir",
     "find_node",
     "find_resource",
     "get_dir_pkg",

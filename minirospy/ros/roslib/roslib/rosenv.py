@@ -6,12 +6,17 @@ import os
 from collections.abc import Mapping, Sequence
 
 from minirospy.ros.rosgraph.rosgraph import rosenv
+from minirospy.ros.rosgraph.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP, ROS_MASTER_URI, ROS_NAMESPACE
 from minirospy.ros.roslib.roslib.exceptions import ROSLibException
 from minirospy.ros.rospkg.rospkg import environment
 
 __all__ = [
     "ROS_HOME",
+    "ROS_HOSTNAME",
+    "ROS_IP",
     "ROS_LOG_DIR",
+    "ROS_MASTER_URI",
+    "ROS_NAMESPACE",
     "ROS_PACKAGE_PATH",
     "ROS_ROOT",
     "ROSEnvException",

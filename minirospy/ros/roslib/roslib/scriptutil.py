@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from xmlrpc.client import ServerProxy
 
+from minirospy.ros.rosgraph.rosgraph.names import script_resolve_name
 from minirospy.ros.rosgraph.rosgraph.rosenv import get_master_uri
 
-__all__ = ["get_master", "get_param_server"]
+__all__ = ["get_master", "get_param_server", "script_resolve_name"]
 
 
 def get_master() -> ServerProxy:

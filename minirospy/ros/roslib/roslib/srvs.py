@@ -11,6 +11,11 @@ from minirospy.ros.roslib.roslib import packages
 from minirospy.ros.roslib.roslib.msgs import MsgSpecException
 
 __all__ = [
+    "COMMENTCHAR",
+    "EXT",
+    "IODELIM",
+    "SEP",
+    "VERBOSE",
     "SrvSpec",
     "SrvSpecException",
     "get_pkg_srv_specs",

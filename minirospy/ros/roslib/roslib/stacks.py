@@ -9,12 +9,16 @@ import os
 from collections.abc import Mapping, Sequence
 
 from minirospy.ros.roslib.roslib.manifest import folders_with
-from minirospy.ros.roslib.roslib.packages import get_pkg_dir
+from minirospy.ros.roslib.roslib.packages import ROS_PACKAGE_PATH, ROS_ROOT, get_pkg_dir
 from minirospy.ros.rospkg.rospkg.common import MANIFEST_FILE, STACK_FILE
 from minirospy.ros.rospkg.rospkg.rospack import RosPack, RosStack
 from minirospy.ros.rospkg.rospkg.rospack import expand_to_packages as _expand
 
 __all__ = [
+    "ROS_PACKAGE_PATH",
+    "ROS_ROOT",
+    "ROS_STACK",
+    "STACK_FILE",
     "InvalidROSStackException",
     "ROSStackException",
     "expand_to_packages",

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from minirospy.ros.submodules import on_first_use
 
-__all__ = ["rosmaster_main"]
+if TYPE_CHECKING:
+    from minirospy.ros.rosmaster.rosmaster import master as master
+    from minirospy.ros.rosmaster.rosmaster.master import DEFAULT_MASTER_PORT
+
+__all__ = ["DEFAULT_MASTER_PORT", "rosmaster_main"]
 
 __getattr__ = on_first_use(
     "rosmaster",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from minirospy.base.environment import DEFAULT_MASTER_PORT, Environment
 
-__all__ = ["Master"]
+__all__ = ["DEFAULT_MASTER_PORT", "Master"]
 
 
 class Master:

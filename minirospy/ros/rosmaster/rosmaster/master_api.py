@@ -20,7 +20,7 @@ from minirospy.core.graph.parameters import ParameterTree, ParameterUpdate
 from minirospy.core.graph.registry import NodeShutdown
 from minirospy.ros.rosmaster.rosmaster.util import xmlrpcapi
 
-__all__ = ["ROSMasterHandler"]
+__all__ = ["LOG_API", "MSG", "NUM_WORKERS", "STATUS", "VAL", "ROSMasterHandler"]
 
 STATUS, MSG, VAL = 0, 1, 2
 NUM_WORKERS = 3

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 from minirospy.core.graph.parameters import ParameterTree, ParameterUpdate
 
-__all__ = ["ParamDictionary"]
+__all__ = ["GLOBALNS", "SEP", "ParamDictionary"]
 
 GLOBALNS = SEP = "/"
 

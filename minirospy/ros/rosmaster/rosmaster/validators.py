@@ -12,6 +12,9 @@ from minirospy.ros.rosgraph.rosgraph.names import resolve_name
 from minirospy.ros.rospy.rospy.names import ParameterInvalid
 
 __all__ = [
+    "ANYTYPE",
+    "ROSRPC",
+    "TYPE_SEPARATOR",
     "ParameterInvalid",
     "empty_or_valid_name",
     "global_name",

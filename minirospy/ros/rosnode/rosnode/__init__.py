@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, NodeUnreachableError, NotFoundError
 from minirospy.introspect import nodes
@@ -16,11 +16,23 @@ from minirospy.introspect.texts import connections_text, node_text
 from minirospy.ros.rosgraph.rosgraph import masterapi
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
+if TYPE_CHECKING:
+    import rosgraph as rosgraph
+
 __all__ = [
     "ID",
     "NAME",
     "ROSNodeException",
     "ROSNodeIOException",
+    "_fullusage",
+    "_rosnode_cmd_cleanup",
+    "_rosnode_cmd_info",
+    "_rosnode_cmd_kill",
+    "_rosnode_cmd_list",
+    "_rosnode_cmd_machine",
+    "_rosnode_cmd_ping",
+    "_sub_rosnode_listnodes",
+    "_succeed",
     "cleanup_master_blacklist",
     "cleanup_master_whitelist",
     "get_api_uri",

@@ -6,10 +6,10 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 from xmlrpc.client import Binary
 
-import yaml
+import yaml as yaml
 
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, NotFoundError, ValueTextError
 from minirospy.client.params import as_xmlrpc_client, check_sendable
@@ -19,19 +19,33 @@ from minirospy.introspect.values import add_angles, parse_documents, parse_value
 from minirospy.ros.ros_names import GLOBALNS, get_ros_namespace, ns_join
 from minirospy.ros.rosgraph.rosgraph.masterapi import Master, MasterError
 
+if TYPE_CHECKING:
+    from minirospy.ros.rosgraph.rosgraph.names import make_caller_id, make_global_ns, script_resolve_name
+
 __all__ = [
+    "GLOBALNS",
     "NAME",
     "NS",
     "RosParamException",
     "RosParamIOException",
+    "_fullusage",
+    "_rosparam_cmd_delete",
+    "_rosparam_cmd_get_dump",
+    "_rosparam_cmd_list",
+    "_rosparam_cmd_set_load",
     "delete_param",
     "dump_params",
     "get_param",
     "get_param_server",
+    "get_ros_namespace",
     "list_params",
     "load_file",
     "load_str",
+    "make_caller_id",
+    "make_global_ns",
+    "ns_join",
     "print_params",
+    "script_resolve_name",
     "set_param",
     "set_param_raw",
     "upload_params",

@@ -9,36 +9,96 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Mapping
+from logging import NullHandler
 from typing import TYPE_CHECKING
 
 from minirospy.base.environment import split_uri
 from minirospy.base.errors import ROSException
-from minirospy.client.log import logerr, logger_of, places, write
+from minirospy.client import get_node_uri, is_shutdown, signal_shutdown
+from minirospy.client.log import (
+    logdebug,
+    logdebug_once,
+    logdebug_throttle,
+    logdebug_throttle_identical,
+    logerr,
+    logerr_once,
+    logerr_throttle,
+    logerr_throttle_identical,
+    logfatal,
+    logfatal_once,
+    logfatal_throttle,
+    logfatal_throttle_identical,
+    logger_of,
+    loginfo,
+    loginfo_once,
+    loginfo_throttle,
+    loginfo_throttle_identical,
+    logout,
+    logwarn,
+    logwarn_once,
+    logwarn_throttle,
+    logwarn_throttle_identical,
+    places,
+    write,
+)
 from minirospy.client.session import current_session
+from minirospy.ros.rospy.rospy.msproxy import xmlrpcapi
 from minirospy.ros.rospy.rospy.names import ParameterInvalid, Validator, valid_name
 
 if TYPE_CHECKING:
+    from rosgraph_msgs.msg import Log
+
     from minirospy.client.log import Keywords
+    from minirospy.ros.rospy.rospy.passing import core_dir as __dir__
+    from minirospy.ros.rospy.rospy.passing import core_getattr as __getattr__
 
 __all__ = [
     "MASTER_NAME",
     "ROSRPC",
+    "Log",
+    "NullHandler",
+    "__dir__",
+    "__getattr__",
+    "_base_logger",
     "add_client_shutdown_hook",
     "add_preshutdown_hook",
     "add_shutdown_hook",
+    "get_node_uri",
     "get_ros_root",
     "is_initialized",
+    "is_shutdown",
     "is_shutdown_requested",
     "is_topic",
+    "logdebug",
+    "logdebug_once",
+    "logdebug_throttle",
+    "logdebug_throttle_identical",
+    "logerr",
+    "logerr_once",
+    "logerr_throttle",
+    "logerr_throttle_identical",
     "logerror",
+    "logfatal",
+    "logfatal_once",
+    "logfatal_throttle",
+    "logfatal_throttle_identical",
+    "loginfo",
+    "loginfo_once",
+    "loginfo_throttle",
+    "loginfo_throttle_identical",
+    "logout",
+    "logwarn",
+    "logwarn_once",
+    "logwarn_throttle",
+    "logwarn_throttle_identical",
     "parse_rosrpc_uri",
     "register_signals",
     "rospydebug",
     "rospyerr",
     "rospyinfo",
     "rospywarn",
-    "service_logger",
-    "topics_logger",
+    "signal_shutdown",
+    "xmlrpcapi",
 ]
 
 MASTER_NAME = "master"

@@ -5,9 +5,9 @@ Source: the behaviour of rospy's class, which rqt_logger_level and programs that
 
 from __future__ import annotations
 
-import rospy
+import rospy as rospy
 
-from minirospy.ros.rosservice import rosservice
+from minirospy.ros.rosservice import rosservice as rosservice
 
 __all__ = ["LoggerLevelServiceCaller", "ROSConsoleException"]
 

@@ -7,12 +7,13 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import DeserializationError
-from minirospy.core.idl.message import number_header
+from minirospy.client.topics import AnyMsg
+from minirospy.core.idl.message import args_kwds_to_message, number_header
 
 if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Message
 
-__all__ = ["deserialize_messages", "serialize_message"]
+__all__ = ["AnyMsg", "args_kwds_to_message", "deserialize_messages", "serialize_message"]
 
 _LENGTH = struct.Struct("<I")
 

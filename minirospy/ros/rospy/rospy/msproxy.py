@@ -15,7 +15,7 @@ from minirospy.client.params import as_xmlrpc_client, check_sendable, get_param_
 from minirospy.client.session import current_session
 from minirospy.runtime.rpc.client import RpcClient
 
-__all__ = ["MasterProxy", "ServerProxy", "get_master", "xmlrpcapi"]
+__all__ = ["MasterProxy"]
 
 _NAMES_FIRST = frozenset(
     {

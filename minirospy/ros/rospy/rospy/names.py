@@ -8,21 +8,55 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from minirospy.base import names
-from minirospy.base.errors import ROSException
+from minirospy.base.errors import ROSException, ROSInitException
+from minirospy.client import get_caller_id, get_name, get_namespace, remap_name, resolve_name
 from minirospy.client.session import current_session
-from minirospy.ros.ros_names import is_global, is_private
-from minirospy.ros.rosgraph.rosgraph.names import resolve_name
+from minirospy.ros.ros_names import (
+    GLOBALNS,
+    REMAP,
+    SEP,
+    canonicalize_name,
+    get_ros_namespace,
+    is_global,
+    is_private,
+    isstring,
+    load_mappings,
+    make_global_ns,
+    namespace,
+    ns_join,
+)
+from minirospy.ros.rosgraph.rosgraph.names import resolve_name as resolve_name_for
 
 __all__ = [
     "ANYTYPE",
+    "GLOBALNS",
+    "REMAP",
+    "SEP",
     "SERVICE_ANYTYPE",
     "TOPIC_ANYTYPE",
     "ParameterInvalid",
+    "ROSException",
+    "ROSInitException",
+    "_set_caller_id",
+    "canonicalize_name",
+    "get_caller_id",
     "get_mappings",
+    "get_name",
+    "get_namespace",
     "get_resolved_mappings",
+    "get_ros_namespace",
     "global_name",
     "initialize_mappings",
+    "is_global",
+    "is_private",
+    "isstring",
+    "load_mappings",
+    "make_global_ns",
+    "namespace",
+    "ns_join",
     "reload_mappings",
+    "remap_name",
+    "resolve_name",
     "resolve_name_without_node_name",
     "scoped_name",
     "valid_name",
@@ -109,8 +143,8 @@ def valid_name(param_name: str, resolve: bool = True) -> Validator:
 
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return an argument as a global name, without remapping. Raise ParameterInvalid."""
-    return resolve_name(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
+    """Return the global name of an argument, not remapped. Raise ParameterInvalid."""
+    return resolve_name_for(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:

@@ -5,16 +5,20 @@ from __future__ import annotations
 import threading
 import time
 
+from minirospy.base import times
 from minirospy.base.clock import SimulatedClock, WallClock
-from minirospy.base.times import Time
 from minirospy.client.session import current_session
-from minirospy.client.time import is_wallclock
+from minirospy.client.time import Duration, Time, get_rostime, get_time, is_wallclock
 
 __all__ = [
+    "Duration",
+    "Time",
+    "_set_rostime",
+    "get_rostime",
     "get_rostime_cond",
+    "get_time",
     "is_rostime_initialized",
     "is_wallclock",
-    "set_rostime",
     "set_rostime_initialized",
     "switch_to_wallclock",
     "wallsleep",
@@ -42,14 +46,17 @@ def set_rostime_initialized(val: bool) -> None:
 
 
 def set_rostime(t: object) -> None:
-    """Set the node's time, which is simulated afterwards. Raise ValueError if ``t`` is not a Time."""
-    if not isinstance(t, Time):
+    """Set the node's time, which is simulated from now on. Raise ValueError if ``t`` is not a Time."""
+    if not isinstance(t, times.Time):
         raise ValueError(f"must be Time instance: {t.__class__}")
     session = current_session()
     clock = session.clock
     if not isinstance(clock, SimulatedClock):
         clock = session.clock = SimulatedClock(changed=session.time_changed)
     clock.set(t.to_nsec())
+
+
+_set_rostime = set_rostime
 
 
 def switch_to_wallclock() -> None:

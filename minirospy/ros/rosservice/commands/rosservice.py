@@ -231,7 +231,7 @@ def _filled_request(type_: str, values: Sequence[object]) -> Message:
 
 
 def _asked_for(request: Message, known: Sequence[str]) -> Message:
-    from minirospy.ros.actionlib.commands.form import ask_for
+    from minirospy.command.form import ask_for
 
     def refuse(error: Exception) -> None:
         complain("rosservice", error)

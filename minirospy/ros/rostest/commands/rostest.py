@@ -16,8 +16,8 @@ from minirospy.base.environment import Environment
 from minirospy.base.errors import MinirospyError, NotFoundError, UsageError
 from minirospy.command.parser import AssignmentParser, Misuse, Parser
 from minirospy.command.verbs import Command
-from minirospy.ros.rostest.runner.junit import Result, report
-from minirospy.ros.rostest.runner.unit import begin_results, rostest_name_from_path
+from minirospy.ros.rosunit.runner.junit import Result, report
+from minirospy.ros.rosunit.runner.unit import begin_results, rostest_name_from_path
 from minirospy.workspace.packages import Packages, package_name
 
 __all__ = ["ROSTEST", "ROSUNIT", "rostest", "rosunit"]
@@ -173,7 +173,7 @@ def _rosunit(
     package = package or _package_of(path, "rosunit", "--package NAME")[0]
     name = name or path.stem
 
-    from minirospy.ros.rostest.runner.bare import run_bare
+    from minirospy.ros.rosunit.runner.bare import run_bare
 
     base = _base(None)
     output = base / package / f"rostest-{name}.xml"

@@ -1,6 +1,28 @@
 """rostest: tests that are nodes. Source: http://wiki.ros.org/rostest."""
 
-__all__ = ["rostestmain"]
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from minirospy.ros.rostest.runner.node import (
+        get_master,
+        is_publisher,
+        is_subscriber,
+        rosrun,
+        run,
+        unitrun,
+    )
+    from minirospy.ros.rosunit.runner.unit import XML_OUTPUT_FLAG
+
+__all__ = [
+    "XML_OUTPUT_FLAG",
+    "get_master",
+    "is_publisher",
+    "is_subscriber",
+    "rosrun",
+    "rostestmain",
+    "run",
+    "unitrun",
+]
 
 
 def rostestmain() -> None:

@@ -6,17 +6,20 @@ import logging
 import sys
 from typing import TYPE_CHECKING
 
-from minirospy.ros.rostest.runner.unit import (
+from minirospy.ros.rosunit.runner.junit import failure_junit_xml as test_failure_junit_xml
+from minirospy.ros.rosunit.runner.junit import success_junit_xml as test_success_junit_xml
+from minirospy.ros.rosunit.runner.unit import (
     create_xml_runner,
     print_runner_summary,
     print_unittest_summary,
+    rostest_name_from_path,
     xml_results_file,
 )
 
 if TYPE_CHECKING:
     import unittest
 
-    from minirospy.ros.rostest.runner.junit import Result
+    from minirospy.ros.rosunit.runner.junit import Result
 
 __all__ = [
     "createXMLRunner",
@@ -24,6 +27,9 @@ __all__ = [
     "printSummary",
     "printlog",
     "printlogerr",
+    "rostest_name_from_path",
+    "test_failure_junit_xml",
+    "test_success_junit_xml",
     "xmlResultsFile",
 ]
 

@@ -14,17 +14,22 @@ from minirospy.ros.roslaunch.roslaunch.launch import RLTestTimeoutException
 from minirospy.ros.roslib.roslib.packages import find_node
 from minirospy.ros.rospkg.rospkg.common import ResourceNotFound
 from minirospy.ros.rostest.rostest.rostest_parent import ROSTestLaunchParent
-from minirospy.ros.rostest.rostest.rostestutil import printlog, printlogerr
-from minirospy.ros.rostest.runner.junit import Result, read
-from minirospy.ros.rostest.runner.unit import XML_OUTPUT_FLAG, xml_results_file
+from minirospy.ros.rostest.rostest.rostestutil import printlog, printlogerr, printRostestSummary
+from minirospy.ros.rosunit.runner.junit import Result, read
+from minirospy.ros.rosunit.runner.unit import XML_OUTPUT_FLAG, xml_results_file
 
 __all__ = [
+    "_DEFAULT_TEST_PORT",
+    "ROSTestLaunchParent",
     "createUnitTest",
     "failDuplicateRunner",
     "failRunner",
     "getConfig",
     "getResults",
     "getRostestParents",
+    "printRostestSummary",
+    "printlog",
+    "printlogerr",
     "rostestRunner",
     "setTextMode",
     "setUp",

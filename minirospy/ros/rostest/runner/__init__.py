@@ -1,4 +1,1 @@
-"""Tests of ROS packages: unit tests that write JUnit XML, and launch files with ``<test>`` tags.
-
-Source: http://wiki.ros.org/rostest, http://wiki.ros.org/rosunit.
-"""
+"""Launch files whose ``<test>`` tags are run. Source: http://wiki.ros.org/rostest."""

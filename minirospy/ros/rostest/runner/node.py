@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Sequence
 
 from minirospy.base.environment import Environment
-from minirospy.ros.rostest.runner import unit
+from minirospy.ros.rosunit.runner import unit
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["get_master", "is_publisher", "is_subscriber", "rosrun", "run", "unitrun"]

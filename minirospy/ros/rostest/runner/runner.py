@@ -20,8 +20,8 @@ from minirospy.base.environment import Environment
 from minirospy.base.errors import LaunchError, MasterUnreachableError, MinirospyError, NotFoundError
 from minirospy.ros.roslaunch.launcher.runner import Launcher, RunOptions
 from minirospy.ros.roslaunch.launcher.spec import LaunchSpec, TestSpec
-from minirospy.ros.rostest.runner.junit import Result, TestCaseResult, TestError, TestFailure, read
-from minirospy.ros.rostest.runner.unit import XML_OUTPUT_FLAG, xml_results_file
+from minirospy.ros.rosunit.runner.junit import Result, TestCaseResult, TestError, TestFailure, read
+from minirospy.ros.rosunit.runner.unit import XML_OUTPUT_FLAG, xml_results_file
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from minirospy.runtime.transport.access import Access

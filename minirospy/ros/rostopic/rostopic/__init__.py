@@ -19,14 +19,43 @@ from minirospy.ros.rosgraph.rosgraph.network import parse_http_host_and_port
 from minirospy.ros.rostopic.rostopic.echo import CallbackEcho
 
 if TYPE_CHECKING:
+    import rosgraph as rosgraph
+
     from minirospy.client.publisher import Publisher
     from minirospy.core.idl.protocols import Message
+    from minirospy.ros.rostopic.rostopic.echo import create_field_filter, create_value_transform
+    from minirospy.ros.rostopic.rostopic.rates import ROSTopicBandwidth, ROSTopicDelay, ROSTopicHz
 
 __all__ = [
     "NAME",
+    "CallbackEcho",
+    "ROSTopicBandwidth",
+    "ROSTopicDelay",
     "ROSTopicException",
+    "ROSTopicHz",
     "ROSTopicIOException",
+    "_check_master",
+    "_fullusage",
+    "_get_topic_type",
+    "_master_get_topic_types",
+    "_rostopic_cmd_bw",
+    "_rostopic_cmd_delay",
+    "_rostopic_cmd_echo",
+    "_rostopic_cmd_find",
+    "_rostopic_cmd_hz",
+    "_rostopic_cmd_info",
+    "_rostopic_cmd_list",
+    "_rostopic_cmd_pub",
+    "_rostopic_cmd_type",
+    "_rostopic_echo",
+    "_rostopic_info",
+    "_rostopic_list",
+    "_rostopic_list_group_by_host",
+    "_rostopic_type",
+    "_sleep",
+    "create_field_filter",
     "create_publisher",
+    "create_value_transform",
     "find_by_type",
     "get_api",
     "get_info_text",

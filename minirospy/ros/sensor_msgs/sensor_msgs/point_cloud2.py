@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     Values: TypeAlias = NDArray[Any]  # the values of points, of any type that fields may have
 
 __all__ = [
+    "_DATATYPES",
+    "PointCloud2",
+    "PointField",
+    "_get_struct_fmt",
     "create_cloud",
     "create_cloud_xyz32",
     "read_points",

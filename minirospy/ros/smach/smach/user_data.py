@@ -9,7 +9,7 @@ from typing import Any
 from minirospy.ros.smach.smach.exceptions import InvalidUserCodeError
 from minirospy.ros.smach.smach.log import logdebug, logerr
 
-__all__ = ["Const", "Remapper", "UserData", "Values", "get_const"]
+__all__ = ["Const", "Remapper", "UserData", "get_const"]
 
 
 class UserData:

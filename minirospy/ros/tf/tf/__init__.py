@@ -5,10 +5,15 @@ A leading slash in a frame's name is removed, because tf2 rejects it. Source: ht
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from minirospy.base.errors import ConnectivityException, ExtrapolationException, LookupException
 from minirospy.base.errors import TransformException as Exception
 from minirospy.ros.tf.tf.broadcaster import TransformBroadcaster
 from minirospy.ros.tf.tf.listener import Transformer, TransformerROS, TransformListener
+
+if TYPE_CHECKING:
+    from minirospy.ros.tf.tf import broadcaster, listener, transformations
 
 __all__ = [
     "ConnectivityException",
@@ -19,4 +24,7 @@ __all__ = [
     "TransformListener",
     "Transformer",
     "TransformerROS",
+    "broadcaster",
+    "listener",
+    "transformations",
 ]

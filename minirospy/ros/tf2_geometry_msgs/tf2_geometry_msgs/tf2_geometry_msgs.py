@@ -24,6 +24,10 @@ from minirospy.ros.python_orocos_kdl import PyKDL
 from minirospy.ros.tf2_ros.tf2_ros.interface import ConvertRegistration, TransformRegistration
 
 __all__ = [
+    "PointStamped",
+    "PoseStamped",
+    "Vector3Stamped",
+    "WrenchStamped",
     "do_transform_point",
     "do_transform_pose",
     "do_transform_vector3",

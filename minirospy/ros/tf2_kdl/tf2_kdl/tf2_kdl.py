@@ -15,6 +15,7 @@ from minirospy.ros.tf2_geometry_msgs.tf2_geometry_msgs.tf2_geometry_msgs import 
 from minirospy.ros.tf2_ros.tf2_ros.interface import ConvertRegistration, Stamped, TransformRegistration
 
 __all__ = [
+    "PointStamped",
     "convert_vector",
     "do_transform_frame",
     "do_transform_twist",

@@ -15,7 +15,7 @@ from minirospy.ros.tf2_ros.tf2_ros.interface import NO_WAIT, BufferInterface
 from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds
 from minirospy.ros.tf2_ros.tf2_ros.waiting import wait_until
 
-__all__ = ["DEFAULT_CAN_TRANSFORM_POLLING_SCALE", "Buffer"]
+__all__ = ["DEFAULT_CAN_TRANSFORM_POLLING_SCALE", "Buffer", "FrameGraph", "FrameGraphResponse"]
 
 DEFAULT_CAN_TRANSFORM_POLLING_SCALE = 0.01
 

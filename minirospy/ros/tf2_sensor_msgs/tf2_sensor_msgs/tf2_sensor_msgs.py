@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import numpy
     from numpy.typing import NDArray
 
-__all__ = ["do_transform_cloud", "from_msg_msg", "to_msg_msg", "transform_to_kdl"]
+__all__ = ["PointCloud2", "do_transform_cloud", "from_msg_msg", "to_msg_msg", "transform_to_kdl"]
 
 _FORMATS = {
     PointField.INT8: "i1",

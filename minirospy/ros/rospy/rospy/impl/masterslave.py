@@ -11,7 +11,7 @@ from typing import Any, cast
 from minirospy.client.session import current_session
 from minirospy.ros.rosgraph.rosgraph.xmlrpc import XmlRpcHandler
 
-__all__ = ["ROSHandler"]
+__all__ = ["LOG_API", "MSG", "STATUS", "VAL", "ROSHandler"]
 
 STATUS, MSG, VAL = 0, 1, 2
 LOG_API = True

@@ -7,7 +7,7 @@ from typing import Any
 from minirospy.client.services import Service
 from minirospy.client.session import current_session
 
-__all__ = ["Registration", "ServiceManager", "TopicManager", "get_service_manager", "get_topic_manager"]
+__all__ = ["Registration", "get_service_manager", "get_topic_manager"]
 
 
 class Registration:

@@ -1,6 +1,6 @@
 """rospy.impl.transport and tcpros_base: the directions of a connection in getBusInfo, and constants of TCPROS."""
 
-__all__ = ["BIDIRECTIONAL", "DEFAULT_BUFF_SIZE", "INBOUND", "OUTBOUND", "TCPROS"]
+__all__ = ["BIDIRECTIONAL", "INBOUND", "OUTBOUND"]
 
 INBOUND, OUTBOUND, BIDIRECTIONAL = "i", "o", "b"
 TCPROS = "TCPROS"

@@ -15,10 +15,7 @@ from xml.etree import ElementTree as ET
 
 from minirospy.base.xml_text import XmlError, check_xml
 
-__all__ = [
-    "Attribute", "Codec", "Element", "Many", "NamedAttribute", "Number", "Object", "ObjectOf", "ParseError", "Path",
-    "Raw", "Text", "VectorOf", "on_error", "on_error_stderr", "report", "to_yaml", "xml_string",
-]  # fmt: skip
+__all__ = ["Object", "ParseError", "Path", "on_error", "on_error_stderr", "to_yaml", "xml_string"]
 
 _T = TypeVar("_T", bound="Object")
 _V = TypeVar("_V")

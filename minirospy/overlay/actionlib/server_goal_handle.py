@@ -1,5 +1,0 @@
-"""actionlib.server_goal_handle, provided by minirospy."""
-
-from minirospy.ros.actionlib.actionlib import ServerGoalHandle
-
-__all__ = ["ServerGoalHandle"]

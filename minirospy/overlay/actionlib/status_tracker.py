@@ -1,5 +1,0 @@
-"""actionlib.status_tracker, provided by minirospy."""
-
-from minirospy.ros.actionlib.actionlib import StatusTracker
-
-__all__ = ["StatusTracker"]

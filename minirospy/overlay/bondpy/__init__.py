@@ -1,1 +1,0 @@
-"""bondpy, provided by minirospy. Source: http://wiki.ros.org/bondpy."""

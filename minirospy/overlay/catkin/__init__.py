@@ -1,1 +1,0 @@
-"""catkin, provided by minirospy: the workspaces of the environment."""

@@ -1,1 +1,0 @@
-"""cv_bridge.boost, provided by minirospy. Source: http://wiki.ros.org/cv_bridge."""

@@ -1,3 +1,0 @@
-"""rosgraph.impl, provided by minirospy: the graph as it is polled."""
-
-from rosgraph.impl import graph as graph

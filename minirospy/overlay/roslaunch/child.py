@@ -1,3 +1,0 @@
-"""roslaunch.child, which is not here: the import raises ImportError with what to use."""
-
-from minirospy.ros.elsewhere import roslaunch_child as child

@@ -1,3 +1,0 @@
-"""roslaunch.remoteprocess, which is not here: the import raises ImportError with what to use."""
-
-from minirospy.ros.elsewhere import roslaunch_remoteprocess as remoteprocess

@@ -1,6 +1,0 @@
-"""roslaunch.server, provided by minirospy: the names that programs import from it."""
-
-from minirospy.ros.roslaunch.roslaunch.core import RLException
-from minirospy.ros.roslaunch.roslaunch.pmon import Process, ProcessListener
-
-__all__ = ["Process", "ProcessListener", "RLException"]

@@ -1,5 +1,0 @@
-"""roslib.rostime, provided by minirospy: genpy's names under their former module."""
-
-from minirospy.base.times import Duration, Time, TVal
-
-__all__ = ["Duration", "TVal", "Time"]

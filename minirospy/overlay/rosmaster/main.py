@@ -1,5 +1,0 @@
-"""rosmaster.main, provided by minirospy: the command."""
-
-from minirospy.ros.rosmaster.rosmaster import rosmaster_main
-
-__all__ = ["rosmaster_main"]

@@ -1,6 +1,0 @@
-"""rospy.impl.paramserver, provided by minirospy."""
-
-from minirospy.client.params import KeptParameters as ParamServerCache
-from minirospy.client.params import get_param_server_cache
-
-__all__ = ["ParamServerCache", "get_param_server_cache"]

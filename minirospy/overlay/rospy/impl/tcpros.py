@@ -1,5 +1,0 @@
-"""rospy.impl.tcpros, provided by minirospy: constants of TCPROS."""
-
-from minirospy.ros.rospy.rospy.impl.transport import DEFAULT_BUFF_SIZE
-
-__all__ = ["DEFAULT_BUFF_SIZE"]

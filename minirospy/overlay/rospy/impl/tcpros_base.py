@@ -1,5 +1,0 @@
-"""rospy.impl.tcpros_base, provided by minirospy."""
-
-from minirospy.ros.rospy.rospy.impl.transport import DEFAULT_BUFF_SIZE, TCPROS
-
-__all__ = ["DEFAULT_BUFF_SIZE", "TCPROS"]

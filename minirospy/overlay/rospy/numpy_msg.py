@@ -1,5 +1,0 @@
-"""rospy.numpy_msg, provided by minirospy: message classes whose arrays are numpy arrays."""
-
-from minirospy.core.idl.numpy_class import numpy_class as numpy_msg
-
-__all__ = ["numpy_msg"]

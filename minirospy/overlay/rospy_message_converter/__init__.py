@@ -1,1 +1,0 @@
-"""rospy_message_converter, provided by minirospy: messages as dicts. Source: http://wiki.ros.org/rospy_message_converter."""

@@ -1,5 +1,0 @@
-"""rosunit.baretest, provided by minirospy."""
-
-from minirospy.ros.rostest.runner.unit import print_runner_summary, print_unittest_summary
-
-__all__ = ["print_runner_summary", "print_unittest_summary"]

@@ -1,5 +1,0 @@
-"""tf2_ros.transform_listener, provided by minirospy: /tf and /tf_static into a buffer. Source: http://wiki.ros.org/tf2_ros."""
-
-from tf2_msgs.msg import TFMessage as TFMessage
-
-from minirospy.ros.tf2_ros.tf2_ros.listener import TransformListener as TransformListener

@@ -1,0 +1,5 @@
+"""The names of actionlib.exceptions."""
+
+from minirospy.ros.actionlib.actionlib import ActionException
+
+__all__ = ["ActionException"]

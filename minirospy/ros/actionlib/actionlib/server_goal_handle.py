@@ -1,0 +1,5 @@
+"""The names of actionlib.server_goal_handle."""
+
+from minirospy.ros.actionlib.actionlib import ServerGoalHandle
+
+__all__ = ["ServerGoalHandle"]

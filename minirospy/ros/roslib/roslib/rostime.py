@@ -1,0 +1,5 @@
+"""roslib.rostime: genpy's names under their former module."""
+
+from minirospy.base.times import Duration, Time, TVal
+
+__all__ = ["Duration", "TVal", "Time"]

@@ -1,0 +1,5 @@
+"""rospy.impl.tcpros: constants of TCPROS."""
+
+from minirospy.ros.rospy.rospy.impl.transport import DEFAULT_BUFF_SIZE
+
+__all__ = ["DEFAULT_BUFF_SIZE"]

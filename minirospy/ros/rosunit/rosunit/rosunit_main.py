@@ -1,0 +1,5 @@
+"""rosunit.rosunit_main: the command."""
+
+from minirospy.ros.rosunit.rosunit import rosunitmain
+
+__all__ = ["rosunitmain"]

@@ -1,0 +1,1 @@
+"""Unit tests that write JUnit XML. Source: http://wiki.ros.org/rosunit."""

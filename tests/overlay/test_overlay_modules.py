@@ -1,0 +1,138 @@
+"""The modules of `overlay/` are generated from those of `ros/`: each offers what the `__all__` of its source names."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import os
+from pathlib import Path
+
+import pytest
+
+from minirospy.ros import overlay_modules
+from minirospy.ros.overlay_modules import PACKAGE, Origin, exported, modules, overlay_files, write_overlay
+
+OVERLAY = PACKAGE / "overlay"
+NAMES = sorted(
+    set(modules()) - {"RPi._GPIO"}
+)  # which has the list of RPi.GPIO, and answers for its names by a function
+
+
+def names_of(path: Path) -> list[str]:
+    """Return the names in the literal `__all__` of a file."""
+    found = [
+        ast.literal_eval(statement.value)
+        for statement in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == "__all__"
+    ]
+    return found[0] if found else []
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_module_offers_what_its_source_names(name: str) -> None:
+    module = importlib.import_module(name)
+    listed = names_of(modules()[name])
+    assert [each for each in listed if not hasattr(module, each)] == []
+    assert sorted(getattr(module, "__all__", [])) == sorted(each for each in listed if each[0] != "_")
+
+
+def test_every_package_with_a_python_module_is_offered() -> None:
+    # The folder of a ROS package that has the package's name is what `import` of that name offers.
+    named = {
+        folder.name
+        for folder in (PACKAGE / "ros").iterdir()
+        if (folder / folder.name / "__init__.py").exists()
+    }
+    assert named > {"rosbag", "rospy", "tf2_ros"}
+    assert named <= set(NAMES)
+    assert {"PyKDL", "RPi.GPIO", "camera_info_manager", "urdf_parser_py.urdf"} <= set(NAMES)
+
+
+def test_each_folder_of_the_tables_exists() -> None:
+    for top, internal in overlay_modules._INTERNAL.items():
+        folder = modules()[top].parent
+        for name in internal.split():
+            assert (folder / f"{name}.py").exists() or (folder / name).is_dir(), f"{top}.{name}"
+            assert f"{top}.{name}" not in modules()
+
+
+def test_folder_has_what_would_be_written_now() -> None:
+    """`make` writes it again if a source changes; `python -m minirospy.ros.overlay_modules` does so by itself."""
+    for name, text in overlay_files().items():
+        assert (OVERLAY / name).read_text(encoding="utf-8") == text, name
+
+
+@pytest.fixture
+def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the folder of an emulated package `pack` without modules."""
+    monkeypatch.setattr(overlay_modules, "PACKAGE", tmp_path / "minirospy")
+    monkeypatch.setattr(overlay_modules, "_ALSO", {})
+    for cached in (overlay_modules.modules, overlay_modules._by_source, overlay_modules._read):
+        monkeypatch.setattr(overlay_modules, cached.__name__, cached.__wrapped__)
+    folder = tmp_path / "minirospy" / "ros" / "pack" / "pack"
+    folder.mkdir(parents=True)
+    (folder / "__init__.py").write_text('"""A package."""\n')
+    return folder
+
+
+def test_new_package_is_one_folder(sources: Path, tmp_path: Path) -> None:
+    (sources / "tool.py").write_text('"""A module."""\n__all__ = ["_hidden", "run"]\n')
+    target = tmp_path / "overlay"
+    written = write_overlay(target)
+    assert {"pack/__init__.py", "pack/tool.py", "pack/py.typed"} <= set(written)
+    assert (target / "pack" / "tool.py").read_text() == (
+        '"""pack.tool, provided by minirospy: generated from minirospy/ros/pack/pack/tool.py."""\n\n'
+        "from minirospy.ros.pack.pack.tool import _hidden as _hidden\n"
+        "from minirospy.ros.pack.pack.tool import run as run\n\n"
+        '__all__ = [\n    "run",\n]\n'
+    )
+
+
+def test_module_without_names_is_only_a_module(sources: Path, tmp_path: Path) -> None:
+    assert list(exported(sources / "__init__.py")) == []
+    write_overlay(tmp_path / "overlay")
+    assert len((tmp_path / "overlay" / "pack" / "__init__.py").read_text().splitlines()) == 1
+
+
+def test_names_are_imported_from_where_they_are_defined(sources: Path) -> None:
+    (sources / "first.py").write_text(
+        "from typing import Any\nfrom math import pi\n__all__ = ['pi', 'run']\n"
+    )
+    (sources / "second.py").write_text(
+        "from typing import TYPE_CHECKING\n"
+        "import time as time\n"
+        "from minirospy.ros.pack.pack.first import run as start\n"
+        "if TYPE_CHECKING:\n    from minirospy.ros.pack.pack.first import pi as pi\n"
+        "__all__ = ['start']\n"
+    )
+    (sources / "__init__.py").write_text("from minirospy.ros.pack.pack import first as first\n")
+    # What is imported in the form `as` the same name is offered, too; Any and TYPE_CHECKING are not.
+    assert exported(sources / "second.py") == {
+        "start": Origin("minirospy.ros.pack.pack.first", "run"),
+        "pi": Origin("math", "pi"),
+        "time": Origin("time", ""),
+    }
+    assert exported(sources / "__init__.py") == {"first": Origin("pack", "first")}
+
+
+@pytest.mark.parametrize(
+    "how", ["def __getattr__(name): ...", "__getattr__ = find", "from math import pi as __getattr__"]
+)
+def test_function_for_missing_names_is_passed_on(sources: Path, how: str) -> None:
+    (sources / "__init__.py").write_text(how + "\n")
+    assert list(exported(sources / "__init__.py")) == ["__getattr__"]
+
+
+def test_module_of_an_earlier_build_goes(sources: Path, tmp_path: Path) -> None:
+    target = tmp_path / "overlay"
+    (sources / "old.py").touch()
+    write_overlay(target)
+    others = target / "pack" / "msg" / "__init__.py"
+    others.parent.mkdir()
+    others.write_text('"""pack: generated by minirospy from its definitions."""\n')
+    (sources / "old.py").unlink()
+    before = os.stat(target / "pack" / "__init__.py").st_mtime_ns
+    write_overlay(target)
+    assert not (target / "pack" / "old.py").exists()
+    assert others.exists()
+    assert os.stat(target / "pack" / "__init__.py").st_mtime_ns == before
