@@ -227,8 +227,9 @@ def test_client_that_answers_pings_is_heard(run_bridge: Callable[..., Running]) 
     client.socket.ping().wait(30)
     (connection,) = bridge.bridge.listeners["foxglove"].connections
     # It sends nothing unasked from now on.
-    heard = connection._received
-    wait_until(lambda: connection._received > heard)
+    liveness = connection._liveness
+    heard = liveness.received
+    wait_until(lambda: liveness.received > heard)
     assert_alive(client)
 
 
