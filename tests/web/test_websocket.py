@@ -7,6 +7,7 @@ from websockets.exceptions import NegotiationError
 from websockets.frames import Opcode
 
 from minirospy.web.access import Refusal
+from minirospy.web.server.account import Account
 from minirospy.web.server.jobs import Jobs
 from minirospy.web.server.liveness import Liveness, Verdict
 from minirospy.web.server.pipe import Endpoints
@@ -184,15 +185,35 @@ def test_client_that_reads_nothing_is_not_pinged_and_then_disconnected() -> None
 
 
 def test_oldest_work_is_dropped_beyond_the_bounds() -> None:
-    jobs = Jobs(1000)
+    account = Account()
+    jobs = Jobs(1000, account.open("a", lambda: None))
     done: list[int] = []
-    dropped = [jobs.add(lambda number=number: done.append(number), 400) for number in range(4)]  # type: ignore[misc]
+    dropped = [jobs.add(lambda number=number: done.append(number), bytes(400)) for number in range(4)]  # type: ignore[misc]
     assert dropped == [0, 0, 1, 1]
     # A single one may be larger.
-    assert jobs.add(lambda: done.append(9), 5000) == 2
+    assert jobs.add(lambda: done.append(9), bytes(50_000)) == 2
     jobs.pop()()
     assert done == [9]
     assert not jobs
-    assert sum(jobs.add(lambda: None, 0) for _ in range(1001)) == 1
-    jobs.clear()
+    assert sum(jobs.add(lambda: None, b"") for _ in range(1001)) == 1
+    assert jobs.size == 1000 * 500
+    assert jobs.clear() == 1000
     assert not jobs
+    assert jobs.size == account.total == 0
+
+
+def test_large_message_that_waits_for_the_turns_of_several_clients_counts_once() -> None:
+    account = Account()
+    shares = [account.open("a", lambda: None) for _ in range(3)]
+    clients = [Jobs(10_000_000, share) for share in shares]
+    image = bytes(1_000_000)
+    for jobs in clients:
+        jobs.add(lambda: None, image)
+        jobs.add(lambda: None, bytes(1000))
+    assert account.total == 1_000_000
+    assert [share.large for share in shares] == [1_000_000] * 3
+    assert [jobs.size for jobs in clients] == [2000] * 3
+    for jobs in clients:
+        assert account.total == 1_000_000
+        jobs.clear()
+    assert account.total == 0

@@ -108,7 +108,7 @@ class Connection:
         self._loop = loop
         self._websocket = WebSocket(self._select, limits.message, limits.messages_a_second)
         self._output = Output(pipe, SendQueue(limits.queue, share=self.share), self.share, loop, self._count)
-        self._jobs = Jobs(limits.queue)  # work for the client that is not about what it sent
+        self._jobs = Jobs(limits.queue, self.share)  # work for the client that is not about what it sent
         self._liveness = Liveness(limits.silent_seconds, now)
         self._turn = site.turns.join(self._work)  # the client's share of the loop
         self._endpoint: Endpoint | None = None  # set in the handshake, when the sub-protocol is chosen
@@ -255,16 +255,20 @@ class Connection:
         if self._phase is not _Phase.ENDED and not self._is_held_back:
             self._site.turns.start(self._turn)
 
-    def in_turn(self, work: Callable[[], None], size: int) -> None:
-        """Do some work for the client in its turn, immediately if that is now; ``size``: bytes that it keeps until then.
+    def in_turn(self, work: Callable[[], None], message: Piece) -> None:
+        """Do some work for the client in its turn, immediately if that is now; it keeps ``message`` until then.
 
         The oldest work is dropped if more waits than may be sent.
         """
         if self._is_in_turn:
             work()
             return
-        self.queue.dropped += self._jobs.add(work, size)
+        if not self.is_open:
+            return
+        self.queue.dropped += self._jobs.add(work, message)
         self._site.turns.start(self._turn)
+        if self._jobs:
+            self._count()
 
     def session_holds(self, count: int) -> None:
         """Count the bytes that the session holds for the client."""
@@ -283,6 +287,13 @@ class Connection:
             self._is_in_turn = False
 
     def _do_jobs(self, end: float) -> bool:
+        if not self._jobs:
+            return False
+        is_left = self._do_some_jobs(end)
+        self._count()
+        return is_left
+
+    def _do_some_jobs(self, end: float) -> bool:
         while self._jobs and self.is_open:
             work = self._jobs.pop()
             try:
@@ -451,15 +462,16 @@ class Connection:
 
     def _count(self) -> None:
         """Count in the account what the client holds alone; this may make clients release memory, this one too."""
-        self.share.set(self.unfinished + self._held + self._output.size)
+        self.share.set(self.unfinished + self._held + self._jobs.size + self._output.size)
 
     def _shed(self) -> None:
         """Release memory: messages that may be dropped, else the connection."""
-        if self.unfinished > self.queue.size + self.queue.answers and not self._held:
+        if self.unfinished > self.queue.size + self.queue.answers + self._jobs.size and not self._held:
             self._refuse_unfinished()
             return
-        if self.queue.size:
+        if self.queue.size or self._jobs:
             self.queue.drop_messages()
+            self.queue.dropped += self._jobs.clear()
             self._count()
             return
         _log.warning("%s: the server holds too much memory for it: disconnected", self.peer)
