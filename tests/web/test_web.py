@@ -619,6 +619,8 @@ def test_clients_with_more_rights_have_more_of_the_loop_and_longer_messages(
 ) -> None:
     _, connection, _ = connected(Limits(), 0.0, grant)
     assert connection._turn.weight == weight
+    new = Connection(connection._site, Mock(is_full=False), "127.0.0.1", connection._loop)
+    assert new._turn.weight < 1.0
     connection.received(b"\x81\xff" + (65_537).to_bytes(8, "big") + bytes(4))
     connection.received(bytes(100))
     assert connection.is_open is (grant is not Grant.READ)

@@ -65,6 +65,7 @@ _log = logging.getLogger(__name__)
 _PONG = 0x8A  # first byte of a frame, and the key under which a pong waits
 _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
 """Of clients when the loop's time is shared. On loopback any program may write; the page of the dashboard has the token."""
+_NEW_WEIGHT = 0.25  # until the request is known: clients that are served do not wait for 250 handshakes
 
 
 @dataclass
@@ -111,6 +112,7 @@ class Connection:
         self._jobs = Jobs(limits.queue, self.share)  # work for the client that is not about what it sent
         self._liveness = Liveness(limits.silent_seconds, now)
         self._turn = site.turns.join(self._work)  # the client's share of the loop
+        self._turn.weight = _NEW_WEIGHT
         self._endpoint: Endpoint | None = None  # set in the handshake, when the sub-protocol is chosen
         self._phase = _Phase.OPEN
         self._is_held_back = False  # while the client has sent as many frames as it may in this second
