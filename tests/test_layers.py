@@ -90,7 +90,14 @@ PURE_FILES = (
             "tf_republisher/pairs.py",
             "video/options.py",
             "video/pictures.py",
+            "server/account.py",
+            "server/admission.py",
+            "server/frames.py",
+            "server/jobs.py",
+            "server/liveness.py",
             "server/queue.py",
+            "server/turns.py",
+            "server/websocket.py",
         )
     }
     | {

@@ -201,3 +201,83 @@ def test_client_does_not_pay_while_other_processes_have_the_processor() -> None:
     while len(done) < 101:
         soon.pop(0)()
     assert done.count("unlucky") > 2 * done.count("greedy")
+
+
+def test_interactive_client_goes_before_clients_whose_work_is_never_done() -> None:
+    """Also if it uses more than an equal part of the time: its requests take longer than a slice."""
+    machine = Machine()
+    machine.join("good", 0.003)
+    for number in range(250):
+        machine.join(f"bad{number}", 0.0005)
+        machine.send(f"bad{number}", 100_000)
+    while len(machine.done) < 250 * 30:
+        machine.iterate()
+
+    for _ in range(50):
+        machine.send("good", 1)
+        before = len(machine.done)
+        while "good" not in machine.done[before:]:
+            machine.iterate()
+        # The rest of the slices that bulk clients have, and no slice of each.
+        assert machine.done[before:].index("good") <= 12
+        machine.iterate()
+
+
+@pytest.mark.parametrize("seconds", [0.0005, 0.02])
+def test_bulk_clients_have_a_fifth_of_the_time_at_least(seconds: float) -> None:
+    machine = Machine()
+    machine.join("bulk", seconds)
+    machine.send("bulk", 1_000_000)
+    for _ in range(50):
+        machine.iterate()
+    names = [f"c{number}" for number in range(20)]
+    for name in names:
+        machine.join(name, 0.001)
+    before, start = machine.done.count("bulk"), machine.now
+    while machine.now - start < 20:
+        for name in names:
+            if not machine.left[name]:
+                machine.send(name, 1)
+        machine.iterate()
+    part = seconds * (machine.done.count("bulk") - before) / (machine.now - start)
+    assert 0.19 <= part <= 0.24
+
+
+def test_bulk_client_becomes_interactive_after_a_short_burst() -> None:
+    machine = Machine()
+    machine.join("a", 0.001)
+    machine.join("bulk", 0.001)
+    machine.send("a", 11)
+    machine.send("bulk", 10_000)
+    while machine.left["a"]:
+        machine.iterate()
+    for _ in range(20):
+        machine.iterate()
+    # Its burst was longer than ten slices: it waits like the other one, then no more.
+    waits = []
+    for _ in range(2):
+        machine.send("a", 1)
+        before = len(machine.done)
+        while machine.left["a"]:
+            machine.iterate()
+        waits.append(machine.shares["a"].queue is machine.shares["bulk"].queue)
+        assert machine.done[before:].index("a") <= 2
+    assert waits == [True, False]
+
+
+def test_clients_that_come_when_nobody_waits_start_at_the_same_tag() -> None:
+    machine = Machine()
+    for name, seconds in (("idle", 0.0006), ("good", 0.0005)):
+        machine.join(name, seconds)
+        for _ in range(10):
+            machine.send(name, 1)
+            machine.now += 1
+    machine.join("busy", 0.009)
+    machine.send("busy", 2)
+    machine.send("idle", 1)
+    machine.send("good", 1)
+    machine.done.clear()
+    while machine.left["busy"]:
+        machine.iterate()
+    # The one first that takes less: what they have used before they were idle does not count.
+    assert machine.done[:2] == ["good", "idle"]

@@ -26,6 +26,7 @@ from websockets.typing import Subprotocol
 from minirospy.base.errors import BridgeError
 from minirospy.web.access import Access, Grant
 from minirospy.web.server import owners
+from minirospy.web.server.account import Account
 from minirospy.web.server.admission import Rank
 from minirospy.web.server.connection import Connection, Limits
 from minirospy.web.server.pipe import Endpoints
@@ -227,8 +228,9 @@ def test_client_that_answers_pings_is_heard(run_bridge: Callable[..., Running]) 
     client.socket.ping().wait(30)
     (connection,) = bridge.bridge.listeners["foxglove"].connections
     # It sends nothing unasked from now on.
-    heard = connection._received
-    wait_until(lambda: connection._received > heard)
+    liveness = connection._liveness
+    heard = liveness.received
+    wait_until(lambda: liveness.received > heard)
     assert_alive(client)
 
 
@@ -553,11 +555,11 @@ EMPTY_FRAMES = {
 
 
 def connected(
-    limits: Limits, seconds_of_frame: float, grant: Grant = Grant.READ
+    limits: Limits, seconds_of_frame: float, grant: Grant = Grant.READ, account: Account | None = None
 ) -> tuple[Turns, Connection, Mock]:
     """Return a loop, a connection after its handshake, and its pipe; each frame takes some seconds of the loop's clock."""
     loop, pipe = Turns(), Mock(is_full=False, unsent=0, endpoints=Endpoints(1, "127.0.0.1", 2))
-    site = Mock(limits=limits, turns=FairTurns(loop.call_soon, loop.time))
+    site = Mock(limits=limits, turns=FairTurns(loop.call_soon, loop.time), account=account or Mock())
     site.check.return_value = grant
     site.admit.return_value = None
     endpoint = Mock()
@@ -617,6 +619,8 @@ def test_clients_with_more_rights_have_more_of_the_loop_and_longer_messages(
 ) -> None:
     _, connection, _ = connected(Limits(), 0.0, grant)
     assert connection._turn.weight == weight
+    new = Connection(connection._site, Mock(is_full=False), "127.0.0.1", connection._loop)
+    assert new._turn.weight < 1.0
     connection.received(b"\x81\xff" + (65_537).to_bytes(8, "big") + bytes(4))
     connection.received(bytes(100))
     assert connection.is_open is (grant is not Grant.READ)
@@ -632,7 +636,7 @@ def test_work_for_a_client_is_done_in_its_turn_and_bounded() -> None:
 
     # The first one is done immediately, which uses up what may start so.
     for number in range(8):
-        connection.in_turn(partial(work, number), 300)
+        connection.in_turn(partial(work, number), bytes(300))
     assert done == [0]
     assert connection.queue.dropped == 4
     loop.iterate()
@@ -644,12 +648,48 @@ def test_work_for_a_client_is_done_in_its_turn_and_bounded() -> None:
     assert done == [0, 5, 6, 7]
     loop.iterate()
     assert loop.frames == 5
-    connection.in_turn(partial(work, 9), 300)
+    connection.in_turn(partial(work, 9), bytes(300))
     for _ in range(3):
         loop.iterate()
     assert done[-1] == 9
     assert loop.frames == 5
     pipe.close.assert_not_called()
+
+
+def test_messages_that_wait_for_their_turn_are_in_the_account_of_memory() -> None:
+    account = Account(limit=1_000_000)
+    loop, connection, _ = connected(Limits(), 0.0, account=account)
+    done: list[int] = []
+
+    def work(number: int) -> None:
+        done.append(number)
+        loop.now += 0.01
+
+    connection.in_turn(partial(work, 0), bytes(400_000))
+    assert account.total == 0
+    connection.in_turn(partial(work, 1), bytes(400_000))
+    connection.in_turn(partial(work, 2), bytes(20_000))
+    assert 420_000 <= account.total <= 421_000
+    loop.iterate()
+    assert 20_000 <= account.total <= 21_000
+    loop.iterate()
+    assert done == [0, 1, 2]
+    assert account.total == 0
+
+    # Beyond the limit they are dropped, as messages that are queued.
+    loop.now += 1.0
+    for number in range(3, 7):
+        connection.in_turn(partial(work, number), bytes(400_000))
+    assert account.total == 0
+    assert connection.queue.dropped == 3
+    loop.iterate()
+    assert done == [0, 1, 2, 3]
+    assert connection.is_open
+
+    connection.in_turn(partial(work, 7), bytes(400_000))
+    assert account.total > 400_000
+    connection.ended()
+    assert account.total == 0
 
 
 def test_work_that_fails_ends_its_client_alone(caplog: pytest.LogCaptureFixture) -> None:
@@ -658,7 +698,7 @@ def test_work_that_fails_ends_its_client_alone(caplog: pytest.LogCaptureFixture)
     def fail() -> None:
         raise ValueError("a fault")
 
-    connection.in_turn(fail, 1)
+    connection.in_turn(fail, b"1")
     loop.iterate()
     assert not connection.is_open
     assert "a fault" in caplog.text

@@ -99,7 +99,7 @@ class ClientTopic:
 
     def _send(self, arrival: Arrival) -> None:
         # Encoding a large message, and cutting it into fragments, takes milliseconds for each client.
-        self._session.client.in_turn(lambda: self._send_now(arrival), len(arrival.body))
+        self._session.client.in_turn(lambda: self._send_now(arrival), arrival.body)
 
     def _send_now(self, arrival: Arrival) -> None:
         if not self._subscriptions or self._is_closed:

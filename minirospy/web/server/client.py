@@ -211,9 +211,9 @@ class WebClient:
         """Drop what waits under a key."""
         self._connection.queue.discard(key)
 
-    def in_turn(self, work: Callable[[], None], size: int) -> None:
-        """Do work that takes long for the client in its turn; ``size``: bytes that it keeps until then."""
-        self._connection.in_turn(work, size)
+    def in_turn(self, work: Callable[[], None], message: Piece) -> None:
+        """Do work that takes long for the client in its turn; it keeps ``message`` until then."""
+        self._connection.in_turn(work, message)
 
     def pause(self) -> None:
         """Handle no more of what the client sends, until :meth:`resume`."""

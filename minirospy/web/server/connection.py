@@ -1,8 +1,8 @@
-"""One connection of a browser or program: HTTP request in, then an answer, a stream, or a WebSocket.
+"""One connection from a browser or program: an HTTP request comes in, then a response, a stream or a WebSocket goes out.
 
-The WebSocket's bytes are parsed by the library ``websockets`` (its part without sockets), one frame at a time, in the client's
-turn (:mod:`minirospy.web.server.turns`). Frames are written here, so that a message goes into the socket without being copied for
-each client. Source: RFC 6455, RFC 9112.
+This is the part with the transport: it feeds the protocol (:mod:`minirospy.web.server.websocket`) in the client's turn
+(:mod:`minirospy.web.server.turns`), calls the session or the page, queues their output (:mod:`minirospy.web.server.output`), and
+counts what the client holds (:mod:`minirospy.web.server.account`). Source: RFC 6455, RFC 9112.
 """
 
 from __future__ import annotations
@@ -11,23 +11,19 @@ import asyncio
 import http
 import logging
 import time
-from collections import deque
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import TYPE_CHECKING
-from urllib.parse import parse_qs, unquote, urlsplit
 
 from websockets.exceptions import NegotiationError
-from websockets.frames import CloseCode, Frame, Opcode
-from websockets.http11 import Request
-from websockets.protocol import State
+from websockets.frames import CloseCode, Frame
 
 from minirospy.base.escape import escaped
-from minirospy.web.access import TOKEN_PROTOCOL, Credentials, Grant, Refusal, header_items
+from minirospy.web.access import Grant, Refusal
 from minirospy.web.json_text import size_in_memory
 from minirospy.web.server.admission import Rank
 from minirospy.web.server.client import (
-    PLAIN_HEADERS,
     Endpoint,
     Exchange,
     HttpHandler,
@@ -37,15 +33,18 @@ from minirospy.web.server.client import (
     Site,
     WebClient,
     frame_head,
-    response_head,
 )
-from minirospy.web.server.files import FileAnswer, FileSender
-from minirospy.web.server.frames import FrameByFrame
+from minirospy.web.server.files import FileAnswer
+from minirospy.web.server.jobs import Jobs
+from minirospy.web.server.liveness import Liveness, Verdict
+from minirospy.web.server.output import Output
 from minirospy.web.server.pipe import LARGE_READ, SMALL_READ
 from minirospy.web.server.queue import Piece, SendQueue
+from minirospy.web.server.request import RequestHead, read_head, refusal_response
+from minirospy.web.server.websocket import Message, Ping, WebSocket
 
 if TYPE_CHECKING:
-    from websockets.typing import Subprotocol
+    from websockets.http11 import Request
 
     from minirospy.web.server.pipe import Endpoints, Pipe
 
@@ -63,13 +62,10 @@ __all__ = [
 
 _log = logging.getLogger(__name__)
 
-_BATCH_BYTES = 256 * 1024
-_BATCH_PIECES = 128
-_PUMP_BYTES = 1024 * 1024  # written to a client that reads at once, before the loop's next iteration
-_PONG = 0x8A
-_MAX_JOBS = 1000  # of a client, each of which keeps a message that is not encoded yet
+_PONG = 0x8A  # first byte of a frame, and the key under which a pong waits
 _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
 """Of clients when the loop's time is shared. On loopback any program may write; the page of the dashboard has the token."""
+_NEW_WEIGHT = 0.25  # until the request is known: clients that are served do not wait for 250 handshakes
 
 
 @dataclass
@@ -82,85 +78,82 @@ class Traffic:
     since: float = field(default_factory=time.monotonic)
 
 
+class _Phase(IntEnum):
+    """The life of a connection."""
+
+    OPEN = 0
+    CLOSING = 1
+    """Nothing more is handled or queued; what is queued may still be sent."""
+    ENDED = 2
+    """The pipe has ended."""
+
+
 class Connection:
     """The state of one connection; the events of its pipe come in here."""
 
     def __init__(self, site: Site, pipe: Pipe, peer: str, loop: asyncio.AbstractEventLoop) -> None:
-        self.peer = peer
-        self.share = site.account.open(peer, self._shed)
-        self.queue = SendQueue(site.limits.queue, share=self.share)
-        self.traffic = Traffic()
-        self.session: Session | None = None
-        self.client: WebClient | None = None
-        self.exchange: Exchange | None = None
-        self.rank = Rank.SILENT
-        """The rights, once the request is known."""
-        self.active = loop.time()
-        """When the connection was opened, or a message was received or taken."""
-        self.unfinished = 0
-        """Bytes of a message that has not arrived whole."""
-        self._site = site
-        self._pipe = pipe
+        limits = site.limits
+        now = loop.time()
+        self.peer = peer  # the client's address
+        self.share = site.account.open(peer, self._shed)  # of the server's memory
+        self.traffic = Traffic()  # counts for people
+        self.session: Session | None = None  # from the handshake of a WebSocket until the end
+        self.client: WebClient | None = None  # from the handshake of a WebSocket on
+        self.exchange: Exchange | None = None  # from the request for a page until the end
+        self.rank = Rank.SILENT  # the rights; set by the listener when it admits the request
+        self.active = now  # when the connection was opened, or last received a message or sent one
+        self.unfinished = 0  # bytes of a message that is not complete, or that the session works on
+        self._site = site  # the listener
+        self._limits = limits  # the listener's
+        self._pipe = pipe  # the transport
         self._loop = loop
-        self._protocol = FrameByFrame(
-            select_subprotocol=lambda _, offered: self._select(offered),
-            max_size=site.limits.message,
-            logger=_QUIET,
-        )
-        self._turn = site.turns.join(self._work)
-        self._endpoint: Endpoint | None = None
-        self._fragments = bytearray()
-        self._is_held_back = False
-        # The client has sent as many frames as it may in this second.
-        self._is_paused = False
-        # Its session works on what came before,
-        self._worked_on = 0
-        # a message of so many bytes.
-        self._jobs: deque[tuple[Callable[[], None], int]] = deque()
-        # Work for the client that is not about what it sent, and the bytes that each keeps.
-        self._jobs_size = 0
-        self._is_in_turn = False
-        self._opcode = Opcode.BINARY
-        self._is_scheduled = False
-        self._is_closing = False
-        self._is_over = False
-        self._file: FileSender | None = None
-        """The file that is being sent."""
-        self._writing: list[Piece] = []
-        """Pieces that the pipe has not written yet, while their large ones are counted."""
-        self._held = 0
-        """Bytes that the session keeps of the client."""
-        self._second = 0.0
-        self._in_second = 0
-        self._received = loop.time()
-        # Since bytes of the client have come.
-        self._is_pinged = False
-        self._progressed = loop.time()
-        self._timer = loop.call_later(site.limits.handshake_seconds, self._handshake_late)
-        self._limits = site.limits
+        self._websocket = WebSocket(self._select, limits.message, limits.messages_a_second)
+        self._output = Output(pipe, SendQueue(limits.queue, share=self.share), self.share, loop, self._count)
+        self._jobs = Jobs(limits.queue, self.share)  # work for the client that is not about what it sent
+        self._liveness = Liveness(limits.silent_seconds, now)
+        self._turn = site.turns.join(self._work)  # the client's share of the loop
+        self._turn.weight = _NEW_WEIGHT
+        self._endpoint: Endpoint | None = None  # set in the handshake, when the sub-protocol is chosen
+        self._phase = _Phase.OPEN
+        self._is_held_back = False  # while the client has sent as many frames as it may in this second
+        self._is_paused = False  # while the session works on an earlier message, see hold()
+        self._worked_on = 0  # bytes of that message
+        self._held = 0  # bytes that the session holds for the client, see session_holds()
+        self._is_in_turn = False  # while _work() runs
+        # Calls _handshake_late at first, then what watches an open connection, then _abort for a closing one.
+        self._timer = loop.call_later(limits.handshake_seconds, self._handshake_late)
+
+    @property
+    def queue(self) -> SendQueue:
+        """Return what waits to be sent."""
+        return self._output.queue
 
     @property
     def is_open(self) -> bool:
         """Return whether more may be sent."""
-        return not self._is_closing
+        return self._phase is _Phase.OPEN
 
     @property
     def is_silent(self) -> bool:
         """Return whether no request has come."""
-        return not (self.client or self.exchange or self._is_closing)
+        return self.is_open and not (self.client or self.exchange)
+
+    @property
+    def endpoints(self) -> Endpoints:
+        """Return the ports of the client and the server, and the server's address."""
+        return self._pipe.endpoints
 
     # --- from the pipe
 
     def received(self, data: bytes) -> None:
-        """Take over bytes of the client."""
-        if self._is_closing:
+        """Take over bytes from the client."""
+        if not self.is_open:
             return
-        self._received = self._loop.time()
-        self._is_pinged = False
+        self._liveness.heard(self._loop.time())
         self.traffic.received_bytes += len(data)
         if self.exchange:
-            return  # one request a connection
-        self._protocol.feed(data)
+            return  # a connection has one request
+        self._websocket.feed(data)
         # A large message is read in large pieces, unless other clients wait for their turns.
         is_alone = len(data) >= SMALL_READ and not self._site.turns.is_busy
         self._pipe.read_bytes = LARGE_READ if is_alone else SMALL_READ
@@ -170,13 +163,13 @@ class Connection:
 
     def writable(self) -> None:
         """Send more."""
-        self._pump()
+        self._output.pump()
 
     def ended(self) -> None:
-        """Forget the connection."""
-        if self._is_over:
+        """Release everything: the pipe has ended."""
+        if self._phase is _Phase.ENDED:
             return
-        self._is_over = self._is_closing = True
+        self._phase = _Phase.ENDED
         self._timer.cancel()
         self._site.turns.leave(self._turn)
         self._discard_unfinished()
@@ -188,116 +181,104 @@ class Connection:
         except Exception:  # noqa: BLE001 a fault of one session is not that of others
             _log.exception("the end of a client's session")
         self.session = self.exchange = None
-        # The connection is part of reference cycles: what waited is freed now, not when they are collected.
-        self.queue.clear()
+        # The connection is part of reference cycles: release its memory now, not when they are collected.
         self._jobs.clear()
-        if self._file:
-            self._file.close()
-        self._wrote()
+        self._output.end()
         self._site.account.close(self.share)
         self._site.left(self)
 
     # --- to the pipe
 
     def answer(self, pieces: tuple[Piece, ...]) -> None:
-        """Send what is never dropped."""
-        if self._is_closing:
+        """Send a message that is never dropped."""
+        if not self.is_open:
             return
-        # Looked at before: a single answer, such as a mesh, may be larger than what may wait.
+        # Checked before: a single answer, such as a mesh, may be larger than what may wait.
         if self.queue.is_overrun:
             _log.warning("%s reads no answers: disconnected", self.peer)
             self._abort()
             return
         self.queue.put_answer(pieces)
         self._count()
-        self._schedule()
+        self._output.schedule()
 
     def answer_file(self, answer: FileAnswer) -> None:
         """Send a file, which is never dropped."""
-        if not self._is_closing:
+        if self.is_open:
             self.queue.put_file(answer)
             self._count()
-            self._schedule()
+            self._output.schedule()
 
     def stream(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool) -> None:
-        """Send what may be dropped."""
-        if not self._is_closing:
+        """Send a message that may be dropped."""
+        if self.is_open:
             self.queue.put(key, pieces, newest_only=newest_only)
-            if self._pipe.is_full:
+            if self._output.is_full:
                 self._count()
             else:
                 self.active = self._loop.time()
-            self._schedule()
+            self._output.schedule()
 
     def close_when_sent(self) -> None:
-        """End the connection after what waits."""
-        self._is_closing = True
-        self._schedule()
+        """End the connection when everything that is queued has been sent."""
+        self._close()
+        self._output.close_when_sent()
         self._timer.cancel()
         self._timer = self._loop.call_later(self._limits.handshake_seconds, self._abort)
 
     def close_websocket(self, code: int, reason: str) -> None:
-        """Say why, and end the connection after what waits."""
-        if self._is_closing or self._protocol.state is not State.OPEN:
+        """Send a close frame, and end the connection when everything that is queued has been sent."""
+        if not self.is_open or not self._websocket.is_open:
             return
-        self._protocol.send_close(code, _cut(reason))
+        self._websocket.close(code, reason)
         self._answer_protocol()
         self.close_when_sent()
 
-    def refuse_unfinished(self) -> None:
-        """End the connection, and free the part of a message that has arrived."""
-        _log.warning("%s: unfinished messages take too much memory: disconnected", self.peer)
-        self.close_websocket(CloseCode.TRY_AGAIN_LATER, "too many unfinished messages")
-        self._discard_unfinished()
+    def give_way(self) -> None:
+        """End the connection, since another client needs its place."""
+        self.close_websocket(CloseCode.TRY_AGAIN_LATER, "another client needs the place")
+        if self.is_open or self._output.is_full:
+            self._abort()
+
+    def abort(self) -> None:
+        """End the connection now."""
+        self._abort()
+
+    # --- for the session
 
     def hold(self, *, is_held: bool) -> None:
-        """Handle no more frames while the session is busy with one; the client's bytes stay in its socket."""
+        """Stop or continue handling frames, while the session is busy with one; the client's bytes stay in its socket."""
         self._is_paused = is_held
         if is_held:
             self._pipe.pause()
             return
         self._worked_on = 0
         self._count_unfinished()
-        if not self._is_over and not self._is_held_back:
+        if self._phase is not _Phase.ENDED and not self._is_held_back:
             self._site.turns.start(self._turn)
 
-    def in_turn(self, work: Callable[[], None], size: int) -> None:
-        """Do some work for the client in its turn, immediately if that is now; ``size``: bytes that it keeps until then.
+    def in_turn(self, work: Callable[[], None], message: Piece) -> None:
+        """Do some work for the client in its turn, immediately if that is now; it keeps ``message`` until then.
 
-        The oldest work is dropped where more waits than may be sent.
+        The oldest work is dropped if more waits than may be sent.
         """
         if self._is_in_turn:
             work()
             return
-        self._jobs.append((work, size))
-        self._jobs_size += size
-        while len(self._jobs) > 1 and (self._jobs_size > self._limits.queue or len(self._jobs) > _MAX_JOBS):
-            self._jobs_size -= self._jobs.popleft()[1]
-            self.queue.dropped += 1
+        if not self.is_open:
+            return
+        self.queue.dropped += self._jobs.add(work, message)
         self._site.turns.start(self._turn)
-
-    def session_holds(self, count: int) -> None:
-        """Count what the session keeps of the client."""
-        self._held = count
-        if not self._is_over:
+        if self._jobs:
             self._count()
 
-    def give_way(self) -> None:
-        """End the connection, since another client needs its place."""
-        self.close_websocket(CloseCode.TRY_AGAIN_LATER, "another client needs the place")
-        if not self._is_closing or self._pipe.is_full:
-            self._abort()
+    def session_holds(self, count: int) -> None:
+        """Count the bytes that the session holds for the client."""
+        self._held = count
+        if self._phase is not _Phase.ENDED:
+            self._count()
 
-    @property
-    def endpoints(self) -> Endpoints:
-        """The ports of both ends, and the address of this one."""
-        return self._pipe.endpoints
-
-    def abort(self) -> None:
-        """End the connection now."""
-        self._abort()
-
-    # --- within
+    # --- the client's turn
 
     def _work(self, end: float) -> bool:
         """Work for the client up to a time; return whether more is left."""
@@ -308,185 +289,65 @@ class Connection:
             self._is_in_turn = False
 
     def _do_jobs(self, end: float) -> bool:
-        while self._jobs and not self._is_closing:
-            work, size = self._jobs.popleft()
-            self._jobs_size -= size
+        if not self._jobs:
+            return False
+        is_left = self._do_some_jobs(end)
+        self._count()
+        return is_left
+
+    def _do_some_jobs(self, end: float) -> bool:
+        while self._jobs and self.is_open:
+            work = self._jobs.pop()
             try:
                 work()
             except Exception:  # noqa: BLE001 whatever a session raises ends this client alone
                 _log.exception("a message for %s could not be sent", self.peer)
                 self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on a message")
-            if self._loop.time() >= end and not self._is_closing:
-                return bool(self._jobs or self._protocol.reader.buffer)
+            if self._loop.time() >= end and self.is_open:
+                return bool(self._jobs or self._websocket.has_unread)
         return False
 
     def _handle_frames(self, end: float) -> bool:
         """Handle frames up to a time; return whether more are left, of what the client may send in this second."""
         if self.client is None:
             self._parse_head()
-        protocol, time_of = self._protocol, self._loop.time
-        now, most = time_of(), self._limits.messages_a_second
-        if now - self._second >= 1.0:
-            self._second, self._in_second = now, 0
-        while self.client and not (self._is_closing or self._is_paused or self._is_held_back):
-            if self._in_second >= most:
-                self._hold_back(self._second + 1.0 - now)
+        websocket, rate, time_of = self._websocket, self._websocket.rate, self._loop.time
+        now = time_of()
+        rate.update(now)
+        while self.client and self.is_open and not (self._is_paused or self._is_held_back):
+            if rate.is_used_up:
+                self._hold_back(rate.seconds_left(now))
                 break
-            frame = protocol.next_frame()
+            frame = websocket.next_frame()
             if frame is None:
                 break
-            self._in_second += 1
             self._framed(frame)
-            if time_of() >= end and protocol.reader.buffer and not self._is_closing:
+            if time_of() >= end and websocket.has_unread and self.is_open:
                 return True
-        if self.client and not self._is_over:
+        if self.client and self._phase is not _Phase.ENDED:
             self._answer_protocol()
-            if self._protocol.state in (State.CLOSING, State.CLOSED):
+            if websocket.is_closed:
                 self.close_when_sent()
         self._count_unfinished()
-        if not self._is_held_back and not self._is_paused and not self._is_over:
+        if not self._is_held_back and not self._is_paused and self._phase is not _Phase.ENDED:
             self._pipe.resume()
         return False
 
-    def _parse_head(self) -> None:
-        request = self._protocol.next_request()
-        if request:
-            self._requested(request)
-        elif self._protocol.handshake_exc:
-            why = self._protocol.handshake_exc.__cause__ or self._protocol.handshake_exc
-            self._refuse(Refusal(400, f"not a request for this server: {escaped(str(why))[:200]}"))
-
-    def _answer_protocol(self) -> None:
-        data = tuple(piece for piece in self._protocol.data_to_send() if piece)
-        if data:
-            self.answer(data)
-
-    def _requested(self, request: Request) -> None:
-        try:
-            # The target and Origin may be no URLs, with a thousand fields: neither is a reason to leave the client connected.
-            found = self._admitted(request)
-        except ValueError as error:
-            found = Refusal(400, f"not a request for this server: {escaped(str(error))[:200]}")
-        if isinstance(found, Refusal):
-            self._refuse(found)
-            return
-        seen, grant, is_page = found
-        if is_page:
-            self._serve_page(seen, grant)
-            return
-
-        response = self._protocol.accept(request)
-        if response.status_code != http.HTTPStatus.SWITCHING_PROTOCOLS or self._endpoint is None:
-            text = bytes(response.body or b"").decode(errors="replace").strip().partition(": ")[2]
-            self._refuse(Refusal(response.status_code, text or "not a WebSocket request"))
-            return
-        self._protocol.send_response(response)
-        self._answer_protocol()
-        self.client = WebClient(self, seen, grant, self._protocol.subprotocol)
-        self.share.is_owner = self.client.is_owner
-        self._turn.weight = _WEIGHTS[grant]
-        if not self.client.may_write:
-            self._protocol.limit(min(self._limits.message, self._limits.read_only_message))
-        self._watch(self._ping)
-        self.session = self._endpoint.open(self.client)
-
-    def _admitted(self, request: Request) -> tuple[HttpRequest, Grant, bool] | Refusal:
-        """Return a request, its rights and whether it is for a page, or why it is refused. Raise ValueError."""
-        headers = {name.lower(): value for name, value in request.headers.raw_items()}
-        credentials = Credentials(
-            headers.get("host", ""),
-            _origin(headers),
-            headers.get("authorization", ""),
-            header_items(headers, "sec-websocket-protocol"),
-            request.path,
-        )
-        is_page = headers.get("upgrade", "").lower() != "websocket"
-        grant = self._site.check(credentials, is_page=is_page)
-        refusal = grant if isinstance(grant, Refusal) else self._site.admit(self, grant)
-        if refusal:
-            return refusal
-        assert isinstance(grant, Grant)
-        parts = urlsplit(request.path)
-        query = {name: values[-1] for name, values in parse_qs(parts.query, keep_blank_values=True).items()}
-        seen = HttpRequest(unquote(parts.path), query, headers, self.peer, *self._pipe.endpoints)
-        return seen, grant, is_page
-
-    def _watch(self, check: Callable[[], None]) -> None:
-        """Call ``check`` from now on in place of what watched the connection until now."""
-        self._timer.cancel()
-        self._timer = self._loop.call_later(self._limits.ping_seconds, check)
-
-    def _select(self, offered: Sequence[Subprotocol]) -> Subprotocol | None:
-        names = [name for name in offered if not name.startswith(TOKEN_PROTOCOL)]
-        why = "nothing is served here"
-        for endpoint in self._site.endpoints:
-            try:
-                chosen = endpoint.select(names)
-            except LookupError as error:
-                why = str(error.args[0])
-                continue
-            self._endpoint = endpoint
-            return chosen  # type: ignore[return-value]
-        raise NegotiationError(why)
-
-    def _serve_page(self, request: HttpRequest, grant: Grant) -> None:
-        handler = self._site.page(request.path)
-        if handler is None:
-            self._refuse(Refusal(404, "there is no such page; WebSocket clients are served here"))
-            return
-        self.exchange = Exchange(self, request, grant)
-        self._progressed = self._loop.time()
-        self._watch(self._watch_progress)
-        try:
-            handler(self.exchange)
-        except Exception:  # noqa: BLE001 whatever the page's handler raises
-            _log.exception("a page could not be served")
-            self._abort()
-
-    def _refuse(self, refusal: Refusal) -> None:
-        _log.info("refused %s: %d %s", self.peer, refusal.status, escaped(refusal.text))
-        body = (refusal.text + "\n").encode()
-        extra = {401: {"WWW-Authenticate": "Bearer"}, 503: {"Retry-After": "5"}}.get(refusal.status, {})
-        self.answer(
-            (
-                response_head(
-                    refusal.status,
-                    {
-                        **PLAIN_HEADERS,
-                        "Content-Type": "text/plain; charset=utf-8",
-                        "Content-Length": str(len(body)),
-                        **extra,
-                    },
-                ),
-                body,
-            )
-        )
-        self.close_when_sent()
-
     def _framed(self, frame: Frame) -> None:
-        if frame.opcode in (Opcode.TEXT, Opcode.BINARY):
-            self._opcode = frame.opcode
-        elif frame.opcode is Opcode.PING:
-            # Only the newest ping needs an answer (RFC 6455, 5.5.3): a client that reads nothing leaves one waiting.
-            self.stream(_PONG, (frame_head(_PONG, len(frame.data)), frame.data), newest_only=True)
-            return
-        elif frame.opcode is not Opcode.CONT:
-            return
-        if frame.fin and not self._fragments:
-            self._delivered(bytes(frame.data))
-            return
-        self._fragments += frame.data
-        if frame.fin:
-            data = bytes(self._fragments)
-            self._fragments.clear()
-            self._delivered(data)
+        event = self._websocket.event_of(frame)
+        if isinstance(event, Ping):
+            # Only the newest ping needs an answer (RFC 6455, 5.5.3): at most one waits for a client that reads nothing.
+            self.stream(_PONG, (frame_head(_PONG, len(event.data)), event.data), newest_only=True)
+        elif event:
+            self._deliver(event)
 
-    def _delivered(self, data: bytes) -> None:
+    def _deliver(self, message: Message) -> None:
         assert self.session
+        data = message.data
         self.traffic.received += 1
         self.active = self._loop.time()
         try:
-            if self._opcode is Opcode.BINARY:
+            if not message.is_text:
                 self.session.received_binary(data)
             elif size_in_memory(data) > self._limits.message:
                 self.close_websocket(CloseCode.MESSAGE_TOO_BIG, "its wide characters take too much memory")
@@ -500,48 +361,8 @@ class Connection:
         if self._is_paused:
             self._worked_on = len(data)
 
-    def _count_unfinished(self) -> None:
-        self.unfinished = len(self._protocol.reader.buffer) + len(self._fragments) + self._worked_on
-        self._count()
-
-    def _count(self) -> None:
-        """Count in the account what the client holds alone; this may make clients give up memory, this one too."""
-        queue = self.queue
-        size = self.unfinished + self._held + queue.size + queue.answers - queue.large
-        if self._pipe.is_full:
-            size += max(0, self._pipe.unsent - sum(map(len, self._writing)))
-        self.share.set(size)
-
-    def _shed(self) -> None:
-        """Give up memory: messages that may be dropped, else the connection."""
-        if self.unfinished > self.queue.size + self.queue.answers and not self._held:
-            self.refuse_unfinished()
-            return
-        if self.queue.size:
-            self.queue.drop_messages()
-            self._count()
-            return
-        _log.warning("%s: the server holds too much memory for it: disconnected", self.peer)
-        self._discard_unfinished()
-        self._abort()
-        self.queue.clear()
-        self._held = 0
-        self._count()
-
-    def _wrote(self) -> None:
-        """Count the pieces that were with the pipe no more."""
-        if self._writing:
-            self.share.release(self._writing)
-            self._writing = []
-
-    def _discard_unfinished(self) -> None:
-        self._protocol.reader.buffer.clear()
-        self._fragments.clear()
-        self._worked_on = 0
-        self._count_unfinished()
-
     def _hold_back(self, seconds: float) -> None:
-        """Read a client that has sent what it may in this second again in the next one."""
+        """Stop reading from the client until the next second: it has sent all the frames that it may in this one."""
         self._is_held_back = True
         self.traffic.held_back += 1
         self._pipe.pause()
@@ -552,81 +373,151 @@ class Connection:
         if not self._is_paused:
             self._site.turns.start(self._turn)
 
-    def _schedule(self) -> None:
-        # What arrives in the same turn of the loop goes out with one call.
-        if not self._is_scheduled and not self._pipe.is_full:
-            self._is_scheduled = True
-            self._loop.call_soon(self._pump)
+    def _answer_protocol(self) -> None:
+        data = self._websocket.data_to_send()
+        if data:
+            self.answer(data)
 
-    def _pump(self) -> None:
-        self._is_scheduled = False
-        if self._is_over:
+    # --- the request
+
+    def _parse_head(self) -> None:
+        try:
+            request = self._websocket.next_request()
+            # The target and Origin may be no URLs, with a thousand fields: the client is refused, not left connected.
+            found = self._admitted(read_head(request)) if request else None
+        except ValueError as error:
+            found = Refusal(400, f"not a request for this server: {escaped(str(error))[:200]}")
+        if found is None:
             return
-        if not self._pipe.is_full:
-            self._wrote()
-        self._write()
-        if self.share.size and not self._is_over:
-            self._count()
+        if isinstance(found, Refusal):
+            self._refuse(found)
+            return
+        seen, grant, is_page = found
+        if is_page:
+            self._serve_page(seen, grant)
+        else:
+            assert request
+            self._open_websocket(request, seen, grant)
 
-    def _write(self) -> None:
-        """Write what waits, as much of it as the pipe takes and as fits into one iteration of the loop."""
-        written = 0
-        while not self._pipe.is_full:
-            if written >= _PUMP_BYTES:
-                self._schedule()
-                return
-            batch: list[Piece] = []
-            size = 0
-            while size < _BATCH_BYTES and len(batch) < _BATCH_PIECES and not self._file:
-                pieces = self.queue.pop()
-                if pieces is None:
-                    break
-                if isinstance(pieces, FileAnswer):
-                    self._file = FileSender(pieces, self._loop, self._pump)
-                    break
-                batch += pieces
-                size += sum(map(len, pieces))
-            if not batch and self._file:
-                piece = self._file.take()
-                if piece is None:
-                    if self._file.has_failed:
-                        self._abort()  # its size has been sent: what follows would be taken for the file
-                    return
-                batch.append(piece)
-                if self._file.is_done:
-                    self._file = None
-            if not batch:
-                if self._is_closing:
-                    self._pipe.close()
-                return
-            self._progressed = self._loop.time()
-            written += sum(map(len, batch))
-            self._pipe.write(batch)
-            if self._is_over:
-                return
-            if self._pipe.is_full and not self._pipe.copies:
-                self._writing = batch
-                self.share.hold(batch)
+    def _admitted(self, head: RequestHead) -> tuple[HttpRequest, Grant, bool] | Refusal:
+        """Return a request, its rights and whether it is for a page, or why it is refused. Raise ValueError."""
+        grant = self._site.check(head.credentials, is_page=head.is_page)
+        refusal = grant if isinstance(grant, Refusal) else self._site.admit(self, grant)
+        if refusal:
+            return refusal
+        assert isinstance(grant, Grant)
+        return head.parsed(self.peer, self._pipe.endpoints), grant, head.is_page
+
+    def _open_websocket(self, request: Request, seen: HttpRequest, grant: Grant) -> None:
+        response = self._websocket.response_to(request)
+        if response.status_code != http.HTTPStatus.SWITCHING_PROTOCOLS or self._endpoint is None:
+            text = bytes(response.body or b"").decode(errors="replace").strip().partition(": ")[2]
+            self._refuse(Refusal(response.status_code, text or "not a WebSocket request"))
+            return
+        self._websocket.accept(response)
+        self._answer_protocol()
+        self.client = WebClient(self, seen, grant, self._websocket.subprotocol)
+        self.share.is_owner = self.client.is_owner
+        self._turn.weight = _WEIGHTS[grant]
+        if not self.client.may_write:
+            self._websocket.restrict(min(self._limits.message, self._limits.read_only_message))
+        self._watch(self._ping)
+        self.session = self._endpoint.open(self.client)
+
+    def _select(self, offered: Sequence[str]) -> str | None:
+        """Choose the endpoint; return its sub-protocol. Raise NegotiationError."""
+        why = "nothing is served here"
+        for endpoint in self._site.endpoints:
+            try:
+                chosen = endpoint.select(offered)
+            except LookupError as error:
+                why = str(error.args[0])
+                continue
+            self._endpoint = endpoint
+            return chosen
+        raise NegotiationError(why)
+
+    def _serve_page(self, request: HttpRequest, grant: Grant) -> None:
+        handler = self._site.page(request.path)
+        if handler is None:
+            self._refuse(Refusal(404, "there is no such page; WebSocket clients are served here"))
+            return
+        self.exchange = Exchange(self, request, grant)
+        self._output.progressed = self._loop.time()
+        self._watch(self._watch_progress)
+        try:
+            handler(self.exchange)
+        except Exception:  # noqa: BLE001 whatever the page's handler raises
+            _log.exception("a page could not be served")
+            self._abort()
+
+    def _refuse(self, refusal: Refusal) -> None:
+        _log.info("refused %s: %d %s", self.peer, refusal.status, escaped(refusal.text))
+        self.answer(refusal_response(refusal))
+        self.close_when_sent()
+
+    # --- memory
+
+    def _count_unfinished(self) -> None:
+        self.unfinished = self._websocket.unfinished + self._worked_on
+        self._count()
+
+    def _count(self) -> None:
+        """Count in the account what the client holds alone; this may make clients release memory, this one too."""
+        self.share.set(self.unfinished + self._held + self._jobs.size + self._output.size)
+
+    def _shed(self) -> None:
+        """Release memory: messages that may be dropped, else the connection."""
+        if self.unfinished > self.queue.size + self.queue.answers + self._jobs.size and not self._held:
+            self._refuse_unfinished()
+            return
+        if self.queue.size or self._jobs:
+            self.queue.drop_messages()
+            self.queue.dropped += self._jobs.clear()
+            self._count()
+            return
+        _log.warning("%s: the server holds too much memory for it: disconnected", self.peer)
+        self._discard_unfinished()
+        self._abort()
+        self.queue.clear()
+        self._held = 0
+        self._count()
+
+    def _refuse_unfinished(self) -> None:
+        _log.warning("%s: unfinished messages take too much memory: disconnected", self.peer)
+        self.close_websocket(CloseCode.TRY_AGAIN_LATER, "too many unfinished messages")
+        self._discard_unfinished()
+
+    def _discard_unfinished(self) -> None:
+        self._websocket.discard_unfinished()
+        self._worked_on = 0
+        self._count_unfinished()
+
+    # --- time
+
+    def _watch(self, check: Callable[[], None]) -> None:
+        """Call ``check`` after the time between two pings, in place of what watched the connection until now."""
+        self._timer.cancel()
+        self._timer = self._loop.call_later(self._limits.ping_seconds, check)
 
     def _ping(self) -> None:
-        """See whether the client is there: it answers a ping, or takes what is sent."""
-        now = self._loop.time()
-        stuck = self._pipe.is_full and now - self._progressed > self._limits.silent_seconds
-        # After a suspend the last bytes are old, and the client has not been pinged since.
-        silent = self._is_pinged and now - self._received > self._limits.silent_seconds
-        if stuck or silent:
-            _log.info("%s %s: disconnected", self.peer, "reads nothing" if stuck else "does not answer")
+        """Ping the client, or disconnect it if it is gone."""
+        output = self._output
+        verdict = self._liveness.check(self._loop.time(), output.progressed, is_full=output.is_full)
+        if verdict in (Verdict.STUCK, Verdict.SILENT):
+            why = "reads nothing" if verdict is Verdict.STUCK else "does not answer"
+            _log.info("%s %s: disconnected", self.peer, why)
             self._abort()
             return
-        if not self._pipe.is_full:
-            self._is_pinged = True
-            self._protocol.send_ping(b"minirospy")
+        if verdict is Verdict.PING:
+            self._websocket.ping(b"minirospy")
             self._answer_protocol()
         self._watch(self._ping)
 
     def _watch_progress(self) -> None:
-        now = self._loop.time()
-        if self._pipe.is_full and now - self._progressed > self._limits.silent_seconds:
+        """Disconnect the client of a page if it reads nothing."""
+        output = self._output
+        if self._liveness.is_stuck(self._loop.time(), output.progressed, is_full=output.is_full):
             self._abort()
             return
         self._watch(self._watch_progress)
@@ -635,33 +526,10 @@ class Connection:
         _log.info("%s sent no request in time", self.peer)
         self._abort()
 
+    def _close(self) -> None:
+        if self._phase is _Phase.OPEN:
+            self._phase = _Phase.CLOSING
+
     def _abort(self) -> None:
-        self._is_closing = True
-        self._pipe.close(flush=False)
-
-
-def _origin(headers: Mapping[str, str]) -> str | None:
-    """Return the site of the page that sends a request; None if it is not one.
-
-    A browser names it in Origin, but not for an image or a frame: there it says that the page is of another site, and
-    may name that in Referer. Source: https://www.w3.org/TR/fetch-metadata/.
-    """
-    origin = headers.get("origin")
-    is_embedded = (
-        headers.get("sec-fetch-site") == "cross-site" and headers.get("sec-fetch-dest") != "document"
-    )
-    if origin is None and is_embedded:
-        page = urlsplit(headers.get("referer", ""))
-        return f"{page.scheme}://{page.netloc}" if page.netloc else "null"
-    return origin
-
-
-def _cut(reason: str) -> str:
-    return reason.encode()[:123].decode(errors="ignore")
-
-
-_QUIET = logging.getLogger("minirospy.web.websockets")
-# It logs each frame at DEBUG, tokens in headers among them.
-_QUIET.addHandler(logging.NullHandler())
-_QUIET.propagate = False
-_QUIET.setLevel(logging.CRITICAL)
+        self._close()
+        self._output.abort()

@@ -2,7 +2,14 @@
 
 Every client has a :class:`Share`, whose ``work`` handles what the client has sent. Work starts immediately while the clients
 together use less than half of the time; beyond that it is queued, and each iteration of the loop handles a few
-milliseconds of it. The order is fair queueing: a client's tag is the time that it has used, a client that was idle starts at
+milliseconds of it.
+
+There are two queues, as the classes of a multilevel feedback scheduler: one for interactive clients, which send little at a time
+and then nothing until they are answered, and one for bulk clients, whose work is never done or takes long. Interactive clients go
+first, so that none of them waits for a slice of each of 250 clients that flood the server; bulk clients have at least a fifth of
+the time.
+
+The order in each queue is fair queueing: a client's tag is the time that it has used, a client that was idle starts at
 the tag that is served now, and the one goes first that will end first, if its work takes as long as before. So a client that uses
 less than its part of the time waits at most for one slice of each other client, and not for long messages of others. A client
 that has more rights has a larger weight: the same time counts less. Source: Goyal, Vin, Cheng: Start-time Fair Queueing,
@@ -27,25 +34,45 @@ SLICE_SECONDS = 0.0001  # of one client before the next client's work: 250 of th
 NEW_PIECES = 8  # of work, by which a client is known; before it is expected to do as the last new clients did
 EXPECTED_DECAY = 0.9  # of what is expected, with each piece of work that takes less
 IMMEDIATE_SHARE = 0.5  # of the time, for work that starts without being queued
+INTERACTIVE_SLICES = (
+    10  # of one burst, 1 ms: a request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms
+)
+MAX_DEBT_TURNS = (
+    10  # of bulk clients: interactive ones alone may have 200 ms before bulk clients have a slice again
+)
+BULK_SHARE = 0.2  # of the time, for bulk clients while interactive ones fill the rest
 
 Work = Callable[[float], bool]
 """Do some work, up to a time of the clock; return whether more is left."""
 
 
 class Share:
-    """The part of the loop that one client has used."""
+    """The part of the loop that one client has used; seconds are divided by its weight."""
 
-    __slots__ = ("expected", "is_closed", "is_queued", "pieces", "tag", "weight", "work")
+    __slots__ = (
+        "burst",
+        "expected",
+        "is_closed",
+        "is_queued",
+        "last_burst",
+        "pieces",
+        "queue",
+        "tag",
+        "weight",
+        "work",
+    )
 
-    def __init__(self, work: Work, tag: float) -> None:
+    def __init__(self, work: Work, queue: _FairQueue) -> None:
         self.work = work
-        self.tag = tag
-        """Seconds that the client has used, by its weight; at least the tag that was served when it last started."""
-        self.weight = 1.0
-        self.expected = 0.0
-        """Seconds that its next piece of work may take, from those before."""
-        self.pieces = 0
-        """Pieces of work that were done, while the client is new."""
+        self.queue = queue  # that of interactive clients, or that of bulk clients
+        self.tag = (
+            queue.served
+        )  # seconds used; at least the tag that its queue served when the client last started
+        self.weight = 1.0  # set once the client's rights are known
+        self.expected = 0.0  # seconds that its next piece of work may take, from those before
+        self.pieces = 0  # of work that were done, while the client is new
+        self.burst = 0.0  # seconds used since the client last had nothing to do
+        self.last_burst = 0.0  # seconds of the burst before
         self.is_queued = False
         self.is_closed = False
 
@@ -58,6 +85,22 @@ class _Entry(NamedTuple):
     number: int
     start: float
     share: Share
+
+
+class _FairQueue:
+    """The queued work of one class of clients."""
+
+    def __init__(self) -> None:
+        self.entries: list[_Entry] = []  # a heap
+        self.served = (
+            0.0  # the tag of the work that was started last; if nothing waited then, the highest tag
+        )
+        self.highest = 0.0  # tag of a client that was served
+
+    def update(self) -> None:
+        """Forget what clients have used if none of them waits: those that come now start at the same tag."""
+        if not self.entries:
+            self.served = self.highest
 
 
 class FairTurns:
@@ -81,29 +124,29 @@ class FairTurns:
         self._meter = meter or clock
         self._turn_seconds = turn
         self._slice = slice_
-        self._served = 0.0
-        # The tag of the work that was started last.
-        self._credit = turn
-        # Seconds of work that may start without being queued.
-        self._credited = clock()
-        self._new_expected = slice_
-        # Seconds that a piece of work of a new client may take.
-        self._queue: list[_Entry] = []
+        self._credit = turn  # seconds of work that may start without being queued
+        self._credited = clock()  # when the credit was last updated
+        self._new_expected = slice_  # seconds that a piece of work of a new client may take
+        self._interactive = _FairQueue()
+        self._bulk = _FairQueue()
+        self._bulk_credit = 0.0  # seconds for which bulk clients go first
         self._numbers = itertools.count()
-        self._is_running = self._is_scheduled = False
+        self._is_running = False  # while a client's work is done
+        self._is_scheduled = False  # from call_soon() until the turn
 
     def __len__(self) -> int:
         """Return the number of clients whose work is queued."""
-        return sum(not entry.share.is_closed for entry in self._queue)
+        queues = self._interactive, self._bulk
+        return sum(not entry.share.is_closed for queue in queues for entry in queue.entries)
 
     @property
     def is_busy(self) -> bool:
         """Return whether a client waits for its turn."""
-        return bool(self._queue)
+        return bool(self._interactive.entries or self._bulk.entries)
 
     def join(self, work: Work) -> Share:
         """Return the share of a new client: it has no advantage over clients that have been idle."""
-        return Share(work, self._served)
+        return Share(work, self._interactive)
 
     def leave(self, share: Share) -> None:
         """Start its work no more. Idempotent."""
@@ -113,12 +156,12 @@ class FairTurns:
         """Do a client's work now or in its turn; return whether some is left. Without effect while it is queued."""
         if share.is_queued or share.is_closed:
             return share.is_queued
-        if self._is_running or self._queue or not self._may_start_now():
+        if self._is_running or self.is_busy or not self._may_start_now():
             self._put(share)
             return True
 
         before = self._clock()
-        if self._run(share, max(share.tag, self._served)):
+        if self._run(share, max(share.tag, share.queue.served)):
             self._put(share)
         self._credit -= self._clock() - before
         return share.is_queued
@@ -130,16 +173,26 @@ class FairTurns:
         return self._credit > 0
 
     def _put(self, share: Share) -> None:
+        queue = self._queue_of(share)
+        queue.update()
+        if queue is not share.queue:
+            # Tags of one queue mean nothing in the other.
+            share.queue = queue
+            share.tag = queue.served
         share.is_queued = True
-        self._push(share, max(share.tag, self._served))
+        self._push(share, max(share.tag, queue.served))
         if not self._is_scheduled:
             self._is_scheduled = True
             self._call_soon(self._turn)
 
+    def _queue_of(self, share: Share) -> _FairQueue:
+        is_bulk = max(share.burst, share.last_burst) > INTERACTIVE_SLICES * self._slice
+        return self._bulk if is_bulk else self._interactive
+
     def _push(self, share: Share, start: float) -> None:
         # Of clients that would end at the same tag the one that used less before goes first.
         end = self._end_of(share, start)
-        heapq.heappush(self._queue, _Entry(end, share.tag, next(self._numbers), start, share))
+        heapq.heappush(share.queue.entries, _Entry(end, share.tag, next(self._numbers), start, share))
 
     def _end_of(self, share: Share, start: float) -> float:
         is_new = share.pieces < NEW_PIECES
@@ -148,24 +201,39 @@ class FairTurns:
     def _turn(self) -> None:
         self._is_scheduled = False
         end = self._clock() + self._turn_seconds
-        while self._queue and self._clock() < end:
-            end_tag, *_, start, share = heapq.heappop(self._queue)
+        while self.is_busy and self._clock() < end:
+            queue = self._next_queue()
+            end_tag, *_, start, share = heapq.heappop(queue.entries)
             if self._end_of(share, start) > end_tag + self._slice:
                 self._push(share, start)  # more is expected of new clients than when it was queued
                 continue
             share.is_queued = False
-            if self._run(share, start):
+            before = self._clock()
+            is_left = self._run(share, start)
+            self._update_bulk_credit(queue, self._clock() - before)
+            if is_left:
                 self._put(share)
-        if self._queue and not self._is_scheduled:
+        if self.is_busy and not self._is_scheduled:
             self._is_scheduled = True
             self._call_soon(self._turn)
+
+    def _next_queue(self) -> _FairQueue:
+        if not self._interactive.entries:
+            return self._bulk
+        return self._bulk if self._bulk.entries and self._bulk_credit >= self._slice else self._interactive
+
+    def _update_bulk_credit(self, queue: _FairQueue, seconds: float) -> None:
+        change = -seconds * (1 - BULK_SHARE) if queue is self._bulk else seconds * BULK_SHARE
+        # Limited in both directions: what was used long ago does not count.
+        most = self._turn_seconds
+        self._bulk_credit = max(-MAX_DEBT_TURNS * most, min(most, self._bulk_credit + change))
 
     def _run(self, share: Share, start: float) -> bool:
         """Do some of a client's work, which starts at a tag; return whether more is left."""
         if share.is_closed:
             return False
         end, before = self._clock() + self._slice, self._meter()
-        self._served = max(self._served, start)
+        share.queue.served = max(share.queue.served, start)
         self._is_running = True
         is_left = False
         try:
@@ -175,7 +243,11 @@ class FairTurns:
         self._is_running = False
         used = self._meter() - before
         share.tag = start + used / share.weight
+        share.queue.highest = max(share.queue.highest, share.tag)
         share.expected = max(used, EXPECTED_DECAY * share.expected)
+        share.burst += used / share.weight
+        if not is_left:
+            share.burst, share.last_burst = 0.0, share.burst
         if share.pieces < NEW_PIECES:
             share.pieces += 1
             self._new_expected = max(used, EXPECTED_DECAY * self._new_expected, self._slice)

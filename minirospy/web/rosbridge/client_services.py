@@ -1,0 +1,132 @@
+"""The services of a client of rosbridge: its calls that are under way, and the services that it offers."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import TYPE_CHECKING
+
+from minirospy.aio.tasks import ErrorReporter
+from minirospy.base.errors import BridgeError
+from minirospy.web.rosbridge import conversion, protocol
+from minirospy.web.rosbridge.operation import REFUSALS, Work, check_name
+from minirospy.web.rosbridge.protocol import OperationError, StatusLevel
+from minirospy.web.rosbridge.services import ClientService, call
+
+if TYPE_CHECKING:
+    from minirospy.web.rosbridge.session import RosbridgeSession
+
+__all__ = ["ClientServices"]
+
+_log = logging.getLogger(__name__)
+
+_MAX_CALLS = 200  # under way, of one client
+_MAX_SERVICES = 200  # that one client offers
+
+
+class ClientServices:
+    """The calls and services of one client; called with its operations, in their order."""
+
+    def __init__(self, session: RosbridgeSession) -> None:
+        self.calls_size = 0
+        """Bytes of memory of the calls under way."""
+        self._session = session
+        self._calls = 0  # under way
+        self._reporter = ErrorReporter(_log, "a client's call of a service")
+
+    def close(self) -> None:
+        """End the services that the client offers; its calls are tasks of the session."""
+        endpoint = self._session.endpoint
+        for name, service in list(endpoint.services.items()):
+            if service.session is self._session:
+                endpoint.close_service(service, f"the client that offers {name} has disconnected")
+
+    def call_service(self, event: protocol.CallService) -> None:
+        if not self._session.is_allowed("services", event.service, "service, cancelling service call for"):
+            return
+        if self._calls >= _MAX_CALLS:
+            raise BridgeError(f"{_MAX_CALLS} calls are under way: wait for an answer")
+        size = self._session.operation_size
+        self._calls += 1
+        self.calls_size += size
+
+        def ended(_: object) -> None:
+            self._calls -= 1
+            self.calls_size -= size
+            self._session.count()
+
+        self._session.spawn(self._call(event, is_large=self._session.is_large)).add_done_callback(ended)
+        # Last: if this is too much, it ends the client, and with it the call.
+        self._session.count()
+
+    async def _call(self, event: protocol.CallService, *, is_large: bool) -> None:
+        try:
+            self._session.require_write("calling services")
+            check_name("service", event.service)
+            in_thread = self._session.endpoint.in_thread if is_large else None
+            response = await call(self._session.graph, event.service, event.arguments, in_thread)
+            values: object = conversion.values(response)
+            result = True
+        except REFUSALS as error:
+            values, result = str(error), False
+            self._session.endpoint.log.warning(
+                "[Client %s] call_service %s: %s", self._session.client.name, event.service, error
+            )
+        except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
+            values, result = "the bridge failed on this call", False
+            self._reporter.report(error)
+        fields = protocol.service_response(event.service, values, event.id, result=result)
+        self._session.send(fields, event.compression, event.fragment_size)
+
+    def advertise_service(self, event: protocol.AdvertiseService) -> Work | None:
+        if not self._session.is_allowed(
+            "services", event.service, "service, cancelling service advertisement for"
+        ):
+            return None
+        self._session.require_write("offering services")
+        check_name("service", event.service)
+        if (
+            sum(each.session is self._session for each in self._session.endpoint.services.values())
+            >= _MAX_SERVICES
+        ):
+            raise BridgeError(f"a client may offer {_MAX_SERVICES} services")
+        return self._offer(event)
+
+    async def _offer(self, event: protocol.AdvertiseService) -> None:
+        if event.service in self._session.endpoint.services:
+            self._session.status(
+                StatusLevel.WARNING, f"Duplicate service advertised. Overwriting {event.service}.", event.id
+            )
+        await self._session.endpoint.free_service(event.service, "Duplicate advertiser.")
+        self._session.endpoint.services[event.service] = ClientService(
+            self._session, self._session.graph, event.service, event.type
+        )
+        self._session.status(StatusLevel.INFO, f"Advertised service {event.service}.", event.id)
+
+    def unadvertise_service(self, event: protocol.UnadvertiseService) -> Work:
+        service = self._own_service(event.service)
+        if service is None:
+            raise OperationError(
+                f"Service {event.service} has not been advertised via rosbridge, can't unadvertise.", event.id
+            )
+        why = f"Service {event.service} was unadvertised with a service call in progress"
+        closing = self._session.endpoint.close_service(service, why)
+        self._session.status(StatusLevel.INFO, f"Unadvertised service {event.service}.", event.id)
+        return _ended(closing)
+
+    def service_response(self, event: protocol.ServiceResponse) -> Work | None:
+        service = self._own_service(event.service)
+        if service is None:
+            raise OperationError(f"Service {event.service} has not been advertised via rosbridge.", event.id)
+        if self._session.is_large:
+            return service.answered_large(event, self._session.endpoint.in_thread)
+        service.answered(event)
+        return None
+
+    def _own_service(self, name: str) -> ClientService | None:
+        service = self._session.endpoint.services.get(name)
+        return service if service and service.session is self._session else None
+
+
+async def _ended(task: asyncio.Task[None]) -> None:
+    await asyncio.wait([task])

@@ -1,0 +1,41 @@
+"""What the handlers of a client's operations share: their results, limits and refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine
+
+from minirospy.base.errors import (
+    BridgeError,
+    MessageException,
+    MinirospyError,
+    ROSSerializationException,
+    ServiceException,
+)
+from minirospy.introspect.graph import why_illegal
+
+__all__ = ["MAX_TOPICS", "MAX_WAITING_BYTES", "REFUSALS", "Work", "check_name", "type_conflict"]
+
+MAX_TOPICS = 1000  # that one client publishes, and that it subscribes to
+MAX_WAITING_BYTES = (
+    64_000_000  # of one client: operations behind one that waits; the same for latched messages
+)
+
+REFUSALS = (MinirospyError, ServiceException, ROSSerializationException, MessageException)
+"""The exceptions of an operation that are reported to the client."""
+
+Work = Coroutine[object, object, None]
+"""The rest of an operation that has to wait for something."""
+
+
+def check_name(kind: str, name: str) -> None:
+    """Raise BridgeError if a name of this kind is illegal."""
+    why = why_illegal(name)
+    if why:
+        raise BridgeError(f"{kind} [{name[:200]}]: {why}")
+
+
+def type_conflict(topic: str, wanted: str, known: str) -> BridgeError:
+    """Return the error of a topic that has another type in the graph, with rosbridge's text."""
+    return BridgeError(
+        f"Tried to register topic {topic} with type {wanted} but it is already established with type {known}"
+    )

@@ -1,0 +1,187 @@
+"""The WebSocket protocol of one client: bytes in, messages and pings out, one frame at a time. Pure.
+
+The library ``websockets`` parses the bytes (its part without sockets); :mod:`minirospy.web.server.frames` stops it after each
+frame. :class:`minirospy.web.server.client.WebClient` writes the frames of messages, so that a message is sent to many clients
+without a copy for each. Source: RFC 6455.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from websockets.frames import Frame, Opcode
+from websockets.protocol import State
+
+from minirospy.web.access import TOKEN_PROTOCOL
+from minirospy.web.server.frames import FrameByFrame
+
+if TYPE_CHECKING:
+    from websockets.http11 import Request, Response
+    from websockets.typing import Subprotocol
+
+__all__ = ["FrameRate", "Message", "Ping", "WebSocket"]
+
+_MAX_REASON = 123  # bytes of a close frame's reason, by RFC 6455
+
+
+class Message(NamedTuple):
+    """A complete message from the client."""
+
+    is_text: bool
+    data: bytes
+
+
+class Ping(NamedTuple):
+    """A ping from the client; ``data`` is to be sent back."""
+
+    data: bytes
+
+
+class FrameRate:
+    """The number of frames that a client may send in one second."""
+
+    def __init__(self, max_frames: int) -> None:
+        self.count = 0  # frames that were handled in the present second
+        self._max_frames = max_frames
+        self._start = 0.0  # of the present second
+
+    @property
+    def is_used_up(self) -> bool:
+        """Return whether the client may send no more frames in the present second."""
+        return self.count >= self._max_frames
+
+    def update(self, now: float) -> None:
+        """Start a new second if the present one has passed."""
+        if now - self._start >= 1.0:
+            self._start, self.count = now, 0
+
+    def seconds_left(self, now: float) -> float:
+        """Return the seconds until the client may send more."""
+        return self._start + 1.0 - now
+
+
+class WebSocket:
+    """The protocol's state for one client: handshake, the unfinished message, close."""
+
+    def __init__(
+        self, select: Callable[[Sequence[str]], str | None], max_size: int, max_frames_a_second: int
+    ) -> None:
+        """``select(offered)`` returns the sub-protocol to use; it raises NegotiationError to refuse all."""
+        self.rate = FrameRate(max_frames_a_second)
+        self._frames = FrameByFrame(
+            select_subprotocol=lambda _, offered: _select(select, offered),
+            max_size=max_size,
+            logger=_QUIET,
+        )
+        self._fragments = bytearray()  # of a message whose last frame has not come
+        self._opcode = Opcode.BINARY  # of the frame that started the last message
+
+    # --- bytes in, events out
+
+    def feed(self, data: bytes) -> None:
+        """Add bytes that were received."""
+        self._frames.feed(data)
+
+    def next_request(self) -> Request | None:
+        """Return the client's request, or None if it is not complete. Raise ValueError if it is not a request."""
+        request = self._frames.next_request()
+        if request is None and self._frames.handshake_exc:
+            raise ValueError(str(self._frames.handshake_exc.__cause__ or self._frames.handshake_exc))
+        return request
+
+    def next_frame(self) -> Frame | None:
+        """Return the next complete frame, or None. Each frame counts toward the client's rate."""
+        frame = self._frames.next_frame()
+        if frame is not None:
+            self.rate.count += 1
+        return frame
+
+    def event_of(self, frame: Frame) -> Message | Ping | None:
+        """Return the ping that a frame is, or the message that it completes, or None."""
+        if frame.opcode in (Opcode.TEXT, Opcode.BINARY):
+            self._opcode = frame.opcode
+        elif frame.opcode is Opcode.PING:
+            return Ping(bytes(frame.data))
+        elif frame.opcode is not Opcode.CONT:
+            return None
+        is_text = self._opcode is Opcode.TEXT
+        if frame.fin and not self._fragments:
+            return Message(is_text, bytes(frame.data))
+        self._fragments += frame.data
+        if not frame.fin:
+            return None
+        data = bytes(self._fragments)
+        self._fragments.clear()
+        return Message(is_text, data)
+
+    @property
+    def has_unread(self) -> bool:
+        """Return whether bytes have come that are not parsed yet."""
+        return bool(self._frames.reader.buffer)
+
+    @property
+    def unfinished(self) -> int:
+        """Return the bytes of frames and messages that are not complete."""
+        return len(self._frames.reader.buffer) + len(self._fragments)
+
+    def discard_unfinished(self) -> None:
+        """Free the parts of frames and messages that have arrived."""
+        self._frames.reader.buffer.clear()
+        self._fragments.clear()
+
+    def restrict(self, max_size: int) -> None:
+        """Refuse larger messages from now on."""
+        self._frames.limit(max_size)
+
+    # --- events in, bytes out
+
+    @property
+    def subprotocol(self) -> str | None:
+        """Return the sub-protocol that was chosen in the handshake."""
+        return self._frames.subprotocol
+
+    @property
+    def is_open(self) -> bool:
+        """Return whether the handshake is done and neither side has sent a close frame."""
+        return self._frames.state is State.OPEN
+
+    @property
+    def is_closed(self) -> bool:
+        """Return whether a close frame was sent."""
+        return self._frames.state in (State.CLOSING, State.CLOSED)
+
+    def response_to(self, request: Request) -> Response:
+        """Return the response of the handshake; its status is 101 if the request is accepted."""
+        return self._frames.accept(request)
+
+    def accept(self, response: Response) -> None:
+        """Open the WebSocket with the response of the handshake."""
+        self._frames.send_response(response)
+
+    def ping(self, data: bytes) -> None:
+        """Send a ping."""
+        self._frames.send_ping(data)
+
+    def close(self, code: int, reason: str) -> None:
+        """Send a close frame; a long reason is cut."""
+        self._frames.send_close(code, reason.encode()[:_MAX_REASON].decode(errors="ignore"))
+
+    def data_to_send(self) -> tuple[bytes, ...]:
+        """Return the bytes that the protocol has to send, and forget them."""
+        return tuple(piece for piece in self._frames.data_to_send() if piece)
+
+
+def _select(
+    select: Callable[[Sequence[str]], str | None], offered: Sequence[Subprotocol]
+) -> Subprotocol | None:
+    names = [name for name in offered if not name.startswith(TOKEN_PROTOCOL)]
+    return select(names)  # type: ignore[return-value]
+
+
+_QUIET = logging.getLogger("minirospy.web.websockets")
+# The library logs each frame at DEBUG, and with the headers tokens.
+_QUIET.addHandler(logging.NullHandler())
+_QUIET.propagate = False
+_QUIET.setLevel(logging.CRITICAL)
