@@ -151,8 +151,7 @@ class Aggregator:
                 return AddDiagnosticsResponse(
                     False, f"Requested load from namespace {namespace} which is already in use"
                 )
-            # One topic per bond: with a shared one, heartbeats of different bonds would displace each other in the
-            # queue.
+            # One topic per bond: with a shared topic, heartbeats of different bonds would overwrite each other.
             bond = self._bonds[namespace] = Bond(f"/diagnostics_agg/bond{namespace}", namespace)
 
         group = load_group(self._base_path, namespace)

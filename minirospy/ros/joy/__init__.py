@@ -2,6 +2,5 @@
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# These modules import ROS 1 messages; in an environment with ROS 2 sourced, its packages of the same names come
-# first.
+# These modules import ROS 1 messages; if ROS 2 is sourced, its packages of the same names come first.
 prefer_ros1()

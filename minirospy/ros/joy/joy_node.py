@@ -3,8 +3,8 @@
 `joy/set_feedback` (sensor_msgs/JoyFeedbackArray) runs its motors: ID 0 is the strong one, any other ID the weak one.
 
 Parameters: ~dev (/dev/input/js0), ~dev_ff (the event device that belongs to ~dev), ~dev_name, ~deadzone (0.05),
-~autorepeat_rate
-(0: none), ~coalesce_interval (0.001 s), ~default_trig_val, ~sticky_buttons (false). Source: http://wiki.ros.org/joy.
+~autorepeat_rate (0: none), ~coalesce_interval (0.001 s), ~default_trig_val, ~sticky_buttons (false).
+Source: http://wiki.ros.org/joy.
 """
 
 from __future__ import annotations

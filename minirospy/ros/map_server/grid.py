@@ -66,8 +66,7 @@ class MapSettings(NamedTuple):
 def read_settings(text: str) -> MapSettings:
     """Return the settings in a map's YAML file. Raise MapError with the real program's message."""
     try:
-        # Load all scalars as strings: yaml-cpp reads `1e-3` as a number, which YAML 1.1 does not, and rejects `false`
-        # as one.
+        # Load all scalars as strings: yaml-cpp accepts `1e-3` as a number (YAML 1.1 does not), but rejects `false`.
         found = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)

@@ -1,10 +1,8 @@
 """teleop_node: converts `joy` to `cmd_vel` while a button is held.
 
 Parameters: ~enable_button (0), ~enable_turbo_button (-1: none), ~axis_linear (1), ~scale_linear (0.5),
-~scale_linear_turbo (1.0),
-~axis_angular (0), ~scale_angular (0.5), ~scale_angular_turbo (as scale_angular); an axis and its scales may be maps from
-x, y, z
-and yaw, pitch, roll. Source: http://wiki.ros.org/teleop_twist_joy.
+~scale_linear_turbo (1.0), ~axis_angular (0), ~scale_angular (0.5), ~scale_angular_turbo (as scale_angular). An axis and
+its scales may be maps from x, y, z and yaw, pitch, roll. Source: http://wiki.ros.org/teleop_twist_joy.
 """
 
 from __future__ import annotations

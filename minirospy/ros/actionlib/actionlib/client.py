@@ -52,8 +52,7 @@ class ActionClient:
         if self.pub_queue_size < 0:
             self.pub_queue_size = 10
 
-        # Disable Nagle's algorithm: these messages are small and awaited, and must not be delayed until the last is
-        # acknowledged.
+        # Disable Nagle's algorithm: a small message must not wait until the previous one is acknowledged.
         self.pub_goal = rospy.Publisher(
             rospy.remap_name(ns) + "/goal",
             self.ActionGoal,
@@ -94,8 +93,7 @@ class ActionClient:
         """Send a goal and return its handle. Keep the handle: without it, the callbacks are no longer called.
 
         ``transition_cb(handle)`` is called on each state change, ``feedback_cb(handle, feedback)`` with feedback. Both
-        are called
-        in threads of the library, never concurrently.
+        are called in threads of the library, never concurrently.
         """
         return self.manager.init_goal(goal, transition_cb, feedback_cb)
 

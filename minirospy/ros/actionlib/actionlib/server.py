@@ -58,9 +58,8 @@ _M = TypeVar("_M", bound=Message)
 class ActionServer:
     """The server of the action ``ActionSpec`` in the namespace ``ns``.
 
-    ``goal_cb(handle)`` is called with each new goal, ``cancel_cb(handle)`` with each goal that a client cancels. They are
-    called
-    in threads of the library, never concurrently. Parameters: ``actionlib_status_frequency`` in Hz,
+    ``goal_cb(handle)`` is called with each new goal, ``cancel_cb(handle)`` with each goal that a client cancels. They
+    are called in threads of the library, never concurrently. Parameters: ``actionlib_status_frequency`` in Hz,
     ``<ns>/status_list_timeout`` in seconds (how long the status of a goal is published after its end),
     ``actionlib_server_pub_queue_size``, ``actionlib_server_sub_queue_size``. Raise ActionException.
     """
@@ -151,8 +150,7 @@ class ActionServer:
         self.pub_queue_size: int = rospy.get_param("actionlib_server_pub_queue_size", 50)
         if self.pub_queue_size < 0:
             self.pub_queue_size = 50
-        # Disable Nagle's algorithm: these messages are small and awaited, and must not be delayed until the last is
-        # acknowledged.
+        # Disable Nagle's algorithm: a small message must not wait until the previous one is acknowledged.
         self.status_pub = rospy.Publisher(
             name + "/status", StatusList, latch=True, tcp_nodelay=True, queue_size=self.pub_queue_size
         )

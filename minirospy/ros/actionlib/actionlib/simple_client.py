@@ -78,8 +78,7 @@ class SimpleActionClient:
         """Send a goal, wait until it ends, and return its state.
 
         After ``execute_timeout`` cancel the goal, and wait for up to ``preempt_timeout`` until it ends. A zero Duration
-        means no
-        timeout.
+        means no timeout.
         """
         self.send_goal(goal)
 

@@ -67,10 +67,8 @@ class CvBridge:
         """Return the image in a message as an array.
 
         It is a read-only view of the message's data, without a copy, unless the encoding or the byte order has to change.
-        Padding
-        between the rows (``step``) is skipped. Raise CvBridgeError if the encoding is unknown, the conversion does not
-        exist, or
-        the message has too little data.
+        Padding between the rows (``step``) is skipped. Raise CvBridgeError if the encoding is unknown, the conversion
+        does not exist, or the message has too little data.
         """
         try:
             image = pixels(img_msg)

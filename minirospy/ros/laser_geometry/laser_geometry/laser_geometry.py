@@ -105,8 +105,7 @@ class LaserProjection:
         """Return the cloud of a scan in another frame, each point transformed with the laser's pose at its measurement.
 
         The transforms at the first and last beam are looked up in a tf2 buffer, and interpolated in between, as in the
-        C++ class;
-        ROS's Python module lacks this method. Raise the exceptions of ``lookup_transform``.
+        C++ class; ROS's Python module lacks this method. Raise the exceptions of ``lookup_transform``.
         """
         import numpy as np
 

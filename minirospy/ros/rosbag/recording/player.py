@@ -53,10 +53,7 @@ class Player:
         returning.
         """
         self.on_change: Callable[[], object] = lambda: None
-        """Called in the player's thread when :meth:`state` changes during playing:
-
-        a message was published, or the end was reached.
-        """
+        """Called in the player's thread when :meth:`state` changes by itself: after each message, and at the end."""
         self._output = output or NodeOutput(options)
         self._bags = bags
         self._options = options

@@ -233,8 +233,7 @@ class Recorder:
         # Do not join() the thread: on Python 3.10 and 3.11 an interrupted join() marks it as finished.
         while not self._finished.is_set():
             try:
-                # This wait is the thread's clean-up after the shutdown: is_shutdown() keeps it from being
-                # interrupted.
+                # This wait is the thread's clean-up: calling is_shutdown() keeps the shutdown from interrupting it.
                 client.is_shutdown()
                 if is_interrupted or time.monotonic() > patience:
                     is_interrupted, patience = False, math.inf

@@ -141,8 +141,7 @@ class Bag(OpenedBag):
             with as_ros_errors():
                 opening[mode](f, allow_unindexed)
             self._create_reader()
-            # minirospy's reader reads the index when needed; a program's subclass may read it now, to show its
-            # progress.
+            # minirospy reads the index when needed; a program's subclass may read it now, to show its progress.
             if mode == "r" and not skip_index and isinstance(self._reader, _BagReader200):
                 self._reader.prepare()
             self._connection_indexes_read = not skip_index
