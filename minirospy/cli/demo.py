@@ -32,7 +32,7 @@ _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
 """Between two of the button's ten polls per second, so that the LED reacts after its typical delay."""
 _FOLLOW_SECONDS = 10.0
 _START_SECONDS = 180.0
-"""Long enough for Windows with a virus scanner, or a Raspberry Pi. A failed launch ends the wait early."""
+"""Timeout, long enough for Windows with a virus scanner or a Raspberry Pi. A failed launch ends the wait early."""
 _WAY = (
     "button_publisher.py --- /button_state (std_msgs/Bool) ---> led_actuator.py",
     "  reads GPIO 11, ten times a second                          sets GPIO 7",

@@ -190,7 +190,7 @@ class Beacons:
             is_received, beacon.is_received = beacon.is_received, False
             beacon.due = now + PERIOD
             if is_received:
-                # Random, so that one of the bridges that put this beacon goes on.
+                # Stop at random, so that about half of the bridges that put this beacon continue.
                 beacon.is_silent = beacon.is_silent or self._random() < 0.5
                 beacon.is_resuming = False
             elif beacon.is_silent and not beacon.is_resuming:

@@ -83,7 +83,7 @@ class ToolNode:
             if ros_time:
                 self._follow_clock(environment.master_uri)
         except BaseException:
-            # Ctrl-C may interrupt this once the node's servers are open.
+            # Ctrl-C may interrupt the start after the node's servers are open: close them.
             self.close()
             raise
 

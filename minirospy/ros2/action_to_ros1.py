@@ -39,7 +39,7 @@ _SERVER_SECONDS = 5.0
 MAX_GOALS = 1_000
 """Goals that are passed on concurrently; further ones are refused."""
 _PENDING_SECONDS = 0.5
-"""After this a goal that is still pending counts as accepted, because ROS 2 has no such state."""
+"""Time after which a pending goal counts as accepted, because ROS 2 has no such state."""
 _ENDS = {
     GoalState.SUCCEEDED: SUCCEEDED,
     GoalState.PREEMPTED: CANCELED,

@@ -33,7 +33,7 @@ _log = logging.getLogger(__name__)
 MAX_BYTES = 64 << 20
 MAX_UNDER_WAY = 200  # requests of a service whose responses have not been written yet
 _MAX_OF_ACTION = 2_000
-"""More than the number of goals, because a request for a result waits for the goal's end."""
+"""Pending requests of an action, more than goals: a request for a result waits for the goal's end."""
 _LONGEST_SECONDS = 10_000_000
 """Practically unlimited: the bridge has its own timeouts, and Zenoh's would end a long goal."""
 

@@ -63,7 +63,7 @@ class Refusal(NamedTuple):
 
 
 class Credentials(NamedTuple):
-    """What a request states about its sender: the headers Host, Origin and Authorization, offered sub-protocols, and path."""
+    """The parts of a request that identify its sender: Host, Origin and Authorization headers, sub-protocols, and path."""
 
     host: str
     origin: str | None

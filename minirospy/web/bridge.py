@@ -79,7 +79,7 @@ class BridgeOptions:
 
 @dataclass(frozen=True)
 class Extras:
-    """What the Foxglove listener serves in addition to its protocol; ``pages`` are public and need no token."""
+    """Additional endpoints and pages of the Foxglove listener; ``pages`` are public and need no token."""
 
     endpoints: Sequence[Endpoint] = ()
     pages: Mapping[str, HttpHandler] = field(default_factory=dict)

@@ -30,7 +30,7 @@ __all__ = ["Arrival", "Filters", "GraphListener", "Publication", "SharedGraph", 
 
 _log = logging.getLogger(__name__)
 
-MIN_REFRESH_INTERVAL = 0.25  # between refreshes while the graph changes
+MIN_REFRESH_INTERVAL = 0.25  # seconds between refreshes while the graph changes
 
 _QUEUE = 100
 _MAX_WAITING = 32_000_000

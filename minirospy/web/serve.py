@@ -37,7 +37,7 @@ _LARGE_BLOCK = 4 * 1024 * 1024
 
 
 class Part(Protocol):
-    """What a node runs: a bridge, or services."""
+    """A bridge or services that a node runs."""
 
     async def start(self) -> None: ...
 

@@ -133,7 +133,7 @@ _INSTEAD = {
     "rosserial_server": "`rosrun rosserial_python serial_node.py` serves the same devices",
     "ps3joy": "pair the pad with the system's Bluetooth settings, then `rosrun joy joy_node`",
 }
-"""What minirospy provides instead of some of these packages and of others."""
+"""minirospy's replacements for some of these packages and for others."""
 
 _QT_REPOSITORIES = (
     "ros-visualization's python_qt_binding, qt_gui_core (branch melodic-devel of both), rqt (kinetic-devel) and {plugin} "

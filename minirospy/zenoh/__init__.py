@@ -1,1 +1,1 @@
-"""What the fleet and the bridge to ROS 2 share for using the library eclipse-zenoh."""
+"""Code for the library eclipse-zenoh that the fleet and the bridge to ROS 2 share."""

@@ -23,7 +23,7 @@ _LINGER = struct.Struct("ii")
 _ZENOHS = _LINGER.pack(1, 10)
 _NONE = _LINGER.pack(0, 0)
 _LOOKS = 10
-"""How often to examine a file: Zenoh sets SO_LINGER only after it has created and connected the socket."""
+"""Number of polls that examine a new file: Zenoh sets SO_LINGER only after it has created and connected the socket."""
 
 
 class LingerRemover:
@@ -31,7 +31,7 @@ class LingerRemover:
 
     def __init__(self) -> None:
         self._looks: dict[tuple[int, int], int] = {}
-        """How often each open file has been examined."""
+        """Number of polls that have examined each open file."""
 
     def look(self) -> int:
         """Remove SO_LINGER from new links; return how many. Does nothing on Windows."""

@@ -16,7 +16,7 @@ _LINE_FEED = "\v"
 _PLAIN = re.compile(r"[\w@%+=:,./~-]*\Z")
 """Strings that need no quotes in any POSIX shell."""
 _PLAIN_IN_POWERSHELL = re.compile(r"[\w+=:./\\~-]*\Z")
-"""The same for PowerShell, where a comma makes an array, and @ and % have other meanings."""
+"""Strings that need no quotes in PowerShell, in which a comma makes an array, and @ and % have other meanings."""
 
 
 class Word(NamedTuple):
@@ -28,7 +28,7 @@ class Word(NamedTuple):
 
 
 class Shell(NamedTuple):
-    """How to read a shell's words, and how to write a candidate for a word."""
+    """A shell's syntax: functions that read a word, and write a candidate for a word."""
 
     read: Callable[[str], Word]
     write: Callable[[str, Word], str]

@@ -38,7 +38,7 @@ __all__ = ["PREFIX", "DoctorNode", "check_own_address", "check_way_back", "unrea
 PREFIX = "/minirospy_doctor"  # prefix of the names of such nodes
 
 _LETTER_BYTES = 16 * 1024
-"""More than one packet: some tunnels drop everything that exceeds their packet size."""
+"""Size of the message, more than one packet: some tunnels drop everything that exceeds their packet size."""
 
 _log = logging.getLogger(__name__)
 
@@ -64,7 +64,7 @@ class DoctorNode:
         try:
             self._loop.run(self.node.start())
         except BaseException:
-            # Ctrl-C may interrupt this once the node's servers are open.
+            # Ctrl-C may interrupt the start after the node's servers are open: close them.
             self._loop.run(self.node.close())
             self._loop.close()
             raise

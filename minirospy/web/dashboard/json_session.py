@@ -48,10 +48,10 @@ class JsonSession:
     """One client's session. Subclasses provide the table of operations, and send changes in :meth:`follow`."""
 
     subject: ClassVar[str]
-    """What operations act on, for error messages."""
+    """The object of the operations, for error messages."""
 
     owners_only: ClassVar[str] = ""
-    """What only clients with the token may do, for error messages; empty if others may do some of it."""
+    """The operations that require the token, for error messages; empty if other clients may use some of them."""
 
     longest: ClassVar[int] = 256_000
     """Characters in an operation: parsing it delays all clients."""

@@ -21,10 +21,10 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""Long, because after SIGINT the file is completed, possibly on a slow disk."""
+"""Timeouts for the end; long, because after SIGINT the file is completed, possibly on a slow disk."""
 
 _TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
-"""Short, because no file is open yet, and a starting interpreter may lose a SIGINT that arrives in a callback of importlib."""
+"""Short timeouts while no file is open: a starting interpreter may lose a SIGINT that arrives in a callback of importlib."""
 
 _MAX_LINES = 20
 COMPRESSIONS = {".bag": {"none": [], "lz4": ["--lz4"], "bz2": ["--bz2"]},

@@ -26,7 +26,7 @@ _MAX_PIXELS = 10_000
 
 @dataclass(frozen=True)
 class Picture:
-    """How to encode an image: ``format`` jpeg or png, "" to pass a compressed image unchanged; None: keep the size."""
+    """The encoding of an image: ``format`` jpeg or png, "" to pass a compressed image unchanged; None: keep the size."""
 
     format: str = "jpeg"
     quality: int = 95

@@ -103,7 +103,7 @@ def _size(found: File | BridgeError | None) -> int:
 
 @dataclass
 class _Shared:
-    """What all feeds share: the limit on concurrently processed pixels, and the bytes of stored images."""
+    """State that all feeds share: the limit on concurrently processed pixels, and the bytes of stored images."""
 
     work: Capacity
     kept: int = 0
