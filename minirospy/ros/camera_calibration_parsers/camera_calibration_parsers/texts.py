@@ -120,7 +120,7 @@ def _pixels(word: object) -> int:
     # Python converts at most 4300 digits.
     if not (digits.isdecimal() and len(digits) <= _MAX_DIGITS and int(digits) < 1 << 32):
         raise CalibrationError(f"a width or height is not a number of pixels: {word!r:.80}")
-    return int(word)
+    return int(digits)
 
 
 def _matrix(tree: dict[str, object], key: str, shape: tuple[int, int] | None) -> tuple[float, ...]:
