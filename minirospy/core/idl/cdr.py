@@ -37,11 +37,11 @@ __all__ = [
 CDR_HEADER = bytes((0, 1, 0, 0))
 """The encapsulation of plain CDR version 1, little-endian; the last two bytes are options, which readers ignore."""
 
-_SPARE = 10_000  # maximum number of elements without bytes, in addition to one for each byte of the message
+_SPARE = 10_000  # elements that take no bytes, in addition to one for each byte of the message
 
 
 class Side(Enum):
-    """Which of the two messages has an item; in the other one it is written as zeros, and skipped when read."""
+    """The messages that have an item. If one lacks it, it is skipped when read, or written as zeros."""
 
     BOTH = 0
     ROS1 = 1

@@ -107,7 +107,7 @@ class Notifier:
 
         # The last serialized update: all subscribers of a topic get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
-        # The same for a large update, of a topic or a parameter.
+        # The last serialized large update, of a topic or a parameter.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
 
         # Large calls that wait; the bytes of those in progress; whether one is being serialized.
