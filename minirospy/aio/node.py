@@ -128,7 +128,7 @@ class Node:
         self._is_started = False
         self._is_closed = False
 
-    # --- life
+    # --- lifetime
 
     async def __aenter__(self) -> Node:
         await self.start()
@@ -460,7 +460,7 @@ class Node:
         """Return a rate: ``async for _ in node.rate(10): ...`` iterates ten times per second, until the node shuts down."""
         return Rate(self, hz)
 
-    # --- within
+    # --- internals
 
     @property
     def _node(self) -> RuntimeNode:

@@ -24,7 +24,7 @@ def close_each(functions: Iterable[CloseFunction]) -> None:
 
 
 async def close_all(functions: Iterable[AsyncCloseFunction]) -> None:
-    """Do the same with functions that may be coroutine functions, sequentially. A cancellation stops it."""
+    """Call the functions, some of which may be coroutine functions, as :func:`close_each` does. A cancellation stops it."""
     for function in functions:
         try:
             closing = function()

@@ -24,7 +24,7 @@ _OWN_SEQUENCE = re.compile(r"\033\[[0-9;]*m|\r?\033\[K|\033\[2J\033\[;H|\033\]2;
 
 
 def escaped(text: str, keep: str = "") -> str:
-    r"""Return ``text`` with each control character but those of ``keep`` as Python writes it: ``\n``, ``\x1b``."""
+    r"""Return ``text`` with control characters, except those in ``keep``, escaped as in Python: ``\n``, ``\x1b``."""
     if not _CONTROL.search(text):
         return text
     return _CONTROL.sub(

@@ -28,7 +28,7 @@ Steps = Generator[Need | None, None, _T]  # work that yields between its steps a
 SMALL_ITEMS = 2000  # a value of this size takes a few milliseconds to serialize
 
 SHORT_ITEMS = 300
-"""Serializing this many takes some 0.1 ms: a thousand clients may request such a value at the same time."""
+"""A value of this size takes some 0.1 ms to serialize; a thousand clients may request it at the same time."""
 
 _LETTERS_PER_ITEM = 16
 

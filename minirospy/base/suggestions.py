@@ -23,9 +23,9 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
 
 
 _SLIP = 0.85
-"""The similarity of two names, as difflib's ratio, that differ in one or two missing, wrong or extra letters."""
+"""Minimum similarity (difflib's ratio) of two names that differ in only one or two missing, wrong or extra letters."""
 
-_STEM = 4  # letters; longer prefixes also get suggestions that complete them
+_STEM = 4  # shortest prefix, in letters, that also gets suggestions that complete it
 
 
 def did_you_mean(word: str, known: Iterable[str], most: int = 2, *, only_slips: bool = False) -> str:

@@ -23,7 +23,7 @@ def channels_of(channel: object) -> list[int]:
 
 
 def level_of(value: object) -> int:
-    """Return 0 or 1. Raise TypeError."""
+    """Return an argument for a level as 0 or 1. Raise TypeError."""
     if isinstance(value, int):
         return 1 if value else 0
     if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):

@@ -31,7 +31,7 @@ __all__ = [
     "Write",
 ]
 
-PINS = 54  # of the chip in BCM numbering: 0 to 53
+PINS = 54  # number of the chip's pins, in BCM numbering: 0 to 53
 
 LEDS = {2: "green", 3: "green", 4: "yellow", 5: "yellow", 6: "red", 7: "red"}  # BCM pin -> colour of its LED
 

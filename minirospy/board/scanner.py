@@ -22,7 +22,7 @@ NOISE = 0.004  # standard deviation of a range, in metres
 FIELDS = (0.4, 0.2)  # reach of the warning field and of the protective field, in metres
 
 _PLAIN, _REFLECTOR = 90.0, 250.0
-_DARK_EDGE = 0.35  # minimum share of a surface's brightness, for one seen from the side
+_DARK_EDGE = 0.35  # minimum brightness, as a share, of a surface seen from the side
 
 
 class Wall(NamedTuple):
@@ -79,7 +79,7 @@ WALLS = (
 
 
 class Room:
-    """Fixed walls, and a person who moves. ``seed`` makes the noise reproducible."""
+    """Fixed walls, and a person who can move. ``seed`` makes the noise reproducible."""
 
     def __init__(self, walls: Sequence[Wall] = WALLS, seed: int | None = None) -> None:
         self.person: Circle | None = None
@@ -87,7 +87,7 @@ class Room:
         self._walls = [_nearest_wall(_angle(beam), walls) for beam in range(BEAMS)]
 
     def scan(self, noise: float = NOISE) -> Scan:
-        """Return a scan of the present room."""
+        """Return a scan of the room."""
         ranges, intensities, reflectors = [], [], []
         gauss = self._noise.gauss
         person = self._person_ranges()

@@ -147,7 +147,7 @@ class Lifecycle:
         """Return whether the node has shut down."""
         return self.shutting_down.is_set()
 
-    # --- which threads were notified
+    # --- notified threads
 
     @property
     def is_notified(self) -> bool:
@@ -184,7 +184,7 @@ class Lifecycle:
         return isinstance(error, errors.ROSInterruptException) and self.is_shutdown_requested
 
     def _run_hooks(self) -> None:
-        """Run the hooks, including those added by hooks or other threads meanwhile, until none is left; then set shutdown."""
+        """Run the hooks, also those added meanwhile by hooks or other threads; then set ``shutting_down``."""
         while not self.shutting_down.is_set():
             for hooks in (self.hooks, self.late_hooks):
                 while hooks:

@@ -97,7 +97,7 @@ class RosOutHandler(DeferringHandler):
         self._busy = threading.local()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Publish one record, unless publishing itself logged it."""
+        """Publish one record, unless it comes from publishing itself."""
         session = current_session()
         node = session.node
         if getattr(self._busy, "yes", False) or node is None or session.is_shutdown():

@@ -64,7 +64,7 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
 
 
 def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
-    """Return the same from a cache that the master keeps up to date; before init_node, without the cache."""
+    """Return a parameter's value from a cache that the master keeps up to date; before init_node, from the master."""
     name = current_session().resolve(param_name)
     cache, node = current_session().parameters, current_session().node
     if node is None or current_session().is_shutdown():

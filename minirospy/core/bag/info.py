@@ -250,7 +250,7 @@ def _median(times: list[array[int]]) -> float:
 
 
 def _median_by_numpy(times: list[array[int]]) -> float:
-    """Return the same, computed in the memory of ``times``, which is overwritten."""
+    """Return the median of the periods, computed with numpy in the memory of ``times``, which is overwritten."""
     import numpy as np
 
     joined = np.frombuffer(times[0], np.uint64)

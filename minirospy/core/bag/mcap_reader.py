@@ -35,7 +35,7 @@ _MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequen
 _CHUNK_HEAD = struct.Struct("<BQQQQII")
 """The head of a chunk record: record head; first and last time, uncompressed size, CRC, length of the compression's name."""
 _LENGTH = struct.Struct("<Q")
-# Afooter with its record head: the positions of the summary and of its offsets, the CRC
+# a footer with its record head: the positions of the summary and of its offsets, the CRC
 _FOOTER = struct.Struct("<BQQQI")
 
 

@@ -89,7 +89,7 @@ class McapRepair:
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
         self._has_loose = False
-        self._entries: _Entries = {}  # of the last chunk, until its message indexes have been read
+        self._entries: _Entries = {}  # entries of the last chunk, until its message indexes have been read
 
     def run(self) -> Iterator[int]:
         """Read the records; yield the position of each. Raise BagFormatError if even the header is incomplete."""

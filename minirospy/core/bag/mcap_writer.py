@@ -129,10 +129,10 @@ class McapWriter:
             self._stream.flush()
 
     def salvage(self, written: int | None = None) -> int:
-        """Complete a file whose stream has failed, with the chunks read back from it; return the number of lost messages.
+        """Complete a file after its stream has failed; return the number of lost messages.
 
-        Like :meth:`minirospy.core.bag.writer.BagWriter.salvage`. Raise BagFormatError or OSError if even an empty file does
-        not fit.
+        The chunks written before are read back and kept. Like :meth:`minirospy.core.bag.writer.BagWriter.salvage`. Raise
+        BagFormatError or OSError if even an empty file does not fit.
         """
         from minirospy.core.bag.mcap_repair import McapRepair
 

@@ -220,7 +220,7 @@ class Repair:
         return self._add(record, content, limit)
 
     def _check_connections(self, content: _Content) -> None:
-        """Raise BagFormatError if a connection differs from that in previous chunks, so that the chunk is not to be trusted."""
+        """Raise BagFormatError if a connection differs from that in previous chunks, so the chunk cannot be trusted."""
         for number, connection in content.connections.items():
             known = self.connections.get(number, connection)
             if (known.topic, known.type, known.md5sum) != (

@@ -153,7 +153,7 @@ class BagWriter:
             self._header_position = stream.tell() + len(MAGIC)
             header = encode_bag_header(BagHeader(0, 0, 0))
             self._put([MAGIC, header])
-            self._position = self._header_position + len(header)  # of the next chunk in the stream
+            self._position = self._header_position + len(header)  # position of the next chunk in the stream
         else:
             self._continue(*continued)
 

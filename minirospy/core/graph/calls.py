@@ -42,7 +42,7 @@ SUCCESS, FAILURE, ERROR = 1, 0, -1  # status codes of an answer
 
 Answer = list[object]  # ``[status code, text, value]``
 
-_MAX_CHARACTERS = 4096  # in a name, a type or a URI
+_MAX_CHARACTERS = 4096  # maximum length of a name, a type or a URI
 
 _MAX_URIS = 20_000
 """URIs per list; checking them takes some milliseconds, which block the node. No master has as many for a topic."""

@@ -52,7 +52,7 @@ _ROWS = 500  # rows of a table to collect in one step
 
 PARAMETERS = ""  # stands for parameters in :meth:`MasterApi.defer`; no topic has this name
 
-# Amessage from the master to a node after a change
+# A message from the master to a node after a change.
 Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
 
 
@@ -176,7 +176,7 @@ class MasterApi(ABC):
         return finish(steps) if self.registry.is_small else steps
 
     def collect_system_state(self) -> Steps[Answer]:
-        """Return the same in steps."""
+        """Return the answer to :meth:`get_system_state`, in steps."""
         if self.registry.is_large:
             # One at a time, so that waiting clients do not each have a list in memory.
             yield ALONE

@@ -23,9 +23,9 @@ __all__ = [
 
 _MIB = 1024 * 1024
 
-MAX_BYTES = 64 * _MIB  # of memory for all registrations together: about 60,000 nodes with one topic each
+MAX_BYTES = 64 * _MIB  # memory limit for all registrations together: about 60,000 nodes with one topic each
 
-MAX_OF_ONE = 32 * _MIB  # the same for one host and port
+MAX_OF_ONE = 32 * _MIB  # memory limit for the registrations of one host and port
 
 RESERVE = 16 * _MIB
 """Part of MAX_BYTES that is reserved for hosts and ports with at most FEW_OF_ONE, some 300 topics and services."""

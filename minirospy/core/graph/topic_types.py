@@ -14,7 +14,7 @@ from minirospy.core.graph.registry_limits import text_cost
 __all__ = ["TopicTypes"]
 
 _MAX_OLD = 10_000  # unregistered topics whose types are kept
-_MAX_OLD_BYTES = 4 * 1024 * 1024  # of these types
+_MAX_OLD_BYTES = 4 * 1024 * 1024  # memory limit for these types
 
 _TYPE_BYTES = 100  # approximate size of a type without its string
 
@@ -78,7 +78,7 @@ class TopicTypes:
             self.set(topic, before.text if before else type_, node)
 
     def keep(self, topic: str, type_: str) -> None:
-        """Keep the type of a topic that is no longer registered, as the latest of these."""
+        """Keep the type of a topic that is no longer registered, as the most recent of the kept ones."""
         before = self._types.get(topic)
         if before and before.node:
             return

@@ -37,11 +37,11 @@ __all__ = [
 CDR_HEADER = bytes((0, 1, 0, 0))
 """The encapsulation of plain CDR version 1, little-endian; the last two bytes are options, which readers ignore."""
 
-_SPARE = 10_000  # limit of elements without bytes, in addition to one for each byte of the message
+_SPARE = 10_000  # elements that take no bytes, in addition to one for each byte of the message
 
 
 class Side(Enum):
-    """Which of the two messages has an item; in the other one it is written as zeros, and skipped when read."""
+    """The messages that have an item. If one lacks it, it is skipped when read, or written as zeros."""
 
     BOTH = 0
     ROS1 = 1
@@ -114,7 +114,7 @@ def make_transcoder(name: str, layout: Layout) -> Transcoder:
 
 
 class _Position(NamedTuple):
-    """Knowledge about a position in CDR: its remainder after division by ``modulus``, which is 1, 2, 4 or 8."""
+    """A position in CDR, as far as known: its remainder after division by ``modulus``, which is 1, 2, 4 or 8."""
 
     modulus: int
     remainder: int
@@ -123,7 +123,7 @@ class _Position(NamedTuple):
         return _Position(self.modulus, (self.remainder + size) % self.modulus)
 
     def after_any(self, width: int) -> _Position:
-        """Return the knowledge about the position after any number of items of ``width`` bytes."""
+        """Return the position after any number of items of ``width`` bytes, as far as known."""
         modulus = min(self.modulus, width)
         return _Position(modulus, self.remainder % modulus)
 
@@ -135,7 +135,7 @@ class _Position(NamedTuple):
         return -self.remainder % width if width <= self.modulus else None
 
     def or_(self, other: _Position) -> _Position:
-        """Return the knowledge that holds for both positions."""
+        """Return a position that describes both."""
         modulus = min(self.modulus, other.modulus)
         while (self.remainder - other.remainder) % modulus:
             modulus //= 2
@@ -152,7 +152,7 @@ class _Walk:
         self._known: dict[tuple[int, _Position], _Position] = {}
 
     def after(self, layout: Layout, start: _Position) -> _Position:
-        """Return the knowledge about the position after a layout."""
+        """Return the position after a layout, as far as known."""
         key = (id(layout), start)
         if key not in self._known:
             position = start
@@ -162,7 +162,7 @@ class _Walk:
         return self._known[key]
 
     def in_loop(self, layout: Layout, start: _Position) -> _Position:
-        """Return the knowledge about the position before each element, and after the last one."""
+        """Return the position before each element and after the last one, as far as known."""
         while True:
             both = start.or_(self.after(layout, start))
             if both == start:
@@ -235,7 +235,7 @@ class _Generator:
         self._source = Source()
         self._is_cdr_source = is_cdr_source
         self._swaps = swaps
-        self._absent = Side.ROS1 if is_cdr_source else Side.ROS2  # items that the source lacks
+        self._absent = Side.ROS1 if is_cdr_source else Side.ROS2  # items missing in the source message
         self._walk = _Walk()
         self._position = _Position(8, 0)
         # Pending ``copy``, ``skip`` or ``zeros``, each with a number of bytes

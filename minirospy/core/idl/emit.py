@@ -330,7 +330,7 @@ class _Module:
 def _is_even(letters: str) -> bool:
     """Return whether ``struct`` adds no padding between these format characters, some of which are floats.
 
-    False for 32-bit floats: in native byte order a value that is too large would become infinity, not an OverflowError.
+    Return False for 32-bit floats: in native order a value that is too large would become infinity, not an OverflowError.
     """
     kinds = {letter for letter in letters if letter.isalpha()}
     return "d" in kinds and kinds <= set("dqQ")

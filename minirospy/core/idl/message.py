@@ -125,7 +125,7 @@ class Message:
 
     def _check_types(self, exc: Exception | None = None) -> None:
         """Raise SerializationError for the first field with an invalid value; otherwise for ``exc`` itself."""
-        # After an error find the field that cannot be written; otherwise everything that genpy refuses.
+        # After an error, find the field that cannot be written; otherwise check for all that genpy refuses.
         checks = _STRICT_CHECKS if exc is None else _CHECKS
         for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
             _check_field(name, type_, getattr(self, name), checks)

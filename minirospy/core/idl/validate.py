@@ -24,12 +24,13 @@ MAX_TEXT = 1 << 20  # characters in a full text; the largest of real packages ha
 
 MAX_LEVELS = 50  # levels of nested messages
 
-_MAX_FIELDS = 4_000  # fields of a message including its inner messages, which the generated source expands
+# fields per message, including those of inner messages, which the generated source expands
+_MAX_FIELDS = 4_000
 
 # The same for all types used by a message; the largest of MoveIt's has some 17,000
 _MAX_FIELDS_IN_ALL = 32_000
 
-_MAX_BYTES = 1 << 27  # of memory for a message's arrays of fixed length
+_MAX_BYTES = 1 << 27  # memory limit for a message's arrays of fixed length
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _SHOWN = 80

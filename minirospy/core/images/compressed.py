@@ -22,7 +22,7 @@ _FORMATS = {
     "webp": "WEBP",
     "jp2": "JPEG2000",
 }
-_QUALITY = 95  # of JPEG, OpenCV's default
+_QUALITY = 95  # JPEG quality, OpenCV's default
 
 
 MAX_PIXELS = 100_000_000
@@ -32,10 +32,11 @@ MAX_PIXELS = 100_000_000
 class Options(NamedTuple):
     """Options of the compression."""
 
-    quality: int = _QUALITY  # of JPEG, from 1 to 100
+    quality: int = _QUALITY  # JPEG quality, from 1 to 100
     progressive: bool = False
     optimize: bool = False
-    level: int | None = None  # of PNG, from 0 to 9, the smallest file; None for the library's default
+    # PNG compression, from 0 to 9 (the smallest file); None for the library's default
+    level: int | None = None
 
 
 def opencv() -> Any:

@@ -47,7 +47,7 @@ class _Walk(NamedTuple):
 class TransformBuffer(FrameTree):
     """The tree of frames over the last ``cache_time`` nanoseconds, and lookups in it."""
 
-    # --- lookups out
+    # --- lookups
 
     def lookup(self, target: str, source: str, time: int) -> StampedTransform:
         """Return the pose of the frame ``source`` in the frame ``target`` at ``time``; 0 means the latest common time.

@@ -116,7 +116,7 @@ def _product(m: _Matrix, n: _Matrix) -> _Matrix:
 
 
 def _quaternion(m: _Matrix) -> Quaternion:
-    """Return the quaternion of a rotation matrix: from the trace, or if small, the largest diagonal element."""
+    """Return the quaternion of a rotation matrix, from its trace or, if that is small, its largest diagonal element."""
     trace = m[0][0] + m[1][1] + m[2][2]
     if trace > 0.0:
         root = math.sqrt(trace + 1.0)

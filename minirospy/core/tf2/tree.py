@@ -37,7 +37,7 @@ class FrameTree:
         self._lazy: dict[str, list[Layout]] = {}  # child frame -> layouts that contain it
         self._arrived = 0
 
-    # --- transforms in
+    # --- inserting
 
     def insert(
         self,
@@ -91,7 +91,7 @@ class FrameTree:
             if frame.cache is not None:
                 frame.cache.clear()
 
-    # --- what there is
+    # --- queries
 
     def frames(self) -> list[Frame]:
         """Return every frame in the order of first appearance, after decoding all messages."""
@@ -177,7 +177,7 @@ class FrameTree:
             for child in layout.children:
                 self._lazy.setdefault(child, []).append(layout)
 
-    # --- what waits to be decoded
+    # --- messages to be decoded
 
     def _settle(self, frame: Frame) -> None:
         """Insert a frame's messages since its last lookup, in the order of arrival."""

@@ -178,7 +178,7 @@ class FrameReader:
         self._start = 0
         self._end = 0
         self._large: bytearray | None = None
-        # Of the large frame: the number of bytes received, and its total size.
+        # The number of bytes received of the large frame, and its total size.
         self._filled: int
         self._wanted = 0
         # The number of bytes of a skipped frame that are still to come.

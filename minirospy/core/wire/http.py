@@ -39,7 +39,8 @@ _REASONS = {
 }
 
 
-Body = bytes | bytearray  # of a message; a long one is not copied from the buffer in which it was collected
+# body of a message; a long one is not copied from the buffer in which it was collected
+Body = bytes | bytearray
 
 
 class HttpHead(NamedTuple):
@@ -47,7 +48,7 @@ class HttpHead(NamedTuple):
 
     start: str
     headers: dict[str, str]
-    method: str  # of a request
+    method: str  # method of a request
     keep_alive: bool  # the connection serves another request after this one
     plain_length: int  # length of the body if only a Content-Length specifies it; else -1
 
@@ -302,7 +303,7 @@ def _end_of_line(data: bytearray, start: int) -> tuple[int, int]:
 
 
 def _end_of_head(data: bytearray, start: int) -> tuple[int, int]:
-    """Return the same for the first line that is followed by an empty one."""
+    """Return the end of the line before the first empty one, and the position after both; -1 if there is none."""
     # Without a regular expression, which is slow for many short lines.
     found = [(at, len(mark)) for mark in (b"\n\r\n", b"\n\n") if (at := data.find(mark, start)) >= 0]
     if not found:

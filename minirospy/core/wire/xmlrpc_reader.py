@@ -17,10 +17,10 @@ from minirospy.base.errors import RpcProtocolError
 __all__ = ["MAX_DEPTH", "DateTime", "Reader", "read_document"]
 
 MAX_DEPTH = 64
-_MAX_ELEMENTS = 1_000_000  # per document; they take some seconds
+_MAX_ELEMENTS = 1_000_000  # per document; parsing this many takes some seconds
 
 _MIB = 1024 * 1024
-_MAX_MEMORY = 64 * _MIB  # of all long strings in one document
+_MAX_MEMORY = 64 * _MIB  # memory limit for all long strings in one document
 
 _MAX_WIDE = 16 * _MIB
 """Bytes of one string with a character beyond U+00FF, which makes each character take 2 or 4 bytes and copies the string."""

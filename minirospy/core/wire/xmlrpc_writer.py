@@ -17,7 +17,7 @@ __all__ = ["Output", "escape", "write", "write_in_steps"]
 _STEP_BYTES = 8192
 _STEP_ITEMS = 300
 _STEP_LETTERS = 65536
-_ALONE_BYTES = 1024 * 1024  # of an answer, after which it demands to be written alone
+_ALONE_BYTES = 1024 * 1024  # size of an answer, after which it demands to be written alone
 
 
 def escape(text: str) -> str:

@@ -60,7 +60,7 @@ _COLLECT = (2000, 5, 1_000_000_000)
 collected automatically.
 """
 
-_SWEEP_SECONDS = 10.0  # between a nearly full master's checks for dead nodes
+_SWEEP_SECONDS = 10.0  # between the checks for dead nodes if the master is nearly full
 _FORGOTTEN_AT_ONCE = 20  # dead nodes to forget per loop iteration
 
 _OWN_NODE = "/rosout"
@@ -221,11 +221,11 @@ class Master(MasterApi):
         return self.registry.publisher_uris(topic)
 
     def parameter(self, key: str) -> object:
-        """Return a parameter's value, {} where it is not set."""
+        """Return a parameter's value, or {} if it is not set."""
         return self.parameters.get(key) if self.parameters.has(key) else {}
 
     def subscribed_parameters(self, uri: str) -> list[str]:
-        """Return a parameter's value, or {} if it is not set."""
+        """Return the keys of parameters that the node at ``uri`` has subscribed to."""
         return self.parameters.subscribed_keys(uri)
 
     def defer(self, uri: str, topic: str) -> None:

@@ -35,12 +35,12 @@ _TICK = 0.001
 _HOLD_SECONDS = 0.02
 _HOLD_TICK = 0.01
 
-_SECONDS_PER_TURN = 0.003  # of each loop iteration, to start calls
+_SECONDS_PER_TURN = 0.003  # time limit per loop iteration, to start calls
 
 # Pending parameter notices per node; beyond that, one notice for each subscribed key replaces them
 _MAX_PARAMETERS = 32
 
-_LARGE_BYTES = 32 * 1024 * 1024  # of large calls in progress, before the next one waits
+_LARGE_BYTES = 32 * 1024 * 1024  # total size of large calls in progress, above which the next one waits
 
 _MAX_ANSWER = 65536  # bytes of a node's answer to a notice, which is ignored
 
@@ -107,7 +107,7 @@ class Notifier:
 
         # The last serialized update: all subscribers of a topic get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
-        # The same for a large update, of a topic or a parameter.
+        # The last serialized large update, of a topic or a parameter.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
 
         # Large calls that wait; the bytes of those in progress; whether one is being serialized.

@@ -43,7 +43,7 @@ was already silent before. The total is not limited: the node waits for a busy m
 """
 
 _CLOSING_CALL_SECONDS = 3600.0
-_PROBE_SECONDS = 3.0  # between checks of a closing node that the master still answers
+_PROBE_SECONDS = 3.0  # between a closing node's checks that the master still answers
 
 _NOTICE_SECONDS = 3.0  # before a closing node logs that it is still waiting for the master
 
@@ -83,7 +83,7 @@ class Registrations:
         self._environment = environment
         self._tables = tables
         self._rpc = rpc
-        # At the limit of threads the functions wait, while the watch goes on.
+        # If no thread can be started, the functions wait, while the watch continues.
         self._again = InOrder(workers)
         self._watch_seconds = watch_seconds
 
@@ -275,7 +275,7 @@ class Registrations:
                 for function in self.when_registered_again:
                     self._again.start(function)
             elif has_forgotten:
-                # Logged once: from here on this master does not count as one that knows this node.
+                # Logged only once, since this master no longer counts as one that knows this node.
                 _log.warning("the master does not know this node, and refuses to")
 
     async def _register_all(self, *, again: bool = False) -> None:

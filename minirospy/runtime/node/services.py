@@ -53,7 +53,8 @@ Handler = Callable[[memoryview, Header], bytes]
 Any other exception is logged and sent as rospy sends it: ``error processing request: ...``. The connection stays open.
 """
 
-AsyncHandler = Callable[[bytes, Header], Awaitable[bytes]]  # the same as a coroutine function, on the loop
+# like Handler, but a coroutine function, called on the loop
+AsyncHandler = Callable[[bytes, Header], Awaitable[bytes]]
 
 
 class ServiceServer:

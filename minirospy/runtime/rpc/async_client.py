@@ -71,7 +71,7 @@ class AsyncRpcClient:
     def start(
         self, uri: str, body: bytes | list[bytes], timeout: float, done: Callable[[Body | RpcError], None]
     ) -> Call:
-        """Do the same with callbacks; on a busy master a coroutine would double the cost of a call.
+        """Do the same as :meth:`call` with callbacks; on a busy master a coroutine would double the cost of a call.
 
         ``body`` is the call as XML, possibly in pieces. ``done`` is called on the loop, possibly immediately, with the
         answer as XML, or with the exception that :meth:`call` would raise.

@@ -43,15 +43,15 @@ _LINGER_SECONDS = 2.0
 
 _SHORT_BODY = 4096  # bytes; a longer request is read in steps
 
-# Bytes; longer requests are read one at a time, since their values may take several times as much memory
+# Bytes; requests longer than this are read one at a time, since their values may take several times as much memory.
 _ALONE_BODY = 1024 * 1024
 
 _PROGRESS = 65536  # transferred bytes that restart the time limit: slow radio needs long for a large value
 
 _RECEIVE = 4096
 _RECEIVE_MORE = 16384
-"""Bytes to receive at a time, of a new request and of the rest of a long one. Pipelined requests within these are parsed
-before the next client is served.
+"""Bytes to receive at a time, of a new request and of the rest of a long one. They are small, since all pipelined
+requests in one receive are parsed before the next client is served.
 """
 
 _END_OF_HEAD = b"\r\n\r\n"

@@ -294,7 +294,7 @@ class RpcServer:
             slowest.end()
 
     def _end_longest_silent(self) -> None:
-        """Close the idle connection that was silent longest, or else any connection that was."""
+        """Close a connection that was silent long, preferably an idle one."""
         longest_silent = list(islice(self.connections, 20))
         if longest_silent:
             next((each for each in longest_silent if each.is_idle), longest_silent[0]).end()

@@ -14,7 +14,7 @@ __all__ = ["Turns"]
 
 _log = logging.getLogger(__name__)
 
-_SECONDS = 0.003  # of each loop iteration, for all work together
+_SECONDS = 0.003  # time limit per loop iteration, for all work together
 
 _PAUSE = 0.005  # seconds to pause while all remaining work waits for something
 
@@ -29,7 +29,7 @@ class Turns:
         self._clock = clock
         self._queue: deque[Steps[None]] = deque()
         self._backlog: deque[Steps[None]] = deque()
-        # The work that takes much memory: the generator that runs, and those that wait for it.
+        # The generator that runs alone because it takes much memory, and those that wait for that.
         self._alone: Steps[None] | None = None
         self._waiting: deque[Steps[None]] = deque()
         self._running: Steps[None] | None = None

@@ -21,7 +21,7 @@ __all__ = ["OutLink"]
 
 _GATHER = 64
 _PUSH_SECONDS = 0.005  # during which a publishing thread itself writes a large message into the socket
-_PUSH_WAIT_MS = 1  # for a single wait meanwhile
+_PUSH_WAIT_MS = 1  # for each wait during that time
 
 _Waiting = bytes | list[bytes | memoryview]  # a frame in an outbox: whole, or the buffers not sent yet
 
@@ -141,7 +141,7 @@ class OutLink:
             self._drained.wait_for(lambda: not self._outbox or self._closed)
 
     async def drain(self, timeout: float) -> None:
-        """Do the same on the loop, for at most ``timeout`` seconds."""
+        """Wait as :meth:`wait` does, but on the loop, and for at most ``timeout`` seconds."""
         end = self._loop.time() + timeout
         while self._outbox and self._loop.time() < end:
             await asyncio.sleep(0.005)

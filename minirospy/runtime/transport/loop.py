@@ -56,7 +56,7 @@ class LoopThread:
         return self.start(coroutine)(timeout)
 
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[float | None], _T]:
-        """Start ``coroutine``, as the first half of :meth:`run`; several start in the order of these calls.
+        """Start ``coroutine``, as the first half of :meth:`run`; coroutines start in the order of the calls.
 
         Return the function that waits for the result, to be called once.
         """

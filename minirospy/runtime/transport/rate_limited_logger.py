@@ -64,6 +64,6 @@ class RateLimitedLogger:
             return
 
         self._logged += 1
-        # Arguments come from peers (names, errors) unless they are neither strings nor exceptions.
+        # Strings and errors may contain text from peers; other arguments cannot.
         shown = [escaped(str(arg)) if isinstance(arg, str | Exception) else arg for arg in args]
         self._log.log(level, text, *shown, stacklevel=3)

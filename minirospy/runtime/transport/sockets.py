@@ -31,12 +31,12 @@ FAMILIES = (socket.AF_INET, socket.AF_INET6)  # the address families of TCP sock
 
 HANDSHAKE_SECONDS = 10.0  # time limit of each handshake: a peer may never answer
 
-BUSY_POLL_SECONDS = 0.0002  # most answers of a process on the same host arrive within this
+BUSY_POLL_SECONDS = 0.0002  # most answers of a process on the same host arrive within this time
 
 _KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
 """Seconds of silence, seconds between probes, number of probes. macOS calls the first one TCP_KEEPALIVE."""
 
-# Requested bytes for a Unix socket, as many as TCP buffers; Linux caps it at net.core.wmem_max (208 kB)
+# Requested bytes for a Unix socket, as many as TCP buffers; Linux caps it at net.core.wmem_max (208 kB by default)
 _SEND_BUFFER = 4 * 1024 * 1024
 
 _PEER = struct.Struct("iII")  # layout of the kernel's credentials of a peer, see Peer

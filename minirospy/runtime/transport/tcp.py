@@ -31,7 +31,8 @@ __all__ = [
     "send_header",
 ]
 
-MAX_HANDSHAKES = 200  # in progress; one more closes the oldest, since a genuine one takes milliseconds
+# handshakes in progress; one more closes the oldest, since a genuine one takes milliseconds
+MAX_HANDSHAKES = 200
 
 _AT_HAND = 8192
 _SHORT_HEADER = 64 * 1024
