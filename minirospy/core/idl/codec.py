@@ -111,7 +111,7 @@ def write_deserialize(source: Source, spec: MessageSpec, lookup: Lookup) -> None
         if spec.fields:
             with source.block("try:"):
                 _Reader(source, lookup, keeps_buffer(spec, lookup)).message(spec)
-            # Where Python has 32 bits, an offset of 2 GiB and more is an OverflowError.
+            # On 32-bit Python an offset of 2 GiB or more raises an OverflowError.
             with source.block("except (struct.error, OverflowError) as error:"):
                 source.line("raise genpy.DeserializationError(error) from error")
         source.line("return self")
