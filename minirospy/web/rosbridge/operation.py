@@ -16,9 +16,8 @@ from minirospy.introspect.graph import why_illegal
 __all__ = ["MAX_TOPICS", "MAX_WAITING_BYTES", "REFUSALS", "Work", "check_name", "type_conflict"]
 
 MAX_TOPICS = 1000  # that one client publishes, and that it subscribes to
-MAX_WAITING_BYTES = (
-    64_000_000  # of one client: operations behind one that waits; the same for latched messages
-)
+# of one client: operations behind one that waits; the same for latched messages
+MAX_WAITING_BYTES = 64_000_000
 
 REFUSALS = (MinirospyError, ServiceException, ROSSerializationException, MessageException)
 """The exceptions of an operation that are reported to the client."""

@@ -34,12 +34,10 @@ SLICE_SECONDS = 0.0001  # of one client before the next client's work: 250 of th
 NEW_PIECES = 8  # of work, by which a client is known; before it is expected to do as the last new clients did
 EXPECTED_DECAY = 0.9  # of what is expected, with each piece of work that takes less
 IMMEDIATE_SHARE = 0.5  # of the time, for work that starts without being queued
-INTERACTIVE_SLICES = (
-    10  # of one burst, 1 ms: a request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms
-)
-MAX_DEBT_TURNS = (
-    10  # of bulk clients: interactive ones alone may have 200 ms before bulk clients have a slice again
-)
+# of one burst, 1 ms: a request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms
+INTERACTIVE_SLICES = 10
+# of bulk clients: interactive ones alone may have 200 ms before bulk clients have a slice again
+MAX_DEBT_TURNS = 10
 BULK_SHARE = 0.2  # of the time, for bulk clients while interactive ones fill the rest
 
 Work = Callable[[float], bool]
@@ -65,9 +63,8 @@ class Share:
     def __init__(self, work: Work, queue: _FairQueue) -> None:
         self.work = work
         self.queue = queue  # that of interactive clients, or that of bulk clients
-        self.tag = (
-            queue.served
-        )  # seconds used; at least the tag that its queue served when the client last started
+        # seconds used; at least the tag that its queue served when the client last started
+        self.tag = queue.served
         self.weight = 1.0  # set once the client's rights are known
         self.expected = 0.0  # seconds that its next piece of work may take, from those before
         self.pieces = 0  # of work that were done, while the client is new
@@ -92,9 +89,8 @@ class _FairQueue:
 
     def __init__(self) -> None:
         self.entries: list[_Entry] = []  # a heap
-        self.served = (
-            0.0  # the tag of the work that was started last; if nothing waited then, the highest tag
-        )
+        # the tag of the work that was started last; if nothing waited then, the highest tag
+        self.served = 0.0
         self.highest = 0.0  # tag of a client that was served
 
     def update(self) -> None:

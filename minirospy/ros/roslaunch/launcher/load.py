@@ -39,9 +39,8 @@ __all__ = [
 
 STDIN = "<stdin>"
 _DEEPEST_INCLUDE = 50
-_MAX_INCLUDES = (
-    10_000  # files per launch; a chain of 26 files that each include the next one twice would load 67,108,863
-)
+# files per launch; a chain of 26 files that each include the next one twice would load 67,108,863
+_MAX_INCLUDES = 10_000
 
 Problems = list[LaunchError]
 
