@@ -47,11 +47,13 @@ _CALL_SECONDS = 3600.0
 _CHALLENGE_SECONDS = 2.0  # for a gateway to answer after another one on its machine has claimed its name
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0  # names removed (some 4 MB) before a trim; delay, as links linger
 MAX_ROBOT_NAMES = 2_000  # of _MAX_IMPORTED that one robot may use
-NAMES_AT_ONCE = 100  # names of a robot that are closed at a time: each is a task, and a call to the master
+MAX_CONCURRENT_NAMES = (
+    100  # names of a robot that are closed at a time: each is a task, and a call to the master
+)
 MAX_LISTED = 5  # robots named in one log line
 LINES = 5  # log lines of one kind per ten seconds
 _WARN_OFFSET = 100_000_000
-_AT_ONCE = 20  # robots removed at a time
+_MAX_CONCURRENT_ROBOTS = 20  # robots removed at a time
 _MAX_IMPORTED = 9_000  # names the importer registers: the master accepts at most 10,000 per node
 
 
@@ -235,10 +237,10 @@ class Importer:
                 gone.append(self.robots.pop(name))
                 left.append(name)
         self._report_names(left, "left")
-        for first in range(0, len(gone), _AT_ONCE):
+        for first in range(0, len(gone), _MAX_CONCURRENT_ROBOTS):
             # return_exceptions: a failure of one does not affect the others.
             for error in await asyncio.gather(
-                *map(self._remove, gone[first : first + _AT_ONCE]), return_exceptions=True
+                *map(self._remove, gone[first : first + _MAX_CONCURRENT_ROBOTS]), return_exceptions=True
             ):
                 if isinstance(error, Exception):
                     self._reporter.report(error)
@@ -409,8 +411,8 @@ class Importer:
             *shown.topics.values(),
             *(offered for _, offered in shown.services.values()),
         ]
-        for first in range(0, len(parts), NAMES_AT_ONCE):
-            await asyncio.gather(*(part.close() for part in parts[first : first + NAMES_AT_ONCE]))
+        for first in range(0, len(parts), MAX_CONCURRENT_NAMES):
+            await asyncio.gather(*(part.close() for part in parts[first : first + MAX_CONCURRENT_NAMES]))
 
     def _serve(self, name: str, token: ServiceToken, left: asyncio.Event) -> RawService:
         key = call_key(token.robot, token.gateway, token.service, token.md5sum)

@@ -19,7 +19,7 @@ __all__ = ["fleet_status", "inquire", "robot_parameter"]
 
 _T = TypeVar("_T")
 _PINGS = 3
-_AT_ONCE = 16
+_MAX_CONCURRENT = 16
 
 
 def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitable[_T]]) -> _T:
@@ -44,7 +44,7 @@ async def fleet_status(network: FleetNetwork, seconds: float) -> tuple[list[Answ
     """Return the robots and control rooms that are present; each has ``seconds`` to answer."""
     robots = await _claims(network, "robot", seconds)
     controls = await _claims(network, "control", seconds)
-    limit = asyncio.Semaphore(_AT_ONCE)
+    limit = asyncio.Semaphore(_MAX_CONCURRENT)
 
     async def answer(claim: Claim) -> Answer:
         async with limit:

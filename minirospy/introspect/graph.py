@@ -27,7 +27,7 @@ __all__ = [
     "why_illegal",
 ]
 
-_LONGEST_NAME = 4096  # characters, the master's limit
+_MAX_NAME_LENGTH = 4096  # characters, the master's limit
 
 
 class NodeAddress(NamedTuple):
@@ -112,8 +112,8 @@ def why_illegal(name: str) -> str:
 
     rospy accepts such names nevertheless, roscpp does not. A field's path may follow a topic's name: /points[0]/x.
     """
-    if len(name) > _LONGEST_NAME:
-        return f"a name has {_LONGEST_NAME} characters at most"
+    if len(name) > _MAX_NAME_LENGTH:
+        return f"a name has {_MAX_NAME_LENGTH} characters at most"
     legal = name != "/" and names.is_legal_name(re.sub(r"\[[^\[\]]*\]", "", name))
     return "" if legal else "that is not a legal name: letters, digits, _ and /"
 

@@ -10,12 +10,12 @@ from typing import Generic, TypeVar
 from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import MinirospyError, ServiceException
 
-__all__ = ["AT_ONCE", "NodeQueries"]
+__all__ = ["MAX_CONCURRENT", "NodeQueries"]
 
-AT_ONCE = 64
+MAX_CONCURRENT = 64
 """Concurrent first queries: a node that hangs costs only a connection."""
 
-_AGAIN_AT_ONCE = 32
+_MAX_CONCURRENT_RETRIES = 32
 """Concurrent retries; a separate limit, so that they do not delay first queries."""
 _QUERY_SECONDS = 5.0
 _AGAIN_SECONDS = 10.0  # before a node that did not answer is queried again
@@ -49,8 +49,8 @@ class NodeQueries(Generic[_Key, _Found]):
         self._present: set[_Key] = set()
         self._tasks: dict[_Key, asyncio.Task[None]] = {}
         self._not_before: dict[_Key, float] = {}
-        self._first = asyncio.Semaphore(AT_ONCE)
-        self._again = asyncio.Semaphore(_AGAIN_AT_ONCE)
+        self._first = asyncio.Semaphore(MAX_CONCURRENT)
+        self._again = asyncio.Semaphore(_MAX_CONCURRENT_RETRIES)
 
     async def look(self, present: Collection[_Key], seconds: float) -> None:
         """Query new keys and forget absent ones; return when the new ones are answered, or after ``seconds``."""

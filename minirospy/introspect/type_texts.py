@@ -21,7 +21,7 @@ __all__ = ["ServiceInfo", "TypeTexts", "described", "installed_type", "type_of_t
 
 _MAX_NAMES = 2_000
 """Cached types, including the names of types that are not installed: a peer may send any number."""
-_AT_ONCE = 32  # publishers queried concurrently
+_MAX_CONCURRENT = 32  # publishers queried concurrently
 
 
 def installed_type(name: str) -> InterfaceType | None:
@@ -59,7 +59,7 @@ class TypeTexts:
         """Query the publishers of these topics; return the types that arrive within ``seconds``: a publisher may stall."""
         if not topics:
             return {}
-        limit = asyncio.Semaphore(_AT_ONCE)
+        limit = asyncio.Semaphore(_MAX_CONCURRENT)
 
         async def look(topic: str, publishers: tuple[str, ...]) -> InterfaceType | None:
             async with limit:

@@ -38,8 +38,8 @@ _WORDS_WITH_MEANING = frozenset({"yes", "no", "true", "false", "on", "off", "nul
 _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
-_LONGEST_ANGLE = 200
-_LONGEST_SHOWN = 40  # digits of an integer in an error message
+_MAX_ANGLE_LENGTH = 200
+_MAX_SHOWN_DIGITS = 40  # digits of an integer in an error message
 
 
 def parse_value(text: str) -> object:
@@ -133,9 +133,9 @@ def check_parameter(value: object, name: str) -> None:
         raise ValueTextError(name, "null is not a value of a parameter: use '' or delete the parameter")
     elif isinstance(value, int) and not -_INT32 <= value < _INT32:
         digits = format_value(value)
-        if len(digits) > _LONGEST_SHOWN:
+        if len(digits) > _MAX_SHOWN_DIGITS:
             raise ValueTextError(
-                name, f"{digits[:_LONGEST_SHOWN]}... is more than a parameter's 32 bits hold"
+                name, f"{digits[:_MAX_SHOWN_DIGITS]}... is more than a parameter's 32 bits hold"
             )
         raise ValueTextError(name, f"{digits} is more than a parameter's 32 bits hold: write {digits}.0")
     elif not isinstance(value, bool | int | float | str | bytes):
@@ -214,9 +214,9 @@ def _arithmetic(text: str) -> float:
     import ast
     import operator
 
-    if len(text) > _LONGEST_ANGLE:
+    if len(text) > _MAX_ANGLE_LENGTH:
         # Longer strings may exceed limits of Python's parser, which raises other errors then.
-        raise ValueError(f"more than {_LONGEST_ANGLE} characters")
+        raise ValueError(f"more than {_MAX_ANGLE_LENGTH} characters")
     binary = {
         ast.Add: operator.add,
         ast.Sub: operator.sub,

@@ -42,7 +42,7 @@ FIELDS = (
 _BYTES, _STRINGS = 5, 9
 _SINGLE: dict[type, int] = {bool: 1, int: 2, float: 3, str: 4}
 _ARRAY_OF_SINGLE = 5
-_SMALLEST, _LARGEST = -(2**31), 2**31 - 1
+_MIN_INT, _MAX_INT = -(2**31), 2**31 - 1
 
 
 class ParameterService(Enum):
@@ -119,7 +119,7 @@ def ros1_value(value: Value) -> object:
 
 
 def _checked(value: object) -> object:
-    if isinstance(value, int) and not isinstance(value, bool) and not _SMALLEST <= value <= _LARGEST:
+    if isinstance(value, int) and not isinstance(value, bool) and not _MIN_INT <= value <= _MAX_INT:
         raise BridgeError(f"{value} does not fit into the 32 bits of an integer in ROS 1")
     return value
 

@@ -34,7 +34,7 @@ MAX_BYTES = 64 << 20
 MAX_UNDER_WAY = 200  # requests of a service whose responses have not been written yet
 _MAX_OF_ACTION = 2_000
 """Pending requests of an action, more than goals: a request for a result waits for the goal's end."""
-_LONGEST_SECONDS = 10_000_000
+_MAX_SECONDS = 10_000_000
 """Practically unlimited: the bridge has its own timeouts, and Zenoh's would end a long goal."""
 
 
@@ -93,7 +93,7 @@ class ZenohClient:
                     attachment=attachment,
                     target=library.QueryTarget.ALL_COMPLETE,
                     consolidation=library.ConsolidationMode.NONE,
-                    timeout=_LONGEST_SECONDS,
+                    timeout=_MAX_SECONDS,
                 )
             except library.ZError as error:
                 _fail(answered, f"service [{name}] of ROS 2: {escaped(str(error))}")

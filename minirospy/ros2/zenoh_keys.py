@@ -30,7 +30,7 @@ _SPACE = "@ros2_lv"
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 _DDS_NAME = re.compile(r"([A-Za-z]\w*)::(msg|srv|action)::dds_::([A-Za-z]\w*)_", re.ASCII)
 _HASH = re.compile(r"RIHS01_[0-9a-f]{64}|TypeHashNotSupported")
-_LONGEST = 2000
+_MAX_LENGTH = 2000
 _DEFAULT_DEPTH = 42
 
 
@@ -117,7 +117,7 @@ def format_token(entity: Entity) -> str:
 def parse_token(key: str) -> Entity | None:
     """Parse a token's key; return None if the bridge does not understand it."""
     parts = key.split("/")
-    if len(key) > _LONGEST or len(parts) < 9 or parts[0] != _SPACE:
+    if len(key) > _MAX_LENGTH or len(parts) < 9 or parts[0] != _SPACE:
         return None
     _, domain, session, _, id, kind, _, namespace, node, *rest = parts
     if kind not in {each.value for each in Kind} or not (id.isascii() and id.isdigit()) or len(id) > 18:

@@ -24,7 +24,7 @@ _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
 """Optional packages that Python packages search for; reported as found."""
 _MAX_LOOPS = 100_000  # of a foreach() with RANGE
-_DEEPEST = 40  # nested files and macros; a deeper file includes itself
+_MAX_DEPTH = 40  # nested files and macros; a deeper file includes itself
 
 
 class Command(NamedTuple):
@@ -132,7 +132,7 @@ class _Run:
     def _body(self, statements: Sequence[Statement], file: Path) -> Iterator[Command]:
         """Yield a file's or a macro's commands, up to its ``return()``."""
         self._depth += 1
-        if self._depth > _DEEPEST:
+        if self._depth > _MAX_DEPTH:
             raise BuildError(str(file), statements[0].line if statements else 0, "includes or calls itself")
         try:
             yield from self._run(statements, file)

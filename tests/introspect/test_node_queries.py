@@ -11,7 +11,7 @@ import pytest
 from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import BridgeError, ServiceException
 from minirospy.introspect import node_queries
-from minirospy.introspect.node_queries import AT_ONCE, NodeQueries
+from minirospy.introspect.node_queries import MAX_CONCURRENT, NodeQueries
 from tests.manual_loop import ManualLoop, run_manually
 from tests.waiting import until
 
@@ -199,7 +199,7 @@ def test_many_nodes_that_do_not_answer_keep_a_new_one_waiting_for_nothing(
     monkeypatch.setattr(node_queries, "_AGAIN_SECONDS", 0.0)
 
     async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
-        dead = [f"dead{number}" for number in range(3 * AT_ONCE)]
+        dead = [f"dead{number}" for number in range(3 * MAX_CONCURRENT)]
         nodes.dead.update(dead)
         await queries.look(dead, LIMIT)
         nodes.dead.clear()

@@ -17,7 +17,7 @@ MAX_PUBLISHERS = 1000  # publishers of one topic that a node connects to
 _CONNECTS_AT_ONCE, _CONNECT_PAUSE = 100, 0.01
 
 _FIRST_DELAY = 0.1
-_LONGEST_DELAY = 8.0
+_MAX_DELAY = 8.0
 
 
 @dataclass(frozen=True)
@@ -82,4 +82,4 @@ class SubscriptionPlan:
             return None
         failures = self._failures[uri]
         self._failures[uri] = failures + 1
-        return Connect(uri, min(_FIRST_DELAY * 2**failures, _LONGEST_DELAY))
+        return Connect(uri, min(_FIRST_DELAY * 2**failures, _MAX_DELAY))

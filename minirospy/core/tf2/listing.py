@@ -11,7 +11,7 @@ from minirospy.core.tf2.cache import Frame, StaticCache, TimeCache, seconds
 
 __all__ = ["escaped_name", "frames_as_dot", "frames_as_yaml"]
 
-_SHORTEST = 0.0001  # seconds; the time span assumed for a single sample when computing a rate
+_MIN_SPAN = 0.0001  # seconds; the time span assumed for a single sample when computing a rate
 
 
 def frames_as_yaml(buffer: TransformBuffer) -> str:
@@ -84,4 +84,4 @@ def _span(cache: TimeCache | StaticCache) -> float:
 
 
 def _rate(cache: TimeCache | StaticCache) -> float:
-    return len(cache) / max(_span(cache), _SHORTEST)
+    return len(cache) / max(_span(cache), _MIN_SPAN)

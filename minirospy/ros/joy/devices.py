@@ -20,7 +20,7 @@ from typing import Any, Protocol
 
 from minirospy.base.errors import MinirospyError
 from minirospy.base.installation import install_command
-from minirospy.ros.joy.joystick import EVENT_AXIS, EVENT_BUTTON, EVENT_INIT, LARGEST, Event
+from minirospy.ros.joy.joystick import EVENT_AXIS, EVENT_BUTTON, EVENT_INIT, MAX_VALUE, Event
 from minirospy.ros.joy.rumble import Rumble, RumbleError, event_device
 
 __all__ = [
@@ -213,7 +213,7 @@ class PygameDevice:
         buttons = [int(stick.get_button(at)) for at in range(stick.get_numbuttons())]
         return [
             *((EVENT_BUTTON, number, value) for number, value in enumerate(buttons)),
-            *((EVENT_AXIS, number, round(value * LARGEST)) for number, value in enumerate(axes)),
+            *((EVENT_AXIS, number, round(value * MAX_VALUE)) for number, value in enumerate(axes)),
         ]
 
     def close(self) -> None:

@@ -14,7 +14,7 @@ __all__ = ["EVENT_AXIS", "EVENT_BUTTON", "EVENT_INIT", "Event", "Joystick", "Joy
 EVENT_BUTTON, EVENT_AXIS, EVENT_INIT = 0x01, 0x02, 0x80
 """Event types of Linux's struct js_event, also used by the other backends."""
 
-LARGEST = 32767.0
+MAX_VALUE = 32767.0
 _FIRST_SECONDS = 1.0  # delay of the first repetition after opening, as in the real node
 
 
@@ -51,7 +51,7 @@ class JoystickOptions:
                 "the range [-1:1] instead of [-32767:32767]. For now I am dividing your deadzone by 32767, but this behavior is "
                 "deprecated so you need to update your launch file."
             )
-            deadzone /= LARGEST
+            deadzone /= MAX_VALUE
         if deadzone > 0.9:
             warnings.append(f"joy_node: deadzone ({deadzone:f}) greater than 0.9, setting it to 0.9")
             deadzone = 0.9
@@ -74,7 +74,7 @@ class Joystick:
 
     def __init__(self, options: JoystickOptions, now: float) -> None:
         self._options = options
-        self._scale = -1.0 / (1.0 - options.deadzone) / LARGEST
+        self._scale = -1.0 / (1.0 - options.deadzone) / MAX_VALUE
         self._is_pending = False
         self.axes: list[float] = []
         self.buttons: list[int] = []
@@ -128,7 +128,7 @@ class Joystick:
         # Before its first move a trigger reports 0, although its rest position is 1.
         if is_initial and not self._options.default_trig_val:
             return
-        unused = LARGEST * self._options.deadzone
+        unused = MAX_VALUE * self._options.deadzone
         value = float(event.value)
         if value > unused:
             value -= unused

@@ -18,7 +18,7 @@ __all__ = ["Rumble", "RumbleError", "event_device", "pack_effect", "pack_event"]
 _EV_FF = 0x15
 _FF_RUMBLE = 0x50
 _FF_GAIN = 0x60
-_LARGEST = 0xFFFF
+_MAX_MAGNITUDE = 0xFFFF
 _MILLISECONDS = 1000  # duration of an effect; joy_node restarts it before it ends
 
 # Fields: type, ID, direction, trigger (2), replay (length, delay); at byte 16 the union, with the two magnitudes.
@@ -42,7 +42,7 @@ def event_device(joystick: str, folder: Path = _INPUT) -> str:
 
 def pack_effect(number: int, strong: float, weak: float) -> bytes:
     """Return a struct ff_effect for motors at 0 to 1 of full power; ``number`` is -1 for a new effect."""
-    low, high = (round(min(max(share, 0.0), 1.0) * _LARGEST) for share in (strong, weak))
+    low, high = (round(min(max(share, 0.0), 1.0) * _MAX_MAGNITUDE) for share in (strong, weak))
     fields = _EFFECT.pack(_FF_RUMBLE, number, 0, 0, 0, _MILLISECONDS, 0, low, high)
     return fields + bytes(_EFFECT_SIZE - len(fields))
 
@@ -63,7 +63,7 @@ class Rumble:
             raise self._error(error) from error
         try:
             self._number = self._upload(-1, (0, 0))
-            os.write(self._file, pack_event(_FF_GAIN, _LARGEST))
+            os.write(self._file, pack_event(_FF_GAIN, _MAX_MAGNITUDE))
         except OSError as error:
             os.close(self._file)
             raise self._error(error) from error

@@ -11,7 +11,7 @@ from minirospy.runtime.rpc.async_client import AsyncRpcClient
 
 __all__ = ["find_dead"]
 
-_AT_ONCE = 50
+_MAX_CONCURRENT = 50
 _SECONDS = 3.0
 
 
@@ -25,8 +25,8 @@ async def find_dead(rpc: AsyncRpcClient, nodes: Mapping[str, str]) -> AsyncItera
         names.setdefault(holder_of(uri), []).append(name)
 
     holders = list(names)
-    for at in range(0, len(holders), _AT_ONCE):
-        some = holders[at : at + _AT_ONCE]
+    for at in range(0, len(holders), _MAX_CONCURRENT):
+        some = holders[at : at + _MAX_CONCURRENT]
         found = await asyncio.gather(*(_is_dead(rpc, nodes[names[holder][0]]) for holder in some))
         for holder, is_dead in zip(some, found, strict=True):
             for name in names[holder] if is_dead else ():

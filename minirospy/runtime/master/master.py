@@ -45,7 +45,7 @@ _log = logging.getLogger(__name__)
 
 _CHECK_SECONDS = 3.0
 _CHECK_TRIES = 3
-_CHECKS_AT_ONCE = 100
+_MAX_CONCURRENT_CHECKS = 100
 _QUICK_CHECK_SECONDS = 1.0
 _TOUCH_SECONDS = 30.0
 _LOCK_SECONDS = 3.0
@@ -61,7 +61,7 @@ collected automatically.
 """
 
 _SWEEP_SECONDS = 10.0  # between the checks for dead nodes if the master is nearly full
-_FORGOTTEN_AT_ONCE = 20  # dead nodes to forget per loop iteration
+_MAX_FORGOTTEN_PER_ITERATION = 20  # dead nodes to forget per loop iteration
 
 _OWN_NODE = "/rosout"
 
@@ -379,7 +379,7 @@ class Master(MasterApi):
 
     async def _check(self, nodes: Mapping[str, str]) -> None:
         """Forget dead nodes; send the others the notifications that they may have missed."""
-        rpc, slots = AsyncRpcClient(same_host=self._same_host), asyncio.Semaphore(_CHECKS_AT_ONCE)
+        rpc, slots = AsyncRpcClient(same_host=self._same_host), asyncio.Semaphore(_MAX_CONCURRENT_CHECKS)
 
         async def check(name: str, uri: str) -> bool:
             async with slots:
@@ -416,7 +416,7 @@ class Master(MasterApi):
                     self.record("gone", name, uri)
                     self._server.turns.start(self.notify_in_steps(actions))
                     count += 1
-                    if count % _FORGOTTEN_AT_ONCE == 0:
+                    if count % _MAX_FORGOTTEN_PER_ITERATION == 0:
                         await asyncio.sleep(0)
             finally:
                 await rpc.close()

@@ -26,7 +26,7 @@ __all__ = ["Notifier", "State"]
 _log = logging.getLogger(__name__)
 
 _MASTER = "/master"
-_CALLS_AT_ONCE = 200
+_MAX_CONCURRENT_CALLS = 200
 _CALLS_TO_SUSPECTS = 50
 _MAX_SUSPECTS = 10000
 _LONG_LIST = 200
@@ -99,7 +99,7 @@ class Notifier:
         # (URI, topic) -> time before which no notice of it is sent, the earliest first.
         self._held: dict[tuple[str, str], float] = {}
 
-        self._line = _Line(_CALLS_AT_ONCE)
+        self._line = _Line(_MAX_CONCURRENT_CALLS)
         self._suspect_line = _Line(_CALLS_TO_SUSPECTS)
         self._suspects: set[str] = set()
         self._starts_soon = False

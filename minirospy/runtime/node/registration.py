@@ -47,7 +47,7 @@ _PROBE_SECONDS = 3.0  # between a closing node's checks that the master still an
 
 _NOTICE_SECONDS = 3.0  # before a closing node logs that it is still waiting for the master
 
-_CALLS_AT_ONCE = 100  # unregistrations per system.multicall
+_MAX_CALLS_PER_MULTICALL = 100  # unregistrations per system.multicall
 
 _Part: TypeAlias = Publication | Subscription | ServiceServer
 _Key: TypeAlias = tuple[str, str]
@@ -344,8 +344,8 @@ class Registrations:
 
         Raise MasterUnreachableError.
         """
-        for start in range(0, len(calls), _CALLS_AT_ONCE):
-            part = calls[start : start + _CALLS_AT_ONCE]
+        for start in range(0, len(calls), _MAX_CALLS_PER_MULTICALL):
+            part = calls[start : start + _MAX_CALLS_PER_MULTICALL]
             batch = [{"methodName": method, "params": [self._name, *args]} for method, args in part]
             answers: object = None
             if len(part) > 1:

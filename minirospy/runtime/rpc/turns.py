@@ -18,7 +18,7 @@ _SECONDS = 0.003  # time limit per loop iteration, for all work together
 
 _PAUSE = 0.005  # seconds to pause while all remaining work waits for something
 
-_AT_ONCE = 16  # number of generators in progress; those not started yet take hardly any memory
+_MAX_IN_PROGRESS = 16  # number of generators in progress; those not started yet take hardly any memory
 
 
 class Turns:
@@ -40,7 +40,7 @@ class Turns:
 
     def start(self, steps: Steps[None]) -> None:
         """Run ``steps`` from the next loop iteration on."""
-        (self._queue if len(self._queue) < _AT_ONCE else self._backlog).append(steps)
+        (self._queue if len(self._queue) < _MAX_IN_PROGRESS else self._backlog).append(steps)
         self._schedule()
 
     def cancel(self, steps: Steps[None]) -> None:
@@ -59,7 +59,7 @@ class Turns:
             self.cancel(steps)
 
     def _schedule(self) -> None:
-        while self._backlog and len(self._queue) < _AT_ONCE:
+        while self._backlog and len(self._queue) < _MAX_IN_PROGRESS:
             self._queue.append(self._backlog.popleft())
         if self._queue and not self._is_scheduled:
             self._is_scheduled = True

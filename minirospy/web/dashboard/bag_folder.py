@@ -21,7 +21,7 @@ _MAX_BAGS = 1000
 _MAX_ENTRIES = 50_000
 """Files and folders to visit: the working folder may be a home folder."""
 
-_DEEPEST = 8
+_MAX_DEPTH = 8
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .+-]{0,99}")
 _RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
 """Device names of Windows."""
@@ -107,7 +107,7 @@ class BagFolder:
         """Yield the bags in the folder and below, level by level."""
         left = _MAX_ENTRIES
         level = [self.root]
-        for _ in range(_DEEPEST):
+        for _ in range(_MAX_DEPTH):
             below: list[Path] = []
             for folder in level:
                 for entry in _listed(folder):

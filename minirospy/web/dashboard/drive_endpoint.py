@@ -52,9 +52,9 @@ _log = logging.getLogger(__name__)
 
 _MAX_TOPICS = 20
 _MAX_VALUES = 100
-_LONGEST = 20_000  # characters in a command
+_MAX_COMMAND_LENGTH = 20_000  # characters in a command
 
-_LARGEST_AXIS = 3.4028234663852886e38  # largest float32
+_MAX_AXIS = 3.4028234663852886e38  # largest float32
 
 
 @dataclass(frozen=True)
@@ -100,8 +100,8 @@ class Command:
 
 def parse(text: str) -> Command:
     """Parse a command. Raise ValueError."""
-    if len(text) > _LONGEST:
-        raise ValueError(f"it has more than {_LONGEST} characters")
+    if len(text) > _MAX_COMMAND_LENGTH:
+        raise ValueError(f"it has more than {_MAX_COMMAND_LENGTH} characters")
     try:
         fields = json.loads(text)
     except RecursionError:
@@ -122,7 +122,7 @@ def parse(text: str) -> Command:
         if not all(-(2**31) <= each < 2**31 for each in buttons):
             raise ValueError("a button is 0 or 1")
         axes = _numbers(fields["axes"])
-        if not all(abs(each) <= _LARGEST_AXIS for each in axes):
+        if not all(abs(each) <= _MAX_AXIS for each in axes):
             raise ValueError("an axis is from -1 to 1")
         return Command(_topic(fields["topic"]), Joystick(axes, buttons))
     raise ValueError(f"it has {', '.join(sorted(map(str, names)))[:80] or 'nothing'}")

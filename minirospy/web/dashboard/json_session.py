@@ -29,7 +29,7 @@ __all__ = ["Fields", "Handler", "JsonEndpoint", "JsonSession", "number", "text_o
 
 _log = logging.getLogger(__name__)
 
-_LONGEST_ERROR = 1000
+_MAX_ERROR_LENGTH = 1000
 _VALUE_FACTOR = 4
 """Memory of a parsed operation per byte of its string, as for objects and lists of numbers."""
 
@@ -126,7 +126,7 @@ class JsonSession:
 
     def send_error(self, text: str, fields: Fields | None = None) -> None:
         """Send an error; ``fields`` are those of the operation."""
-        self.send({"error": text[:_LONGEST_ERROR]})
+        self.send({"error": text[:_MAX_ERROR_LENGTH]})
 
     def send_answer(self, answer: object, fields: Fields) -> None:
         """Send the result of an operation."""

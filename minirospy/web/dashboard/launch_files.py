@@ -13,7 +13,7 @@ from minirospy.workspace.packages import Packages
 __all__ = ["LaunchFile", "LaunchFiles"]
 
 _SUFFIXES = (".launch", ".launch.xml")
-_DEEPEST = 5
+_MAX_DEPTH = 5
 _MOST = 5000
 
 
@@ -37,7 +37,7 @@ class LaunchFiles:
         folders = self._packages.folders()
         own = set(folders.values())
         for package, folder in folders.items():
-            for path in _launch_files(folder, own, _DEEPEST):
+            for path in _launch_files(folder, own, _MAX_DEPTH):
                 found[LaunchFile(package, path.relative_to(folder).as_posix())] = path
                 if len(found) >= _MOST:
                     break

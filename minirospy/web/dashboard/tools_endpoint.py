@@ -48,7 +48,7 @@ _MAX_PREVIEW = 200
 """Characters of a value shown while the user types it."""
 
 _REPORT_SECONDS = 2.0
-_AT_ONCE = 4
+_MAX_CONCURRENT = 4
 """Concurrent requests of one client: nodes that do not answer take seconds."""
 
 
@@ -135,7 +135,7 @@ class ToolsSession(JsonSession):
     def __init__(self, endpoint: ToolsEndpoint, client: WebClient) -> None:
         self._endpoint = endpoint
         self._running: set[asyncio.Task[None]] = set()
-        self._threads = ThreadPoolExecutor(_AT_ONCE, "tools")
+        self._threads = ThreadPoolExecutor(_MAX_CONCURRENT, "tools")
         handlers: Mapping[str, Handler] = {
             "watch": self._watch,
             "unwatch": self._unwatch,

@@ -44,7 +44,7 @@ from minirospy.aio.services import Service, ServiceClass
 from minirospy.base.errors import BridgeError, RpcRefused, ServiceException
 from minirospy.core.idl.protocols import Message
 from minirospy.core.wire.tcpros import ANY
-from minirospy.introspect.node_queries import AT_ONCE
+from minirospy.introspect.node_queries import MAX_CONCURRENT
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.web.graph import Filters
 from minirospy.web.json_text import load_json
@@ -86,7 +86,7 @@ class Rosapi:
     def __init__(self, node: Node, filters: Filters | None = None) -> None:
         self.node = node
         self._filters = filters or Filters()
-        self._probing = asyncio.Semaphore(AT_ONCE)
+        self._probing = asyncio.Semaphore(MAX_CONCURRENT)
         self._served: list[Service] = []
         self._offers: dict[str, tuple[ServiceClass[Message, Message], _Handler]] = {
             "topics": (Topics, self._topics),

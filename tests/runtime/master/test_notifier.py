@@ -24,7 +24,7 @@ class Scene:
     """A notifier whose calls the test answers."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(notifier_module, "_CALLS_AT_ONCE", 4)
+        monkeypatch.setattr(notifier_module, "_MAX_CONCURRENT_CALLS", 4)
         monkeypatch.setattr(notifier_module, "_CALLS_TO_SUSPECTS", 1)
         self.under_way: dict[str, Callable[[bytes | RpcError], None]] = {}
         self.bodies: list[tuple[str, bytes]] = []

@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 STDIN = "<stdin>"
-_DEEPEST_INCLUDE = 50
+_MAX_INCLUDE_DEPTH = 50
 # files per launch; a chain of 26 files that each include the next one twice would load 67,108,863
 _MAX_INCLUDES = 10_000
 
@@ -250,9 +250,9 @@ class _File:
 
     def _include(self, tag: Tag, scope: _Scope) -> _Scope:
         file = tag.required("file")
-        if self._depth >= _DEEPEST_INCLUDE:
+        if self._depth >= _MAX_INCLUDE_DEPTH:
             raise tag.error(
-                f"includes are nested deeper than {_DEEPEST_INCLUDE}: does a file include itself?"
+                f"includes are nested deeper than {_MAX_INCLUDE_DEPTH}: does a file include itself?"
             )
 
         if len(self._spec.includes) >= _MAX_INCLUDES:

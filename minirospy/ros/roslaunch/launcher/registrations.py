@@ -22,7 +22,7 @@ __all__ = ["DeadNodes", "main", "unregister_dead"]
 
 _ANSWER_SECONDS = 5.0  # seconds; an exited process on this machine refuses immediately, so only a hanging one takes this long
 
-_AT_ONCE = 16
+_MAX_CONCURRENT = 16
 
 
 class DeadNodes:
@@ -71,7 +71,7 @@ def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
             state = graph.state()
             registered = {name for table in state for names in table.values() for name in names}
             left = [node for node in graph.addresses(sorted(registered.intersection(nodes))) if node.uri]
-            with ThreadPoolExecutor(_AT_ONCE) as pool:
+            with ThreadPoolExecutor(_MAX_CONCURRENT) as pool:
                 return [name for name in pool.map(lambda node: _unregister(graph, node, state), left) if name]
     except (MasterUnreachableError, RpcError):
         return []

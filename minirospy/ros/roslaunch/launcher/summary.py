@@ -8,7 +8,7 @@ from minirospy.ros.roslaunch.launcher.spec import NodeSpec
 
 __all__ = ["summary"]
 
-_LONGEST = 20
+_MAX_LENGTH = 20
 
 
 def summary(nodes: Iterable[NodeSpec], params: Mapping[str, object], clear: Iterable[str]) -> str:
@@ -30,7 +30,7 @@ def summary(nodes: Iterable[NodeSpec], params: Mapping[str, object], clear: Iter
 
 def _short(value: object) -> str:
     text = str(value)
-    if len(text) > _LONGEST:
-        text = f"{text[: _LONGEST - 3]}..."
+    if len(text) > _MAX_LENGTH:
+        text = f"{text[: _MAX_LENGTH - 3]}..."
     text = text.rstrip()
     return text if text.isascii() and text.isprintable() else "<...>"

@@ -30,7 +30,7 @@ from minirospy.ros.rosserial_python.devices.endpoints import (
     to_bytes,
 )
 from minirospy.ros.rosserial_python.devices.packets import (
-    LONGEST,
+    MAX_MESSAGE_LENGTH,
     Decoder,
     Fault,
     Packet,
@@ -173,9 +173,9 @@ class SerialClient:
 
     def send(self, topic: int, msg: bytes) -> None:
         """Send a message on the topic with this id to the device."""
-        if 0 < self.buffer_in < len(msg) or len(msg) > LONGEST:
+        if 0 < self.buffer_in < len(msg) or len(msg) > MAX_MESSAGE_LENGTH:
             text = "Message from ROS network dropped: message larger than buffer (%d of %d bytes)."
-            rospy.logerr(text, len(msg), self.buffer_in if self.buffer_in > 0 else LONGEST)
+            rospy.logerr(text, len(msg), self.buffer_in if self.buffer_in > 0 else MAX_MESSAGE_LENGTH)
             return
         self._to_write.put(encode(topic, msg))
 

@@ -10,11 +10,11 @@ import struct
 from collections.abc import Iterator
 from typing import NamedTuple
 
-__all__ = ["LONGEST", "Decoder", "Fault", "Packet", "WrongVersion", "encode"]
+__all__ = ["MAX_MESSAGE_LENGTH", "Decoder", "Fault", "Packet", "WrongVersion", "encode"]
 
 _SYNC, _VERSION = 0xFF, 0xFE
 _HEAD = struct.Struct("<HBH")
-LONGEST = 0xFFFF  # bytes in the longest message that a packet can contain
+MAX_MESSAGE_LENGTH = 0xFFFF  # bytes in the longest message that a packet can contain
 
 
 class Packet(NamedTuple):
@@ -42,8 +42,8 @@ def _checksum(data: bytes) -> int:
 
 def encode(topic_id: int, data: bytes) -> bytes:
     """Return a packet. Raise ValueError if the data is too long."""
-    if len(data) > LONGEST:
-        raise ValueError(f"{len(data)} bytes: a packet holds {LONGEST}")
+    if len(data) > MAX_MESSAGE_LENGTH:
+        raise ValueError(f"{len(data)} bytes: a packet holds {MAX_MESSAGE_LENGTH}")
     length, topic = struct.pack("<H", len(data)), struct.pack("<H", topic_id)
     return b"".join(
         (

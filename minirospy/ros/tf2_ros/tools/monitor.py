@@ -28,7 +28,7 @@ _KEPT = 1000  # number of delays in an average, and of messages in a rate
 _STEP = 0.01
 _STEPS = 20  # measurements of the delay between two frames per report
 _SMOOTHING = 0.01
-_SHORTEST = 1e-8
+_MIN_PERIOD = 1e-8
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -69,7 +69,7 @@ class Delays:
         for sender in sorted(self._node_delays):
             average, most = _average_and_most(self._node_delays[sender])
             times = self._node_times[sender]
-            rate = len(times) / max(times[-1] - times[0], _SHORTEST)
+            rate = len(times) / max(times[-1] - times[0], _MIN_PERIOD)
             yield f"Node: {sender} {rate:g} Hz, Average Delay: {average:g} Max Delay: {most:g}"
 
 

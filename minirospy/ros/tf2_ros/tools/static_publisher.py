@@ -40,7 +40,7 @@ OR
 Usage: {_NAME} /param_name 
 {_ABOUT}"""  # noqa: W291
 
-_SHORTEST = 0.001
+_MIN_PERIOD = 0.001
 """Shortest period in seconds: a period of 0 would keep this process and all listeners busy."""
 _TOLERANCE = 0.01
 """Largest deviation of a quaternion's squared length from 1: beyond it, every listener rejects the transform."""
@@ -61,7 +61,7 @@ def _run_tf(words: Sequence[str]) -> None:
         raise ToolError(_WRONG_COUNT, text=_TF_USAGE)
     *numbers, parent, child, period = words
     transform = _transform(numbers, parent, child)
-    seconds = max(_number(period, "period"), 1000 * _SHORTEST) / 1000
+    seconds = max(_number(period, "period"), 1000 * _MIN_PERIOD) / 1000
 
     rospy.init_node(_NAME, anonymous=True)
     broadcaster = TransformBroadcaster()

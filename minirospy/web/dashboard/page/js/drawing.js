@@ -1,11 +1,11 @@
 // What the drawings of graphs, frames and state machines have in common: lines, loops, and names that are too long for
 // a box. Pure.
 
-const LONGEST = 60; // characters of a name in a drawing
+const MAX_NAME_LENGTH = 60; // characters of a name in a drawing
 const SPREAD = 9; // pixels from the middle of a side to the ends of a loop
 
 /** Return a name that fits a box; what is left out is in the middle, as names differ at their ends. */
-export function brief(name, most = LONGEST) {
+export function brief(name, most = MAX_NAME_LENGTH) {
   const letters = [
     ...name.slice(0, 4 * most),
     ...(name.length > 8 * most ? name.slice(-4 * most) : name.slice(4 * most)),

@@ -4,7 +4,7 @@
 import { t } from "./texts.js";
 
 const FIRST_DELAY_MS = 300;
-const LONGEST_DELAY_MS = 4000;
+const MAX_DELAY_MS = 4000;
 
 export class Endpoint {
   /**
@@ -42,7 +42,7 @@ export class Endpoint {
       if (this.isClosed) return;
       this.handlers.closed?.();
       this.timer = setTimeout(() => this.connect(), this.delay);
-      this.delay = Math.min(this.delay * 1.6, LONGEST_DELAY_MS);
+      this.delay = Math.min(this.delay * 1.6, MAX_DELAY_MS);
     };
   }
 

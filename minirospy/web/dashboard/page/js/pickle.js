@@ -3,8 +3,8 @@
 // Source: Python's Lib/pickletools.py (protocols 0 to 5, the opcodes that plain values need).
 
 const MARK = Symbol("mark");
-const DEEPEST = 50;
-const LONGEST = 1000; // bytes of an integer that is read: longer ones would keep the page busy
+const MAX_DEPTH = 50;
+const MAX_INTEGER_BYTES = 1000; // bytes of an integer that is read: longer ones would keep the page busy
 const MAX_TEXT = 4000; // characters and values of one that is shown
 
 export class PickleError extends Error {}
@@ -50,7 +50,7 @@ export function readPickle(bytes) {
   };
   const long = (length) => {
     const from = need(length);
-    if (length > LONGEST) return { kind: `int of ${length} bytes` };
+    if (length > MAX_INTEGER_BYTES) return { kind: `int of ${length} bytes` };
     let value = 0n;
     for (let index = length - 1; index >= 0; index--) value = (value << 8n) | BigInt(bytes[from + index]);
     value = length ? BigInt.asIntN(length * 8, value) : 0n;
@@ -203,7 +203,7 @@ export function readPickle(bytes) {
 /** Return a value as one line, as Python writes it; what is very long is cut. */
 export function pythonText(value, room = { left: MAX_TEXT }, depth = 0) {
   room.left -= 1;
-  if (room.left < 0 || depth > DEEPEST) return "…";
+  if (room.left < 0 || depth > MAX_DEPTH) return "…";
   const each = (item) => pythonText(item, room, depth + 1);
   if (value === null || value === undefined) return "None";
   if (typeof value === "boolean") return value ? "True" : "False";

@@ -4,7 +4,7 @@
 import { t } from "./texts.js";
 
 const RETRY_MS = 1000;
-const LONGEST = 95_000; // characters of a request, as the server's limit
+const MAX_REQUEST_LENGTH = 95_000; // characters of a request, as the server's limit
 
 export class Tools {
   constructor(link) {
@@ -22,7 +22,7 @@ export class Tools {
     const text = JSON.stringify({ ...fields, id });
     return new Promise((resolve, reject) => {
       // The server cannot say which request it has not read.
-      if (text.length > LONGEST) throw new Error(t("it is too large"));
+      if (text.length > MAX_REQUEST_LENGTH) throw new Error(t("it is too large"));
       this.answers.set(id, { resolve, reject });
       this.send(text);
     });

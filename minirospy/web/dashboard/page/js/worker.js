@@ -7,7 +7,7 @@ import { PathError, canLead, numericPaths, parseSteps, select, stampOf, topicOf 
 
 const FLUSH_MS = 33;
 const FIRST_DELAY_MS = 300;
-const LONGEST_DELAY_MS = 4000;
+const MAX_DELAY_MS = 4000;
 const MAX_LINES = 30_000; // of one subscriber to all messages, between two batches
 const MAX_POINTS = 1_000_000; // of one series, between two batches
 
@@ -51,7 +51,7 @@ function connect() {
     disconnected();
     post({ kind: "state", state: isConnectedOnce ? "lost" : "refused" });
     setTimeout(connect, delay);
-    delay = Math.min(delay * 1.6, LONGEST_DELAY_MS);
+    delay = Math.min(delay * 1.6, MAX_DELAY_MS);
   };
 }
 

@@ -6,7 +6,7 @@ import { pixelsOf } from "../pixels.js";
 import { Rate } from "../rates.js";
 import { t } from "../texts.js";
 
-const LARGEST = 40_000; // pixels of the screen, of an image that is zoomed
+const MAX_PIXELS = 40_000; // pixels of the screen, of an image that is zoomed
 const TYPES = new Set(["sensor_msgs/Image", "sensor_msgs/CompressedImage"]);
 const MARKER_TYPE = "visualization_msgs/ImageMarker";
 
@@ -249,7 +249,7 @@ export class Image {
     const before = this.canvas.getBoundingClientRect();
     const [x, y] = [(event.clientX - before.left) / before.width, (event.clientY - before.top) / before.height];
     this.zoomed = Math.min(
-      LARGEST / Math.max(this.canvas.width, this.canvas.height),
+      MAX_PIXELS / Math.max(this.canvas.width, this.canvas.height),
       Math.max(0.05, (before.width / this.canvas.width) * Math.exp(-event.deltaY * 0.0015)),
     );
     this.fit();

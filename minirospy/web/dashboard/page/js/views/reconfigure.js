@@ -10,7 +10,7 @@ const UPDATES = "/parameter_updates";
 const SERVICE = "/set_parameters";
 const TYPE = "dynamic_reconfigure/ConfigDescription";
 const NOTE_MS = 6000;
-const LARGEST_FILE = 90_000; // the server parses no more
+const MAX_FILE_SIZE = 90_000; // the server parses no more
 
 export class Reconfigure {
   constructor(link, words, main, place) {
@@ -465,7 +465,7 @@ class Panel {
     this.file.value = "";
     if (!file) return;
     try {
-      if (file.size > LARGEST_FILE) throw new Error(t("the file is too large"));
+      if (file.size > MAX_FILE_SIZE) throw new Error(t("the file is too large"));
       const values = await this.link.tools.request({ do: "yaml", text: await file.text() });
       const { parameters } = this.description;
       const names = Object.keys(values);
