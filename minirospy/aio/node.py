@@ -70,7 +70,8 @@ class Node:
     parameters and special names as on a command line (``sys.argv`` for a program that roslaunch starts; by
     default none, since a process may hold several nodes). ``master_uri``, ``host`` and ``namespace`` stand in
     for ROS_MASTER_URI, ROS_HOSTNAME and ROS_NAMESPACE. ``rosout``: whether log lines go to /rosout.
-    ``simulated_time``: whether the node follows /clock where /use_sim_time is set.
+    ``simulated_time``: whether the node follows /clock if /use_sim_time is set. ``registration_fault_lines``: log lines in ten
+    seconds about what the master does not register.
 
     Entering waits for a master. All methods belong to the event loop that entered, but for :meth:`shutdown`.
     Source: http://wiki.ros.org/Nodes.
@@ -87,6 +88,7 @@ class Node:
         host: str = "",
         rosout: bool = True,
         simulated_time: bool = True,
+        registration_fault_lines: int = MAX_REGISTRATION_FAULTS,
     ) -> None:
         """Create the node. Raise ValueError on a name that is empty or has a namespace."""
         if not name:
@@ -106,7 +108,7 @@ class Node:
         self.name = names.canonicalize(self._environment.namespace + "/" + name)
         self.log = logging.getLogger("rosout" + self.name.replace("/", "."))
         """Python's logger of this node: to the terminal as rospy prints, and to /rosout."""
-        self.registration_faults = RateLimitedLogger(self.log, MAX_REGISTRATION_FAULTS)
+        self.registration_faults = RateLimitedLogger(self.log, registration_fault_lines)
         """Logs what the master has not registered."""
 
         self.shutdown_request = ""

@@ -89,8 +89,6 @@ class Gateway:
         Raise BridgeError, MasterUnreachableError, RpcError, ROSInterruptException if the node is shut down before.
         """
         options = self.options
-        # A thousand robots have thousands of topics: a master that does not register them is one line.
-        self.node.registration_faults = RateLimitedLogger(self.node.log)
         await self._wait_for_network()
         network = self.network
         assert network
