@@ -104,3 +104,11 @@ class BagReader(ABC):
     def close(self) -> None:
         """End what helps reading; the stream stays open."""
         return
+
+
+class ScannedReader(BagReader):
+    """A reader whose bag may lack an index, and is scanned instead."""
+
+    @abstractmethod
+    def scan(self) -> Iterator[int]:
+        """Read the whole bag, and make its index; yield the positions that are read, to show the progress."""
