@@ -11,7 +11,7 @@ import ast
 import functools
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,7 +47,7 @@ _INTERNAL = {
 _GENERATED = "generated from minirospy/"  # in the docstring of each module
 _METADATA = "rospy-1.17.0.egg-info"  # programs ask importlib.metadata for rospy's version
 _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: rospy as minirospy has it\n"
-_WIDTH = 118  # characters in a line of __all__
+_WIDTH = 118  # characters in a line
 
 
 class Origin(NamedTuple):
@@ -157,22 +157,30 @@ def _origin(asked: Origin) -> Origin:
 def _text(name: str, source: Path) -> str:
     where = source.relative_to(PACKAGE).as_posix()
     lines = [f'"""{name}, provided by minirospy: {_GENERATED}{where}."""', ""]
-    names = exported(source)
-    for bound, (module, imported) in names.items():
-        lines.append(
-            f"from {module} import {imported} as {bound}" if imported else f"import {module} as {bound}"
-        )
+    by_module: dict[str, list[str]] = {}
+    for bound, (module, imported) in exported(source).items():
+        if imported:
+            by_module.setdefault(module, []).append(f"{imported} as {bound}")
+        else:
+            lines.append(f"import {module} as {bound}")
+    for module, names in by_module.items():
+        lines += [f"from {module} import (", *_wrapped(names), ")"]
     public = _read(source).public
     if public is not None:
-        line, listed = "   ", [each for each in sorted(public) if not each.startswith("_")]
-        lines += ["", "__all__ = ["]
-        for each in listed:
-            if len(line) + len(each) + 4 > _WIDTH:
-                lines.append(line)
-                line = "   "
-            line += f' "{each}",'
-        lines += [line, "]"] if listed else ["]"]
+        listed = [f'"{each}"' for each in sorted(public) if not each.startswith("_")]
+        lines += ["", "__all__ = [", *_wrapped(listed), "]"]
     return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _wrapped(words: Iterable[str]) -> list[str]:
+    """Return indented lines of the words, each with a comma."""
+    lines: list[str] = []
+    for word in words:
+        if lines and len(lines[-1]) + len(word) + 2 <= _WIDTH:
+            lines[-1] += f" {word},"
+        else:
+            lines.append(f"    {word},")
+    return lines
 
 
 def _text_of_missing(name: str) -> str:
