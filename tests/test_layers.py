@@ -42,8 +42,14 @@ OPTIONAL_PACKAGES = [
     "urdfdom_py", "web_video_server", "xacro",
 ]  # fmt: skip
 """The ROS packages that no other package needs."""
-LEAVES = {"web", "fleet", "ros2", *(f"ros/{package}" for package in OPTIONAL_PACKAGES)}
-"""Rooms and ROS packages that can be deleted: nothing outside imports them, except for functions of `cli/`, which run one."""
+LEAVES = {
+    **{room: [room] for room in ("web", "fleet", "ros2")},
+    "ROS packages": [f"ros/{package}" for package in OPTIONAL_PACKAGES],
+    "rosbag's migration": ["ros/rosbag/migration", "ros/rosbag/rosbag/migration.py"],
+    "bags of version 1.2": ["core/bag/reader12.py"],
+}
+"""Parts that can be deleted: nothing outside imports one, except for functions of `cli/`, which run it. Name -> its paths."""
+LEAF_PATHS = sorted(path for paths in LEAVES.values() for path in paths)
 SYSTEM_PACKAGES = {"catkin", "python_orocos_kdl", "rospkg"}
 """Real ROS has these from the system or for each package: a package.xml names them as rosdep does, or not at all."""
 UNNAMED = {
@@ -265,12 +271,23 @@ def test_ros_package_imports_what_its_manifest_names() -> None:
     assert set(UNNAMED) - unnamed.keys() == set()
 
 
-def leaf_of(module: str) -> str:
-    """Return the leaf that a dotted name is in, or an empty string."""
+def leaf_of(path: str) -> str:
+    """Return the leaf that a path in the package is in, an empty string for another one; each ROS package is a leaf."""
+    for leaf in LEAF_PATHS:
+        if path == leaf or path.startswith(f"{leaf}/"):
+            names = [name for name, paths in LEAVES.items() if leaf in paths]
+            return leaf if names == ["ROS packages"] else names[0]
+    return ""
+
+
+@functools.cache
+def leaf_of_module(module: str) -> str:
+    """Return the leaf that a dotted name is in, such as ``package.module.name``."""
     parts = module.split(".")
     if parts[0] != "minirospy":
         return ""
-    return next((leaf for leaf in ("/".join(parts[1:2]), "/".join(parts[1:3])) if leaf in LEAVES), "")
+    paths = ("/".join(parts[1:end]) for end in range(2, len(parts) + 1))
+    return next((leaf for path in paths for leaf in (leaf_of(path), leaf_of(f"{path}.py")) if leaf), "")
 
 
 @functools.cache
@@ -297,14 +314,14 @@ def test_nothing_outside_imports_a_leaf() -> None:
         relative = path.relative_to(PACKAGE).as_posix()
         room = relative.partition("/")[0]
         for module in imported_on_import(path) if room == "cli" else imports(path):
-            leaf = leaf_of(module)
-            if leaf and not relative.startswith(f"{leaf}/") and (relative, room_of(module)) not in UPWARDS:
+            leaf = leaf_of_module(module)
+            if leaf and leaf != leaf_of(relative) and (relative, room_of(module)) not in UPWARDS:
                 upwards.append(f"{relative}: {module}")
     assert upwards == []
 
 
 def test_each_leaf_exists() -> None:
-    assert [leaf for leaf in sorted(LEAVES) if not (PACKAGE / leaf).is_dir()] == []
+    assert [path for path in LEAF_PATHS if not (PACKAGE / path).exists()] == []
 
 
 IMPORT_ALL = """
@@ -342,20 +359,19 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return target
 
 
-@pytest.mark.parametrize("leaf", ["web", "fleet", "ros2", "ros"])
+@pytest.mark.parametrize("leaf", LEAVES)
 def test_rest_can_be_imported_without_a_leaf(copied: Path, leaf: str) -> None:
-    """Without each room that is a leaf; without all ROS packages that are."""
-    gone = [each for each in LEAVES if each.split("/")[0] == leaf and (copied / each).exists()]
-    for each in gone:
-        (copied / each).rename(copied.parent / each.replace("/", " "))
+    gone = {path: copied.parent / path.replace("/", " ") for path in LEAVES[leaf] if (copied / path).exists()}
+    for path, aside in gone.items():
+        (copied / path).rename(aside)
     try:
         words = (sys.executable, "-c", IMPORT_ALL, str(copied))
         done = subprocess.run(
             words, cwd=copied.parent, capture_output=True, text=True, timeout=100, check=False
         )
     finally:
-        for each in gone:
-            (copied.parent / each.replace("/", " ")).rename(copied / each)
+        for path, aside in gone.items():
+            aside.rename(copied / path)
     assert gone
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
 

@@ -68,9 +68,10 @@ class Node:
 
     ``name`` is without a namespace; ``anonymous`` appends a number to it. ``argv`` are remappings, private
     parameters and special names as on a command line (``sys.argv`` for a program that roslaunch starts; by
-    default none, since a process may have several nodes). ``master_uri``, ``host`` and ``namespace`` replace
-    ROS_MASTER_URI, ROS_HOSTNAME and ROS_NAMESPACE. ``rosout``: whether log lines are published to /rosout.
-    ``simulated_time``: whether the node follows /clock if /use_sim_time is set.
+    default none, since a process may hold several nodes). ``master_uri``, ``host`` and ``namespace`` stand in
+    for ROS_MASTER_URI, ROS_HOSTNAME and ROS_NAMESPACE. ``rosout``: whether log lines go to /rosout.
+    ``simulated_time``: whether the node follows /clock if /use_sim_time is set. ``registration_fault_lines``: log lines in ten
+    seconds about what the master does not register.
 
     Entering waits for a master. Call all methods except :meth:`shutdown` in the event loop that entered.
     Source: http://wiki.ros.org/Nodes.
@@ -87,6 +88,7 @@ class Node:
         host: str = "",
         rosout: bool = True,
         simulated_time: bool = True,
+        registration_fault_lines: int = MAX_REGISTRATION_FAULTS,
     ) -> None:
         """Create the node. Raise ValueError on a name that is empty or has a namespace."""
         if not name:
@@ -105,9 +107,9 @@ class Node:
         name = special.get("__name") or (names.anonymous_name(name) if anonymous else name)
         self.name = names.canonicalize(self._environment.namespace + "/" + name)
         self.log = logging.getLogger("rosout" + self.name.replace("/", "."))
-        """Python's logger of this node, which writes to the terminal, like rospy, and to /rosout."""
-        # Logs registrations that the master refused
-        self.registration_faults = RateLimitedLogger(self.log, MAX_REGISTRATION_FAULTS)
+        """Python's logger of this node: to the terminal as rospy prints, and to /rosout."""
+        self.registration_faults = RateLimitedLogger(self.log, registration_fault_lines)
+        """Logs what the master has not registered."""
 
         # The reason given by another process, such as the master for a new node of the same name
         self.shutdown_request = ""

@@ -172,7 +172,7 @@ def _zenoh(rules: Rules, catalogue: Catalogue, connect: Sequence[str]) -> Callab
         to_endpoint,
     )
 
-    require_zenoh("ros2-bridge --zenoh")
+    require_zenoh("ros2-bridge --zenoh", needs_hash=True)
     variable = "ZENOH_SESSION_CONFIG_URI"
     config = os.environ.get(variable, "")
     try:

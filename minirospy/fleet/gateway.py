@@ -89,8 +89,6 @@ class Gateway:
         Raise BridgeError, MasterUnreachableError or RpcError, or ROSInterruptException if the node is shut down before that.
         """
         options = self.options
-        # A thousand robots have thousands of topics: if the master fails to register them, log one line.
-        self.node.registration_faults = RateLimitedLogger(self.node.log)
         await self._wait_for_network()
         network = self.network
         assert network

@@ -18,8 +18,8 @@ from minirospy.core.bag import compression as compressions
 from minirospy.core.bag.base import BagReader
 from minirospy.core.bag.mcap_reader import open_bag_or_mcap
 from minirospy.core.bag.mcap_repair import MAGIC, McapRepair
+from minirospy.core.bag.old_formats import unindexed_old_bag
 from minirospy.core.bag.reader import ChunkedReader
-from minirospy.core.bag.reader12 import unindexed_bag12
 from minirospy.core.bag.records import Connection, read_version
 from minirospy.core.bag.repair import Repair
 from minirospy.core.bag.writer import BagWriter, Continued
@@ -252,7 +252,7 @@ def reindex(path: str, progress: Progress) -> list[str]:
 def convert12(source: str, target: str, progress: Progress) -> None:
     """Convert a bag of version 1.2, with or without an index, to version 2.0. Raise BagError or OSError."""
     with open(source, "rb") as stream, new_bag(target, compressions.NONE) as writer:
-        reader = unindexed_bag12(stream)
+        reader = unindexed_old_bag(stream)
         for position in reader.scan():
             progress(position)
         numbers: dict[int, int] = {}

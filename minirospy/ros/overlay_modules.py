@@ -11,7 +11,7 @@ import ast
 import functools
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,9 +20,14 @@ from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES
 __all__ = ["Origin", "exported", "modules", "overlay_files", "write_overlay"]
 
 PACKAGE = Path(__file__).parents[1]
-_PROGRAMS = {"commands", "nodes", "scripts"}  # folders of a ROS package that are no Python module
 _ALSO = {"RPi": PACKAGE / "board" / "pins"}
 """Python modules of no ROS package -> the folder that has them."""
+_NAMED_OTHERWISE = {
+    "camera_info_manager_py": ("camera_info_manager",),
+    "python_orocos_kdl": ("PyKDL",),
+    "urdfdom_py": ("urdf_parser_py",),
+}
+"""ROS package -> the Python modules that have another name."""
 _INTERNAL = {
     "PyKDL": "frames functions vectors",
     "actionlib": "aio client goal_id handle machine server simple_client simple_server spec states statuses waiting",
@@ -43,11 +48,14 @@ _INTERNAL = {
     "topic_tools": "expressions",
     "urdf_parser_py": "joints links",
 }
-"""Python module -> its modules that ROS's does not have. New ones do not belong here but next to the module's folder."""
+"""Python module -> its modules that ROS's does not have. Put a new one next to the folder of the module instead."""
 _GENERATED = "generated from minirospy/"  # in the docstring of each module
 _METADATA = "rospy-1.17.0.egg-info"  # programs ask importlib.metadata for rospy's version
 _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: rospy as minirospy has it\n"
-_WIDTH = 118  # characters in a line of __all__
+_WIDTH = 118  # characters in a line
+
+_HOOKS = {"__getattr__", "__dir__"}
+"""Functions by which a module answers for names that it does not have (PEP 562)."""
 
 
 class Origin(NamedTuple):
@@ -118,16 +126,8 @@ def _python_modules(package: Path) -> Iterator[str]:
     """Yield the Python modules of a ROS package: its folders with an ``__init__.py`` that have the module's name."""
     named = {package.name, *_NAMED_OTHERWISE.get(package.name, ())}
     for folder in package.iterdir():
-        if folder.name in named and folder.name not in _PROGRAMS and (folder / "__init__.py").exists():
+        if folder.name in named and (folder / "__init__.py").exists():
             yield folder.name
-
-
-_NAMED_OTHERWISE = {
-    "camera_info_manager_py": ("camera_info_manager",),
-    "python_orocos_kdl": ("PyKDL",),
-    "urdfdom_py": ("urdf_parser_py",),
-}
-"""ROS package -> the Python modules that have another name."""
 
 
 def exported(source: Path) -> dict[str, Origin]:
@@ -157,22 +157,30 @@ def _origin(asked: Origin) -> Origin:
 def _text(name: str, source: Path) -> str:
     where = source.relative_to(PACKAGE).as_posix()
     lines = [f'"""{name}, provided by minirospy: {_GENERATED}{where}."""', ""]
-    names = exported(source)
-    for bound, (module, imported) in names.items():
-        lines.append(
-            f"from {module} import {imported} as {bound}" if imported else f"import {module} as {bound}"
-        )
+    by_module: dict[str, list[str]] = {}
+    for bound, (module, imported) in exported(source).items():
+        if imported:
+            by_module.setdefault(module, []).append(f"{imported} as {bound}")
+        else:
+            lines.append(f"import {module} as {bound}")
+    for module, names in by_module.items():
+        lines += [f"from {module} import (", *_wrapped(names), ")"]
     public = _read(source).public
     if public is not None:
-        line, listed = "   ", [each for each in sorted(public) if not each.startswith("_")]
-        lines += ["", "__all__ = ["]
-        for each in listed:
-            if len(line) + len(each) + 4 > _WIDTH:
-                lines.append(line)
-                line = "   "
-            line += f' "{each}",'
-        lines += [line, "]"] if listed else ["]"]
+        listed = [f'"{each}"' for each in sorted(public) if not each.startswith("_")]
+        lines += ["", "__all__ = [", *_wrapped(listed), "]"]
     return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _wrapped(words: Iterable[str]) -> list[str]:
+    """Return indented lines of the words, each with a comma."""
+    lines: list[str] = []
+    for word in words:
+        if lines and len(lines[-1]) + len(word) + 2 <= _WIDTH:
+            lines[-1] += f" {word},"
+        else:
+            lines.append(f"    {word},")
+    return lines
 
 
 def _text_of_missing(name: str) -> str:
@@ -230,10 +238,6 @@ def _read(source: Path) -> _Source:
             if "__all__" in names and statement.value is not None:
                 public = tuple(ast.literal_eval(statement.value))
     return _Source(public, imported, frozenset(passed_on))
-
-
-_HOOKS = {"__getattr__", "__dir__"}
-"""Functions by which a module answers for names that it does not have (PEP 562)."""
 
 
 if __name__ == "__main__":

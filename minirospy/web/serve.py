@@ -10,7 +10,7 @@ import sys
 from collections.abc import Awaitable, Callable, Sequence
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from minirospy.aio.node import Node
+from minirospy.aio.node import MAX_REGISTRATION_FAULTS, Node
 from minirospy.base.errors import BridgeError, MinirospyError, ROSInterruptException
 from minirospy.base.escape import escaped
 from minirospy.base.heap import return_large_blocks
@@ -107,20 +107,27 @@ def run(
     on_started: Callable[[_P], None],
     *,
     imports_messages: bool = True,
+    registration_fault_lines: int = MAX_REGISTRATION_FAULTS,
     connect: Callable[[_P], Awaitable[None]] | None = None,
 ) -> int:
     """Run a bridge on a node of this name until it is shut down; return the exit status.
 
-    ``argv``: remappings, as from a launch file; None: those of the process. ``start`` creates the bridge, ``on_started``
-    shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, which need message
-    classes. ``connect`` runs what may fail before the node registers its name, because the master then shuts down a running
-    node of that name.
+    ``argv``: remappings, as a launch file gives them; None: those of the process. ``start`` makes the bridge,
+    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for which
+    it would import message classes. ``registration_fault_lines`` are those of the node. ``connect`` opens
+    what may fail before the node takes its name: the master ends a running node of that name.
     """
     return_large_blocks(_LARGE_BLOCK)
     loop = new_event_loop()
     try:
         words = sys.argv[1:] if argv is None else argv
-        node = Node(name, argv=words, rosout=imports_messages, simulated_time=imports_messages)
+        node = Node(
+            name,
+            argv=words,
+            rosout=imports_messages,
+            simulated_time=imports_messages,
+            registration_fault_lines=registration_fault_lines,
+        )
         return loop.run_until_complete(_run(node, start, on_started, connect))
     finally:
         loop.close()

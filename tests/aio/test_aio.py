@@ -326,6 +326,14 @@ def test_leaving_the_loop_unsubscribes(graph: MasterProxy) -> None:
     run(main)
 
 
+def test_node_logs_as_many_registration_faults_as_asked(caplog: pytest.LogCaptureFixture) -> None:
+    faults = Node("fleet_control", registration_fault_lines=1).registration_faults
+    for name in "abc":
+        faults.warning("/%s is not registered", name)
+    faults.close()
+    assert caplog.messages == ["/a is not registered", "2 more like the last ones"]
+
+
 def test_publishers_of_a_topic_share_its_registration(graph: MasterProxy) -> None:
     async def main() -> None:
         async with Node("a") as a:

@@ -12,10 +12,12 @@ from minirospy.core.bag.reader import open_bag
 from minirospy.core.bag.records import Connection
 from minirospy.core.idl.load import class_from_text
 from minirospy.ros.rosbag.commands.rosbag_scripts import SCRIPTS, main
+from minirospy.ros.rosbag.parts import migration_scripts
 from tests.core.bag.bags import STRING_MD5, Given, connection, make_bag
 
 GIVEN = [[Given(0, 5, b"\x01\0\0\0a"), Given(1, 6, b"\x01\0\0\0b")], [Given(0, 1, b"\x01\0\0\0c")]]
 FOLDER = Path(__file__).parents[2] / "minirospy" / "ros" / "rosbag" / "scripts"
+PROGRAMS = SCRIPTS | migration_scripts()
 
 
 @pytest.fixture
@@ -37,12 +39,12 @@ def connections(name: str) -> list[Connection]:
 
 
 def test_every_program_is_a_script_of_the_package() -> None:
-    assert {path.name for path in FOLDER.glob("*.py")} == set(SCRIPTS)
-    for name in SCRIPTS:
+    assert {path.name for path in FOLDER.glob("*.py")} == set(PROGRAMS)
+    for name in PROGRAMS:
         assert f'main("{name}")' in (FOLDER / name).read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", sorted(SCRIPTS))
+@pytest.mark.parametrize("name", sorted(PROGRAMS))
 def test_without_words_the_usage_is_printed(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     status = main(name, [])
     out, err = capsys.readouterr()

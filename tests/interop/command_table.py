@@ -1,6 +1,6 @@
 """Every command and option of rostopic, rosnode, rosservice, rosparam, rosmsg and rossrv, typed in real ROS and in ours.
 
-`WRITE=1 pytest tests/interop/test_interop_tools.py -k table` writes what both print to docs/command_compatibility.md.
+`WRITE=1 pytest tests/interop/test_interop_tools.py -k table` writes what both print to docs/compatibility/commands.md.
 Compared are standard output and the exit status. Errors on stderr start with ROS's text where ROS has one, then ours
 follows: OTHER_WORDS are the lines where they do not.
 
@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 from tests.interop.conftest import PATIENCE
 
-PAGE = Path(__file__).parents[2] / "docs" / "command_compatibility.md"
+PAGE = Path(__file__).parents[2] / "docs" / "compatibility" / "commands.md"
 REAL = Path("/usr/bin")
 OURS = Path(sys.executable).parent
 

@@ -1,4 +1,4 @@
-"""docs/rospy_compatibility.md and its kin are up to date with real ROS and ours; nothing is missing."""
+"""docs/compatibility/rospy.md and its kin are up to date with real ROS and ours; nothing is missing."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.interop.conftest import PATIENCE
 
 SCRIPT = Path(__file__).parents[1] / "referee" / "compare_surface.py"
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = [DOCS / f"{name}_compatibility.md" for name in ("rospy", "modules", "tf")]
+PAGES = [DOCS / "compatibility" / f"{name}.md" for name in ("rospy", "modules", "tf")]
 
 
 def test_the_pages_are_up_to_date() -> None:

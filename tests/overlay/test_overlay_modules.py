@@ -82,8 +82,7 @@ def test_new_package_is_one_folder(sources: Path, tmp_path: Path) -> None:
     assert {"pack/__init__.py", "pack/tool.py", "pack/py.typed"} <= set(written)
     assert (target / "pack" / "tool.py").read_text() == (
         '"""pack.tool, provided by minirospy: generated from minirospy/ros/pack/pack/tool.py."""\n\n'
-        "from minirospy.ros.pack.pack.tool import _hidden as _hidden\n"
-        "from minirospy.ros.pack.pack.tool import run as run\n\n"
+        "from minirospy.ros.pack.pack.tool import (\n    _hidden as _hidden, run as run,\n)\n\n"
         '__all__ = [\n    "run",\n]\n'
     )
 

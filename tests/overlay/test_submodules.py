@@ -37,7 +37,7 @@ def test_submodule_of_real_ros_is_offered(module: str) -> None:
 
 @pytest.mark.parametrize("module", RECORD["not offered"])
 def test_module_that_is_listed_as_missing_is_missing(module: str) -> None:
-    """The list in docs/modules_compatibility.md is true."""
+    """The list in docs/compatibility/modules.md is true."""
     with pytest.raises(ImportError):
         importlib.import_module(module)
 

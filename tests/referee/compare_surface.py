@@ -1,7 +1,7 @@
 """Every public name and signature of real rospy, and of the modules around it, beside ours: writes three pages of docs.
 
-docs/rospy_compatibility.md compares rospy; docs/modules_compatibility.md rosgraph, rosnode, rostopic and their kin;
-docs/tf_compatibility.md tf2_ros, tf and PyKDL.
+docs/compatibility/rospy.md compares rospy; docs/compatibility/modules.md rosgraph, rosnode, rostopic and their kin;
+docs/compatibility/tf.md tf2_ros, tf and PyKDL.
 
     .venv/bin/python tests/referee/compare_surface.py            write the pages
     .venv/bin/python tests/referee/compare_surface.py --check    exit status 1 where one would change
@@ -598,13 +598,13 @@ def main() -> int:
         described_by(REAL_PYTHON, "--private"), described_by(sys.executable, "--all-private")
     )
     pages = {
-        DOCS / "rospy_compatibility.md": page("rospy and minirospy, name by name", ROSPY, real, ours),
-        DOCS / "modules_compatibility.md": page(
+        DOCS / "compatibility" / "rospy.md": page("rospy and minirospy, name by name", ROSPY, real, ours),
+        DOCS / "compatibility" / "modules.md": page(
             "rosgraph, rosnode, rostopic and their kin and minirospy, name by name", AROUND, real, ours
         )
         + "\n"
         + submodule_text,
-        DOCS / "tf_compatibility.md": page(
+        DOCS / "compatibility" / "tf.md": page(
             "tf2_ros, tf and PyKDL and minirospy, name by name", FRAMES, real, ours
         ),
     }

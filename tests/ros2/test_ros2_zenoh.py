@@ -499,6 +499,17 @@ def test_without_the_library_one_line_says_what_to_install(
     assert install_command("minirospy[fleet]", upgrade=True) in error
 
 
+def test_missing_hash_library_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "xxhash", None)
+    assert main(["--zenoh"]) == 1
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "needs the library xxhash: " in error
+    assert install_command("minirospy[fleet]", upgrade=True) in error
+
+
 @pytest.mark.parametrize("version", ["0.11.0", "1.3.9", "2.0.0"])
 def test_a_library_of_another_protocol_is_refused(
     version: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -101,3 +101,11 @@ class BagReader(ABC):
     def close(self) -> None:
         """Release the reader's resources, such as threads; the stream stays open."""
         return
+
+
+class ScannedReader(BagReader):
+    """A reader whose bag may lack an index, and is scanned instead."""
+
+    @abstractmethod
+    def scan(self) -> Iterator[int]:
+        """Read the whole bag, and make its index; yield the positions that are read, to show the progress."""

@@ -107,14 +107,16 @@ class McapReader(BagReader):
         wanted = {number: self.connections[number] for number in chosen}
         first = 0 if start is None else start
         last = _END_OF_TIME if end is None else end
-        # A chunk is read when its first message may be the next one. Each chunk's data is in memory once, together
-        # with other chunks' data only if they overlap in time. Positions are unique, so runs are never compared.
+        selection = _Selection(self._summary.channels.keys(), wanted.keys(), first, last)
+        # A chunk is read when its first message may be the next one; its data is in memory once, and so are those of others
+        # only as far as they overlap with it in time.
+        # No two have one position.
         heap = [(run.start, run.position, -1, run) for run in self._runs(wanted.keys(), first, last)]
         heapify(heap)
         while heap:
             _, position, at, run = heap[0]
             if at < 0:
-                run.load(self.stream, self._size, self._summary.channels.keys(), wanted.keys(), first, last)
+                run.load(self.stream, self._size, selection)
             else:
                 time, _, channel, body, after = run.messages[at]
                 yield StoredMessage(wanted[channel], time, run.body(self.stream, body, after), 0)
@@ -192,6 +194,17 @@ class _ChunkHeader(NamedTuple):
     data_size: int
 
 
+class _Selection(NamedTuple):
+    """The messages that are asked for."""
+
+    known: Collection[int]
+    """The channels in the summary; one of another channel is damage."""
+    wanted: Collection[int]
+    first: int
+    last: int
+    """Times in nanoseconds, both included."""
+
+
 class _Run:
     """The messages of a chunk, in the order of time: time, index in the chunk, channel, start and end of the body."""
 
@@ -201,16 +214,8 @@ class _Run:
         self.messages: list[tuple[int, int, int, int, int]] = []
         self._data = b""
 
-    def load(
-        self,
-        stream: BinaryIO,
-        limit: int,
-        known: Collection[int],
-        wanted: Collection[int],
-        first: int,
-        last: int,
-    ) -> None:
-        """Read the chunk, and find the messages with these channels and times. Raise BagFormatError."""
+    def load(self, stream: BinaryIO, limit: int, selection: _Selection) -> None:
+        """Read the chunk, and find the messages of these channels and times. Raise BagFormatError."""
         from mcap.opcode import Opcode
 
         with mcap_faults():
@@ -226,7 +231,7 @@ class _Run:
             if after > size:
                 break
             if opcode == Opcode.MESSAGE:
-                self._add(data, body, after, at, known, wanted, first, last)
+                self._add(data, body, after, at, selection)
             at = after
         if at != size:
             raise BagFormatError("not a whole MCAP file: a record does not fit into its chunk", self.position)
@@ -236,17 +241,8 @@ class _Run:
         """Return the bytes of a message."""
         return self._data[start:end]
 
-    def _add(
-        self,
-        data: bytes,
-        start: int,
-        end: int,
-        place: int,
-        known: Collection[int],
-        wanted: Collection[int],
-        first: int,
-        last: int,
-    ) -> None:
+    def _add(self, data: bytes, start: int, end: int, place: int, selection: _Selection) -> None:
+        known, wanted, first, last = selection
         if end - start < _MESSAGE.size:
             raise BagFormatError("not a whole MCAP file: a message is too short", self.position)
         channel, _, time, _ = _MESSAGE.unpack_from(data, start)
@@ -265,21 +261,13 @@ class _Loose(_Run):
         super().__init__(position, start)
         self.places: list[tuple[int, int]] = []
 
-    def load(
-        self,
-        stream: BinaryIO,
-        limit: int,
-        known: Collection[int],
-        wanted: Collection[int],
-        first: int,
-        last: int,
-    ) -> None:
+    def load(self, stream: BinaryIO, limit: int, selection: _Selection) -> None:
         """See :meth:`_Run.load`."""
         for position, length in self.places:
             stream.seek(position + _HEAD.size)
             head = stream.read(min(length, _MESSAGE.size))
             before = len(self.messages)
-            self._add(head, 0, len(head), position, known, wanted, first, last)
+            self._add(head, 0, len(head), position, selection)
             if len(self.messages) > before:
                 time, place, channel, _, _ = self.messages[-1]
                 start = position + _HEAD.size

@@ -1,8 +1,8 @@
 """Read bags: a seekable binary stream in, connections and messages in the order of time out.
 
-Opening a bag of version 2.0 reads its first record, and the connections and chunk infos at its end. Messages are read
-chunk by chunk; chunks that overlap in time are merged. Memory use: the chunk infos, and a few chunks.
-Source: http://wiki.ros.org/Bags/Format/2.0; for version 1.2: `minirospy.core.bag.reader12`.
+Opening a bag of version 2.0 reads its first record, and its connections and chunk infos at the end. Messages are read chunk
+by chunk; where chunks overlap in time they are merged. Memory: the chunk infos, and a few chunks.
+Source: http://wiki.ros.org/Bags/Format/2.0; for version 1.2: `minirospy.core.bag.old_formats`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from minirospy.core.bag import records
 from minirospy.core.bag.base import BagReader, Block, Position, StoredMessage
 from minirospy.core.bag.chunks import THREADS, ChunkStream, Found, StoredChunk, scan, size_of
 from minirospy.core.bag.index import ConnectionIndex, read_entries
-from minirospy.core.bag.reader12 import open_bag12
+from minirospy.core.bag.old_formats import open_old_bag
 from minirospy.core.bag.records import ChunkInfo, Connection
 
 __all__ = ["ChunkedReader", "open_bag"]
@@ -44,9 +44,7 @@ def open_bag(stream: BinaryIO) -> BagReader:
         raise BagVersionError(
             version, f"unsupported bag version {version}. Please convert bag to newer format."
         )
-    if version // 100 == 1:
-        return open_bag12(stream, version)
-    raise BagVersionError(version, f"unknown bag version {version}")
+    return open_old_bag(stream, version)
 
 
 class ChunkedReader(BagReader):

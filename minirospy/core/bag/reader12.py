@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 from minirospy.base.errors import BagFormatError, BagUnindexedError
 from minirospy.core.bag import records
-from minirospy.core.bag.base import BagReader, Block, Position, StoredMessage
+from minirospy.core.bag.base import Block, Position, ScannedReader, StoredMessage
 from minirospy.core.bag.chunks import size_of
 from minirospy.core.bag.index import ConnectionIndex, Entry, merge_entries
 from minirospy.core.bag.records import ChunkInfo, Connection, Record
@@ -22,8 +22,8 @@ __all__ = ["Reader12", "open_bag12", "unindexed_bag12"]
 _ENTRY = struct.Struct("<IIQ")
 
 
-class Reader12(BagReader):
-    """A bag of version 1.2, with a connection for each topic.
+class Reader12(ScannedReader):
+    """A bag of version 1.2: a connection for each topic.
 
     ``start``: the position of the first record. It is not ``indexed`` until :meth:`read_index` or :meth:`scan`.
     """

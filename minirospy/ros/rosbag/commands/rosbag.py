@@ -16,11 +16,11 @@ from minirospy.command.verbs import Family, HelpStatus
 from minirospy.ros.rosbag.commands import (
     rosbag_convert,
     rosbag_info,
-    rosbag_migrate,
     rosbag_play,
     rosbag_record,
     rosbag_rewrite,
 )
+from minirospy.ros.rosbag.parts import migration_verbs
 
 __all__ = ["FAMILY", "main"]
 
@@ -29,7 +29,7 @@ FAMILY = Family(
     "",
     (
         *rosbag_info.VERBS,
-        *rosbag_migrate.VERBS,
+        *migration_verbs(),
         *rosbag_rewrite.VERBS,
         rosbag_convert.VERB,
         rosbag_play.VERB,

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any, TypedDict
 from minirospy.base.errors import BagCompressionError, BagError
 from minirospy.core.bag import compression as compressions
 from minirospy.core.bag import info
+from minirospy.core.bag.base import ScannedReader
 from minirospy.core.bag.info import _human_frequency as _human_readable_frequency
 from minirospy.core.bag.info import _human_size as _human_readable_size
 from minirospy.core.bag.reader import ChunkedReader
-from minirospy.core.bag.reader12 import Reader12
 from minirospy.core.bag.repair import Repair
 from minirospy.ros.rosbag.rosbag.exceptions import (
     ROSBagEncryptException,
@@ -308,7 +308,7 @@ class Bag(OpenedBag):
         """
         if self._version and self._version < 200:
             reader = self._source
-            if isinstance(reader, Reader12):
+            if isinstance(reader, ScannedReader):
                 yield from reader.scan()
             return
 

@@ -9,8 +9,8 @@ from typing import Any, BinaryIO, TypeAlias, cast
 
 from minirospy.base.errors import BagUnindexedError
 from minirospy.core.bag.base import BagReader
+from minirospy.core.bag.old_formats import unindexed_old_bag
 from minirospy.core.bag.reader import ChunkedReader, open_bag
-from minirospy.core.bag.reader12 import unindexed_bag12
 from minirospy.core.bag.records import ChunkInfo, Connection, read_version
 from minirospy.core.bag.writer import BagWriter, Continued
 from minirospy.ros.rosbag.rosbag.exceptions import ROSBagException, ROSBagUnindexedException
@@ -63,7 +63,7 @@ class OpenedBag(PrivateBag):
                 raise
             if self._version < 200:
                 stream.seek(position)
-                self._source = unindexed_bag12(stream)
+                self._source = unindexed_old_bag(stream)
 
     def _open_write(self, f: FileArgument, allow_unindexed: bool) -> None:
         self._file = self._take(f, "w+b")

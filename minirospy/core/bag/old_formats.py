@@ -1,0 +1,45 @@
+"""Bags of versions before 2.0: the one place that names their reader, which is imported when such a bag is opened."""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+from typing import BinaryIO
+
+from minirospy.base.errors import BagVersionError
+from minirospy.core.bag import records
+from minirospy.core.bag.base import BagReader, ScannedReader
+
+__all__ = ["open_old_bag", "unindexed_old_bag"]
+
+_READERS = {1: "minirospy.core.bag.reader12"}
+"""Major version -> a module with ``open_bag12`` and ``unindexed_bag12``."""
+
+
+def open_old_bag(stream: BinaryIO, version: int) -> BagReader:
+    """Return a reader of the bag whose first line has been read.
+
+    Raise BagVersionError for a version that is not read, and what the version's reader raises.
+    """
+    reader: BagReader = _module(version).open_bag12(stream, version)
+    return reader
+
+
+def unindexed_old_bag(stream: BinaryIO) -> ScannedReader:
+    """Return a reader of the bag at the stream's position, which is to be scanned. Raise BagFormatError, BagVersionError."""
+    start = stream.tell()
+    version = records.read_version(stream)
+    stream.seek(start)
+    reader: ScannedReader = _module(version).unindexed_bag12(stream)
+    return reader
+
+
+def _module(version: int) -> ModuleType:
+    name = _READERS.get(version // 100, "")
+    try:
+        if name:
+            return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name != name:
+            raise
+    raise BagVersionError(version, f"unknown bag version {version}")

@@ -1,0 +1,40 @@
+"""The one place that names rosbag's migration of messages, which few need: its modules are imported when they are.
+
+Its folder, with `rosbag/migration.py`, can be deleted; then its verbs and programs are missing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from minirospy.command.verbs import Verb
+
+__all__ = ["migration_scripts", "migration_verbs"]
+
+_MIGRATION = "minirospy.ros.rosbag.migration"
+
+
+def migration_verbs() -> tuple[Verb, ...]:
+    """Return the verbs `rosbag check` and `rosbag fix`."""
+    module = _module("verbs")
+    return module.VERBS if module else ()
+
+
+def migration_scripts() -> dict[str, Callable[[list[str]], int]]:
+    """Return the programs that migrate, by their names."""
+    module = _module("scripts")
+    return module.SCRIPTS if module else {}
+
+
+def _module(name: str) -> ModuleType | None:
+    """Return a module of the migration; None if that has been deleted."""
+    try:
+        return importlib.import_module(f"{_MIGRATION}.{name}")
+    except ModuleNotFoundError as error:
+        if error.name != _MIGRATION:
+            raise
+        return None
