@@ -21,8 +21,9 @@ __all__ = [
     "width_of",
 ]
 
-_MAX_VALUES = 5_000_000  # of numbers: objects and text of them are some 300 MB
-_MAX_COLLECTIONS = 1_000_000
+_MAX_VALUES = 4_000_000  # in one text: as numbers they take 160 MB, besides the text
+_MAX_STRINGS = 2_000_000  # in one text, names of fields among them: they take 150 MB
+_MAX_COLLECTIONS = 1_000_000  # lists and objects in one text: they take 100 to 240 MB
 MAX_QUICK_CHARACTERS = 64 * 1024  # of any text that is parsed immediately: 2 ms at most
 MAX_QUICK_STRINGS = 4 * 1024 * 1024  # characters of a text that has few values, such as an image in base64
 MAX_QUICK_VALUES = 20_000
@@ -92,6 +93,8 @@ def _check_counts(text: str, max_values: int, max_collections: int) -> None:
     for marks, most in ((",", max_values), ("[{", max_collections)):
         if len(text) > most and sum(map(text.count, marks)) > most:
             raise ValueError(f"more than {most} values")
+    if len(text) > 2 * _MAX_STRINGS and text.count('"') > 2 * _MAX_STRINGS:
+        raise ValueError(f"more than {_MAX_STRINGS} strings")
 
 
 class _PiecewiseDecoder(json.JSONDecoder):
