@@ -1,7 +1,8 @@
 """Texts of clients, and their JSON, with limits: `[]` fifty million times would take gigabytes, and hold up all clients. Pure.
 
 The library's parser keeps Python's global interpreter lock (GIL) until it has parsed the whole text, and so stops all threads of
-the process. A large text is parsed in pieces instead, by :func:`load_json_in_pieces` in a thread of its own.
+the process. A large text is parsed in pieces instead, by :func:`load_json_in_pieces` in a thread, and a large value is encoded in
+pieces, by :func:`dump_json_in_pieces`.
 """
 
 from __future__ import annotations
@@ -9,11 +10,13 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from json.scanner import py_make_scanner  # type: ignore[attr-defined]
 
 __all__ = [
     "MAX_QUICK_CHARACTERS",
+    "dump_json",
+    "dump_json_in_pieces",
     "is_quick_text",
     "load_json",
     "load_json_in_pieces",
@@ -28,6 +31,9 @@ MAX_QUICK_CHARACTERS = 64 * 1024  # of any text that is parsed immediately: 2 ms
 MAX_QUICK_STRINGS = 4 * 1024 * 1024  # characters of a text that has few values, such as an image in base64
 MAX_QUICK_VALUES = 20_000
 _PIECE = 32 * 1024  # characters of numbers that are parsed in one call
+
+_PIECE_VALUES = 1000  # of a list that become text in one call: 1 ms for floats
+_PIECE_CHARACTERS = 64 * 1024  # of a string
 
 _SPACE = re.compile(r"[ \t\n\r]*")
 _MARKS = re.compile(r'[\[\]{}"]')
@@ -151,3 +157,80 @@ def _numbers(text: str, start: int, end: int) -> list[object]:
     if not found:
         raise json.JSONDecodeError("Expecting value", text, start)
     return found
+
+
+# --- values -> texts
+
+
+def dump_json(value: object) -> str:
+    """Return the compact text of a value. Raise ValueError for NaN and infinities."""
+    return json.dumps(value, separators=(",", ":"), allow_nan=False)
+
+
+def dump_json_in_pieces(value: object) -> str:
+    """Do the same without keeping the GIL for long: for a thread beside the event loop. Keys of dictionaries are strings."""
+    return "".join(_pieces(value))
+
+
+def _pieces(value: object) -> Iterator[str]:
+    """Yield the text of a value in parts."""
+    if isinstance(value, dict):
+        mark = "{"
+        for name, each in value.items():
+            yield f"{mark}{dump_json(name)}:"
+            yield from _pieces(each)
+            mark = ","
+        yield "}" if value else "{}"
+    elif isinstance(value, list):
+        yield "["
+        # The elements of a message's array have one type.
+        is_nested = bool(value) and isinstance(value[0], dict | list | str)
+        yield from _nested_elements(value) if is_nested else _numbers_of(value)
+        yield "]"
+    elif isinstance(value, str) and len(value) > _PIECE_CHARACTERS:
+        yield '"'
+        for at in range(0, len(value), _PIECE_CHARACTERS):
+            yield dump_json(value[at : at + _PIECE_CHARACTERS])[1:-1]
+        yield '"'
+    else:
+        yield dump_json(value)
+
+
+def _numbers_of(values: list[object]) -> Iterator[str]:
+    """Yield the texts of a list's elements, which are numbers or null, with the commas between them."""
+    for at in range(0, len(values), _PIECE_VALUES):
+        yield ("," if at else "") + dump_json(values[at : at + _PIECE_VALUES])[1:-1]
+
+
+def _nested_elements(values: list[object]) -> Iterator[str]:
+    """Do the same for dictionaries, lists and strings: many small ones become text in one call."""
+    mark, batch, size = "", list[object](), 0
+    for each in values:
+        of_each = _size(each)
+        if batch and size + of_each > _PIECE_VALUES:
+            yield mark + dump_json(batch)[1:-1]
+            mark, batch, size = ",", [], 0
+        if of_each > _PIECE_VALUES:
+            yield mark
+            yield from _pieces(each)
+            mark = ","
+        else:
+            batch.append(each)
+            size += of_each
+    if batch:
+        yield mark + dump_json(batch)[1:-1]
+
+
+def _size(value: object) -> int:
+    """Return how many numbers take about as long as a value; if it is large, not all of it is counted."""
+    if isinstance(value, str):
+        return 1 + len(value) * _PIECE_VALUES // _PIECE_CHARACTERS
+    if not isinstance(value, dict | list):
+        return 1
+    size = 1 + len(value)
+    for each in value.values() if isinstance(value, dict) else value:
+        if size > _PIECE_VALUES:
+            break
+        if isinstance(each, dict | list | str):
+            size += _size(each)
+    return size

@@ -31,7 +31,7 @@ from minirospy.base.name_filter import NameFilter
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.web.access import Access
 from minirospy.web.graph import Filters
-from minirospy.web.rosbridge import png, protocol
+from minirospy.web.rosbridge import endpoint, png, protocol
 from minirospy.web.rosbridge.endpoint import RosbridgeOptions
 from tests.waiting import until, wait_until
 
@@ -158,6 +158,70 @@ def test_no_client_waits_for_the_large_message_of_another(bridge: Running) -> No
         assert len(messages()[0].data) == 100_000
     assert "topic" in client.next("status", id="behind")["msg"]
     assert not any(each.unfinished for each in listener.connections)
+
+
+@pytest.mark.parametrize(
+    ("compression", "fragment_size"), [("none", None), ("none", 1000), ("png", None), ("cbor", None)]
+)
+def test_large_message_is_encoded_in_a_thread_while_others_are_served(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch, compression: str, fragment_size: int | None
+) -> None:
+    encode, names = endpoint._encoded, list[str]()
+    has_started, may_end = threading.Event(), threading.Event()
+
+    def slow(topic: str, *arguments: Any) -> bytes:
+        if topic == "/large":
+            names.append(threading.current_thread().name)
+            has_started.set()
+            may_end.wait(30)
+        return encode(topic, *arguments)
+
+    monkeypatch.setattr(endpoint, "_encoded", slow)
+    latched(bridge, "/large", String("a" * 100_000))
+    latched(bridge, "/small", String("b"))
+    fields = {"compression": compression, "fragment_size": fragment_size}
+    client, other = bridge.rosbridge(), bridge.rosbridge()
+    client.send(op="subscribe", topic="/large", **fields)
+    assert has_started.wait(30)
+    client.send(op="subscribe", topic="/small")
+    other.send(op="subscribe", topic="/small")
+    assert other.next("publish")["msg"] == {"data": "b"}
+    other.send(op="subscribe", topic="/large", **fields)
+    client.send(op="call_service", service="/none", id="answered")
+    assert client.next("service_response")["id"] == "answered"
+    may_end.set()
+
+    # The order of a client's messages is kept.
+    op = "fragment" if fragment_size else "png" if compression == "png" else "publish"
+    first = client.next(op)
+    assert client.next("publish")["topic"] == "/small"
+    if op == "publish":
+        assert first["msg"] == {"data": "a" * 100_000}
+    assert other.next(op)["op"] == op
+    assert set(names) == {"rosbridge-encode_0"}
+
+
+def test_client_may_leave_while_its_large_message_is_encoded(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    encode, has_started, may_end = endpoint._encoded, threading.Event(), threading.Event()
+
+    def slow(*arguments: Any) -> bytes:
+        has_started.set()
+        may_end.wait(30)
+        return encode(*arguments)
+
+    monkeypatch.setattr(endpoint, "_encoded", slow)
+    latched(bridge, "/large", String("a" * 100_000))
+    client = bridge.rosbridge()
+    client.send(op="subscribe", topic="/large")
+    assert has_started.wait(30)
+    client.close()
+    wait_until(lambda: not bridge.call(lambda: bridge.bridge.rosbridge.sessions))
+    may_end.set()
+    other = bridge.rosbridge()
+    other.send(op="subscribe", topic="/large")
+    assert other.next("publish")["msg"] == {"data": "a" * 100_000}
 
 
 def test_large_service_calls_and_answers_are_converted_in_a_thread(bridge: Running) -> None:
