@@ -255,6 +255,40 @@ def test_large_service_calls_and_answers_are_converted_in_a_thread(bridge: Runni
     assert all(name.startswith("rosbridge-large") for name in names)
 
 
+@pytest.mark.parametrize(("compression", "fragment_size"), [("none", None), ("none", 50_000), ("cbor", None)])
+def test_large_answer_of_a_service_is_encoded_in_a_thread(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch, compression: str, fragment_size: int | None
+) -> None:
+    encode, names = protocol.encode_messages, list[str]()
+
+    def noted(*arguments: Any) -> list[str | bytes]:
+        names.append(threading.current_thread().name)
+        return encode(*arguments)
+
+    monkeypatch.setattr(protocol, "encode_messages", noted)
+    node = bridge.node("server")
+
+    async def serve() -> None:
+        node.serve(
+            "/long", SetBool, lambda request: SetBoolResponse(True, "a" * (100_000 if request.data else 10))
+        )
+
+    bridge.run(serve())
+    client = bridge.rosbridge()
+    fields = {"compression": compression, "fragment_size": fragment_size}
+    wait_until(lambda: bridge.call(lambda: bridge.bridge.graph.service_info("/long") is not None))
+    client.send(op="call_service", service="/long", args=[False], id="short", **fields)
+    assert client.next("service_response", id="short")["values"]["message"] == "a" * 10
+    client.send(op="call_service", service="/long", args=[True], id="long", **fields)
+    if fragment_size:
+        parts = [client.next("fragment", id="long")["data"] for _ in range(3)]
+        answer = json.loads("".join(parts))
+    else:
+        answer = client.next("service_response", id="long")
+    assert answer["values"] == {"success": True, "message": "a" * 100_000}
+    assert [name.startswith("rosbridge-encode") for name in names] == [False, True]
+
+
 def test_client_without_rights_sends_nothing_large(run_bridge: Callable[..., Running]) -> None:
     access = Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
     bridge = run_bridge(access=access)

@@ -151,9 +151,9 @@ class RosbridgeEndpoint:
         return self._types.of(arrival.header)
 
     @staticmethod
-    def is_quick(arrival: Arrival, compression: str) -> bool:
+    def is_quick(body: bytes | memoryview, compression: str = "none") -> bool:
         """Return whether a message is encoded in a few milliseconds."""
-        return len(arrival.body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
+        return len(body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
 
     def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
         """Return a message as clients get it, encoded once for all of them. Raise BridgeError if it cannot be."""
