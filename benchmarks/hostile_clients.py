@@ -202,11 +202,14 @@ def _flood(port: int, request: bytes, count: int, end: float) -> None:
 
 async def serve() -> None:
     """Role: the dashboard with rosbridge; print its ports and the URI of its node, and run until standard input ends."""
+    from minirospy.runtime.master.heap import return_large_blocks
+
     from minirospy import Node
     from minirospy.web.access import Access
     from minirospy.web.bridge import BridgeOptions
     from minirospy.web.dashboard.dashboard import Dashboard
 
+    return_large_blocks(4 * 1024 * 1024)  # as `minirospy bridge` does
     access = Access(read_token=READ_TOKEN, write_token=WRITE_TOKEN)
     options = BridgeOptions(foxglove_port=0, rosbridge_port=0, access=access)
     async with Node("bench_dashboard", rosout=False) as node:

@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/rospy/Overview/Time.
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -28,6 +29,8 @@ __all__ = [
     "is_wallclock",
     "sleep",
 ]
+
+_log = logging.getLogger("rosout")
 
 _NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
 
@@ -175,7 +178,7 @@ class Timer(threading.Thread):
     """Calls ``callback(TimerEvent)`` every ``period`` (a Duration), or once with ``oneshot``, in its own thread.
 
     ``reset``: start again if simulated time jumps back; otherwise the timer stops with
-    ROSTimeMovedBackwardsException. An error of the callback stops it, too.
+    ROSTimeMovedBackwardsException. An error of the callback stops it, too; so does ``sys.exit()``, which is logged.
     """
 
     def __init__(
@@ -224,7 +227,12 @@ class Timer(threading.Thread):
 
                 real = get_rostime()
                 start = time.perf_counter()
-                self._callback(TimerEvent(last_expected, last_real, expected, real, last_duration))
+                try:
+                    self._callback(TimerEvent(last_expected, last_real, expected, real, last_duration))
+                except SystemExit as error:
+                    # threading reports every other error of a thread; rospy's timer ends without a word.
+                    _log.error("Timer ends: its callback %s called sys.exit(%s)", self._callback, error)
+                    return
                 if self._oneshot:
                     return
 

@@ -2,7 +2,7 @@
 
 The standard library's parser holds Python's global interpreter lock (GIL) until it has parsed the whole string, and so
 blocks all threads of the process. Large strings are parsed in pieces instead, by :func:`load_json_in_pieces` in a separate
-thread.
+thread; large values are encoded in pieces, by :func:`dump_json_in_pieces`.
 """
 
 from __future__ import annotations
@@ -10,11 +10,13 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from json.scanner import py_make_scanner  # type: ignore[attr-defined]
 
 __all__ = [
     "MAX_QUICK_CHARACTERS",
+    "dump_json",
+    "dump_json_in_pieces",
     "is_quick_text",
     "load_json",
     "load_json_in_pieces",
@@ -22,12 +24,16 @@ __all__ = [
     "width_of",
 ]
 
-_MAX_VALUES = 5_000_000  # for numbers: objects and strings of this number take some 300 MB
-_MAX_COLLECTIONS = 1_000_000
+_MAX_VALUES = 4_000_000  # in one JSON string; as numbers they take 160 MB
+_MAX_STRINGS = 2_000_000  # in one JSON string, names of fields included; they take 150 MB
+_MAX_COLLECTIONS = 1_000_000  # lists and objects in one JSON string; they take 100 to 240 MB
 MAX_QUICK_CHARACTERS = 64 * 1024  # in any string that is parsed immediately: 2 ms at most
 MAX_QUICK_STRINGS = 4 * 1024 * 1024  # characters in a string with few values, such as an image in base64
 MAX_QUICK_VALUES = 20_000
 _PIECE = 32 * 1024  # characters of numbers that are parsed in one call
+
+_PIECE_VALUES = 1000  # of a list that become text in one call: 1 ms for floats
+_PIECE_CHARACTERS = 64 * 1024  # of a string
 
 _SPACE = re.compile(r"[ \t\n\r]*")
 _MARKS = re.compile(r'[\[\]{}"]')
@@ -93,6 +99,8 @@ def _check_counts(text: str, max_values: int, max_collections: int) -> None:
     for marks, most in ((",", max_values), ("[{", max_collections)):
         if len(text) > most and sum(map(text.count, marks)) > most:
             raise ValueError(f"more than {most} values")
+    if len(text) > 2 * _MAX_STRINGS and text.count('"') > 2 * _MAX_STRINGS:
+        raise ValueError(f"more than {_MAX_STRINGS} strings")
 
 
 class _PiecewiseDecoder(json.JSONDecoder):
@@ -149,3 +157,80 @@ def _numbers(text: str, start: int, end: int) -> list[object]:
     if not found:
         raise json.JSONDecodeError("Expecting value", text, start)
     return found
+
+
+# --- values -> texts
+
+
+def dump_json(value: object) -> str:
+    """Return the compact text of a value. Raise ValueError for NaN and infinities."""
+    return json.dumps(value, separators=(",", ":"), allow_nan=False)
+
+
+def dump_json_in_pieces(value: object) -> str:
+    """Do the same without keeping the GIL for long: for a thread beside the event loop. Keys of dictionaries are strings."""
+    return "".join(_pieces(value))
+
+
+def _pieces(value: object) -> Iterator[str]:
+    """Yield the text of a value in parts."""
+    if isinstance(value, dict):
+        mark = "{"
+        for name, each in value.items():
+            yield f"{mark}{dump_json(name)}:"
+            yield from _pieces(each)
+            mark = ","
+        yield "}" if value else "{}"
+    elif isinstance(value, list):
+        yield "["
+        # The elements of a message's array have one type.
+        is_nested = bool(value) and isinstance(value[0], dict | list | str)
+        yield from _nested_elements(value) if is_nested else _numbers_of(value)
+        yield "]"
+    elif isinstance(value, str) and len(value) > _PIECE_CHARACTERS:
+        yield '"'
+        for at in range(0, len(value), _PIECE_CHARACTERS):
+            yield dump_json(value[at : at + _PIECE_CHARACTERS])[1:-1]
+        yield '"'
+    else:
+        yield dump_json(value)
+
+
+def _numbers_of(values: list[object]) -> Iterator[str]:
+    """Yield the texts of a list's elements, which are numbers or null, with the commas between them."""
+    for at in range(0, len(values), _PIECE_VALUES):
+        yield ("," if at else "") + dump_json(values[at : at + _PIECE_VALUES])[1:-1]
+
+
+def _nested_elements(values: list[object]) -> Iterator[str]:
+    """Do the same for dictionaries, lists and strings: many small ones become text in one call."""
+    mark, batch, size = "", list[object](), 0
+    for each in values:
+        of_each = _size(each)
+        if batch and size + of_each > _PIECE_VALUES:
+            yield mark + dump_json(batch)[1:-1]
+            mark, batch, size = ",", [], 0
+        if of_each > _PIECE_VALUES:
+            yield mark
+            yield from _pieces(each)
+            mark = ","
+        else:
+            batch.append(each)
+            size += of_each
+    if batch:
+        yield mark + dump_json(batch)[1:-1]
+
+
+def _size(value: object) -> int:
+    """Return how many numbers take about as long as a value; if it is large, not all of it is counted."""
+    if isinstance(value, str):
+        return 1 + len(value) * _PIECE_VALUES // _PIECE_CHARACTERS
+    if not isinstance(value, dict | list):
+        return 1
+    size = 1 + len(value)
+    for each in value.values() if isinstance(value, dict) else value:
+        if size > _PIECE_VALUES:
+            break
+        if isinstance(each, dict | list | str):
+            size += _size(each)
+    return size

@@ -14,18 +14,21 @@ from minirospy.base.errors import BuildError
 
 __all__ = ["Statement", "Word", "keyword_arguments", "parse_cmake"]
 
-_TOKEN = re.compile(
-    r"""
+_TOKEN_PATTERN = r"""
       (?P<blank>[\s;]+)
-    | (?P<comment>\#\[(?P<c>=*)\[.*?\](?P=c)\] | \#[^\n]*)
-    | \[(?P<b>=*)\[\n?(?P<bracket>.*?)\](?P=b)\]
+    | (?P<comment>%s \#[^\n]*)
+    | %s
     | "(?P<quoted>(?:[^"\\]|\\.)*)"
     | (?P<open>\()
     | (?P<close>\))
     | (?P<word>(?:[^\s()"\#;\\]|\\.)+)
-    """,
+"""
+_TOKEN = re.compile(
+    _TOKEN_PATTERN % (r"\#\[(?P<c>=*)\[.*?\](?P=c)\] |", r"\[(?P<b>=*)\[\n?(?P<bracket>.*?)\](?P=b)\]"),
     re.VERBOSE | re.DOTALL,
 )
+_TOKEN_WITHOUT_BRACKETS = re.compile(_TOKEN_PATTERN % ("", r"(?P<bracket>(?!))"), re.VERBOSE | re.DOTALL)
+_BRACKET = re.compile(r"\#?\[(=*)\[")
 _ENDS = {name: f"end{name}" for name in ("if", "foreach", "while", "macro", "function")}
 _OPENERS = {end: name for name, end in _ENDS.items()}
 
@@ -128,11 +131,25 @@ def _commands(text: str, where: str) -> Iterator[Statement]:
         raise BuildError(where, start, f"{name}( is not closed")
 
 
+def _is_closed(text: str, bracket: re.Match[str], unclosed: set[str]) -> bool:
+    """Return whether the bracket that opens here is closed later; if not, remember that in ``unclosed``.
+
+    Without that each of thousands of brackets that open would be a search to the end of the file.
+    """
+    level = bracket[1]
+    if level not in unclosed and text.find(f"]{level}]", bracket.end()) < 0:
+        unclosed.add(level)
+    return level not in unclosed
+
+
 def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
     """Yield each token and its line."""
     position, line = 0, 1
+    unclosed: set[str] = set()
     while position < len(text):
-        match = _TOKEN.match(text, position)
+        bracket = _BRACKET.match(text, position)
+        is_closed = bracket is None or _is_closed(text, bracket, unclosed)
+        match = (_TOKEN if is_closed else _TOKEN_WITHOUT_BRACKETS).match(text, position)
         if match is None:
             rest = text[position:].split("\n", maxsplit=1)[0].rstrip("\r")
             raise BuildError(where, line, f"a quote or bracket is not closed: {rest}")

@@ -95,3 +95,33 @@ while timer.is_alive():  # it may not have started
     timer.join(0.05)
 """
     assert run(program) == ["ROSTimeMovedBackwardsException ROS time moved backwards"]
+
+
+@pytest.mark.parametrize(
+    ("statement", "lines"),
+    [
+        ("sys.exit(3)", ["Timer ends: its callback <function callback> called sys.exit(3)"]),
+        ("raise ValueError('a fault')", ["ValueError: a fault"]),
+    ],
+)
+def test_error_of_a_callback_ends_its_timer_alone(statement: str, lines: list[str]) -> None:
+    program = f"""
+import logging, re, sys
+threading.excepthook = lambda args: print(f"{{args.exc_type.__name__}}: {{args.exc_value}}")
+rospy.init_node("case")
+class Handler(logging.Handler):
+    def emit(self, record):
+        print(re.sub(" at 0x[0-9a-f]+", "", record.getMessage()))
+log = logging.getLogger("rosout")
+log.handlers[:] = [Handler()]
+called = threading.Semaphore(0)
+other = rospy.Timer(rospy.Duration(0.01), lambda _: called.release())
+def callback(event):
+    {statement}
+timer = rospy.Timer(rospy.Duration(0.01), callback)
+timer.join(30)
+for _ in range(3):
+    called.acquire()
+print(timer.is_alive(), other.is_alive(), rospy.is_shutdown())
+"""
+    assert run(program) == [*lines, "False True False"]

@@ -169,6 +169,22 @@ def calls(attacked: Attacked) -> None:
             sock.sendall(data)
 
 
+def many_values(attacked: Attacked) -> None:
+    """Send texts that have as many values as are allowed, and one that has too many strings, at the same time."""
+    numbers = frame(b'{"op": "publish", "topic": "/x", "msg": {"a": [0' + b",1.5" * 3_990_000 + b"]}}")
+    strings = frame(b'{"op": "publish", "topic": "/x", "msg": {"a": [0' + b',"ab"' * 1_990_000 + b"]}}")
+    more = frame(b'{"op": "publish", "topic": "/x", "msg": {"a": [0' + b',"ab"' * 3_990_000 + b"]}}")
+    for data in (numbers, strings, more):
+
+        def send(data: bytes = data) -> None:
+            sock = attacked.rosbridge()
+            with contextlib.suppress(OSError):
+                sock.sendall(data)
+                sock.recv(1000)
+
+        attacked.side_by_side(16, send)
+
+
 def large_png(attacked: Attacked) -> None:
     """Publish a PNG of 500 kB with 13,000 x 13,000 pixels, and request it as a page."""
 
@@ -197,7 +213,7 @@ def large_png(attacked: Attacked) -> None:
 
 @pytest.mark.parametrize(
     "attack",
-    [meshes, fragments, half_messages, wide_texts, latched_messages, calls, large_png],
+    [meshes, fragments, half_messages, wide_texts, latched_messages, calls, many_values, large_png],
     ids=lambda each: str(each.__name__),
 )
 def test_memory_of_the_process_is_limited(attack: Callable[[Attacked], None], attacked: Attacked) -> None:

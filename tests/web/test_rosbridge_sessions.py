@@ -31,7 +31,7 @@ from minirospy.base.name_filter import NameFilter
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.web.access import Access
 from minirospy.web.graph import Filters
-from minirospy.web.rosbridge import png, protocol
+from minirospy.web.rosbridge import endpoint, png, protocol
 from minirospy.web.rosbridge.endpoint import RosbridgeOptions
 from tests.waiting import until, wait_until
 
@@ -160,6 +160,70 @@ def test_no_client_waits_for_the_large_message_of_another(bridge: Running) -> No
     assert not any(each.unfinished for each in listener.connections)
 
 
+@pytest.mark.parametrize(
+    ("compression", "fragment_size"), [("none", None), ("none", 1000), ("png", None), ("cbor", None)]
+)
+def test_large_message_is_encoded_in_a_thread_while_others_are_served(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch, compression: str, fragment_size: int | None
+) -> None:
+    encode, names = endpoint._encoded, list[str]()
+    has_started, may_end = threading.Event(), threading.Event()
+
+    def slow(topic: str, *arguments: Any) -> bytes:
+        if topic == "/large":
+            names.append(threading.current_thread().name)
+            has_started.set()
+            may_end.wait(30)
+        return encode(topic, *arguments)
+
+    monkeypatch.setattr(endpoint, "_encoded", slow)
+    latched(bridge, "/large", String("a" * 100_000))
+    latched(bridge, "/small", String("b"))
+    fields = {"compression": compression, "fragment_size": fragment_size}
+    client, other = bridge.rosbridge(), bridge.rosbridge()
+    client.send(op="subscribe", topic="/large", **fields)
+    assert has_started.wait(30)
+    client.send(op="subscribe", topic="/small")
+    other.send(op="subscribe", topic="/small")
+    assert other.next("publish")["msg"] == {"data": "b"}
+    other.send(op="subscribe", topic="/large", **fields)
+    client.send(op="call_service", service="/none", id="answered")
+    assert client.next("service_response")["id"] == "answered"
+    may_end.set()
+
+    # The order of a client's messages is kept.
+    op = "fragment" if fragment_size else "png" if compression == "png" else "publish"
+    first = client.next(op)
+    assert client.next("publish")["topic"] == "/small"
+    if op == "publish":
+        assert first["msg"] == {"data": "a" * 100_000}
+    assert other.next(op)["op"] == op
+    assert set(names) == {"rosbridge-encode_0"}
+
+
+def test_client_may_leave_while_its_large_message_is_encoded(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    encode, has_started, may_end = endpoint._encoded, threading.Event(), threading.Event()
+
+    def slow(*arguments: Any) -> bytes:
+        has_started.set()
+        may_end.wait(30)
+        return encode(*arguments)
+
+    monkeypatch.setattr(endpoint, "_encoded", slow)
+    latched(bridge, "/large", String("a" * 100_000))
+    client = bridge.rosbridge()
+    client.send(op="subscribe", topic="/large")
+    assert has_started.wait(30)
+    client.close()
+    wait_until(lambda: not bridge.call(lambda: bridge.bridge.rosbridge.sessions))
+    may_end.set()
+    other = bridge.rosbridge()
+    other.send(op="subscribe", topic="/large")
+    assert other.next("publish")["msg"] == {"data": "a" * 100_000}
+
+
 def test_large_service_calls_and_answers_are_converted_in_a_thread(bridge: Running) -> None:
     server, client = bridge.rosbridge(), bridge.rosbridge()
     server.send(op="advertise_service", service="/list", type="rosapi/Topics")
@@ -189,6 +253,40 @@ def test_large_service_calls_and_answers_are_converted_in_a_thread(bridge: Runni
     assert client.next("service_response", id="c")["values"]["topics"] == topics
     assert len(names) == 2
     assert all(name.startswith("rosbridge-large") for name in names)
+
+
+@pytest.mark.parametrize(("compression", "fragment_size"), [("none", None), ("none", 50_000), ("cbor", None)])
+def test_large_answer_of_a_service_is_encoded_in_a_thread(
+    bridge: Running, monkeypatch: pytest.MonkeyPatch, compression: str, fragment_size: int | None
+) -> None:
+    encode, names = protocol.encode_messages, list[str]()
+
+    def noted(*arguments: Any) -> list[str | bytes]:
+        names.append(threading.current_thread().name)
+        return encode(*arguments)
+
+    monkeypatch.setattr(protocol, "encode_messages", noted)
+    node = bridge.node("server")
+
+    async def serve() -> None:
+        node.serve(
+            "/long", SetBool, lambda request: SetBoolResponse(True, "a" * (100_000 if request.data else 10))
+        )
+
+    bridge.run(serve())
+    client = bridge.rosbridge()
+    fields = {"compression": compression, "fragment_size": fragment_size}
+    wait_until(lambda: bridge.call(lambda: bridge.bridge.graph.service_info("/long") is not None))
+    client.send(op="call_service", service="/long", args=[False], id="short", **fields)
+    assert client.next("service_response", id="short")["values"]["message"] == "a" * 10
+    client.send(op="call_service", service="/long", args=[True], id="long", **fields)
+    if fragment_size:
+        parts = [client.next("fragment", id="long")["data"] for _ in range(3)]
+        answer = json.loads("".join(parts))
+    else:
+        answer = client.next("service_response", id="long")
+    assert answer["values"] == {"success": True, "message": "a" * 100_000}
+    assert [name.startswith("rosbridge-encode") for name in names] == [False, True]
 
 
 def test_client_without_rights_sends_nothing_large(run_bridge: Callable[..., Running]) -> None:

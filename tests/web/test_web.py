@@ -692,6 +692,28 @@ def test_messages_that_wait_for_their_turn_are_in_the_account_of_memory() -> Non
     assert account.total == 0
 
 
+def test_work_is_held_while_the_last_of_it_goes_on_in_a_thread() -> None:
+    loop, connection, pipe = connected(Limits(), 0.0)
+    done: list[int] = []
+
+    def start(number: int) -> None:
+        done.append(number)
+        connection.hold_jobs(are_held=True)
+        connection.in_turn(partial(done.append, 2), b"2")
+
+    connection.in_turn(partial(start, 1), b"1")
+    connection.in_turn(partial(done.append, 3), b"3")
+    connection.received(EMPTY_FRAMES["pings"][:60])
+    for _ in range(3):
+        loop.iterate()
+    assert (done, loop.frames) == ([1], 10)
+    assert not loop.soon
+    connection.hold_jobs(are_held=False)
+    loop.iterate()
+    assert done == [1, 2, 3]
+    pipe.close.assert_not_called()
+
+
 def test_work_that_fails_ends_its_client_alone(caplog: pytest.LogCaptureFixture) -> None:
     loop, connection, _ = connected(Limits(), 0.0)
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.base.errors import BuildError
-from minirospy.workspace.cmake import keyword_arguments, parse_cmake
+from minirospy.workspace import cmake
+from minirospy.workspace.cmake import Word, keyword_arguments, parse_cmake
 
 
 def read(text: str) -> list[tuple[str, tuple[str, ...], int]]:
@@ -86,3 +88,26 @@ def test_errors_have_a_line(text: str, error: str) -> None:
 def test_any_text_is_read_or_refused(text: str) -> None:
     with contextlib.suppress(BuildError):
         read(text)
+
+
+def test_brackets_that_do_not_close_are_searched_for_once_a_level() -> None:
+    class Text(str):
+        searches = 0
+
+        def find(self, *arguments: Any) -> int:
+            Text.searches += 1
+            return super().find(*arguments)
+
+    text = Text("set(" + "[=[ [[ #[==[ \n" * 1000 + "]==] \n")
+    words = [match["word"] for match, _ in cmake._tokens(text, "CMakeLists.txt") if match["word"]]
+    assert words[:3] == ["set", "[=[", "[["]
+    # Every "[==[" is closed behind it all: the first one is a comment up to there.
+    assert len(words) == 3
+    assert Text.searches == 3
+
+    text = Text("set(" + "[=[ [[ #[==[ \n" * 1000 + ")")
+    (statement,) = parse_cmake(str(text), "CMakeLists.txt")
+    assert statement.words == (Word("[=["), Word("[[")) * 1000
+    Text.searches = 0
+    assert len(list(cmake._tokens(text, "CMakeLists.txt"))) == 6003
+    assert Text.searches == 3

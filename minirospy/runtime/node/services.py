@@ -247,7 +247,8 @@ class LoopServiceServer(ServiceServer):
     async def _respond_on_loop(self, sock: socket.socket, request: bytes, fields: Header) -> bytes:
         try:
             return serialize_response(await self._async_handler(request, fields))
-        except Exception as error:  # noqa: BLE001 - the edge to user code: the client waits for an answer
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - the edge to user code: the client waits for an answer
+            # asyncio would end the loop, and so all that the node does, with a task that raises SystemExit.
             return self._failure(error)
         except asyncio.CancelledError:
             # Either this task was cancelled or something that the handler awaited; only Python 3.11 could distinguish

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from minirospy.aio.tasks import ErrorReporter
 from minirospy.base.errors import BridgeError
+from minirospy.web.json_text import dump_json, dump_json_in_pieces
 from minirospy.web.rosbridge import conversion, protocol
 from minirospy.web.rosbridge.operation import REFUSALS, Work, check_name
 from minirospy.web.rosbridge.protocol import OperationError, StatusLevel
-from minirospy.web.rosbridge.services import ClientService, call
+from minirospy.web.rosbridge.services import ClientService, Response, call
 
 if TYPE_CHECKING:
     from minirospy.web.rosbridge.session import RosbridgeSession
@@ -65,18 +67,35 @@ class ClientServices:
             check_name("service", event.service)
             in_thread = self._session.endpoint.in_thread if is_large else None
             response = await call(self._session.graph, event.service, event.arguments, in_thread)
-            values: object = conversion.values(response)
-            result = True
+            messages = await self._encoded(event, response)
         except REFUSALS as error:
-            values, result = str(error), False
+            messages = self._failed(event, str(error))
             self._session.endpoint.log.warning(
                 "[Client %s] call_service %s: %s", self._session.client.name, event.service, error
             )
         except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
-            values, result = "the bridge failed on this call", False
+            messages = self._failed(event, "the bridge failed on this call")
             self._reporter.report(error)
-        fields = protocol.service_response(event.service, values, event.id, result=result)
-        self._session.send(fields, event.compression, event.fragment_size)
+        self._session.send_encoded(messages)
+
+    async def _encoded(self, event: protocol.CallService, response: Response) -> list[str | bytes]:
+        """Return the messages that carry a response; a large one is encoded in a thread."""
+        endpoint = self._session.endpoint
+        size = event.fragment_size or endpoint.options.fragment_size
+
+        def encode(dump: Callable[[object], str]) -> list[str | bytes]:
+            values = conversion.values(response.message())
+            fields = protocol.service_response(event.service, values, event.id, result=True)
+            return protocol.encode_messages(fields, event.compression, size, dump)
+
+        if endpoint.is_quick(response.data):
+            return encode(dump_json)
+        return await endpoint.encode(lambda: encode(dump_json_in_pieces))
+
+    def _failed(self, event: protocol.CallService, text: str) -> list[str | bytes]:
+        size = event.fragment_size or self._session.endpoint.options.fragment_size
+        fields = protocol.service_response(event.service, text, event.id, result=False)
+        return protocol.encode_messages(fields, event.compression, size)
 
     def advertise_service(self, event: protocol.AdvertiseService) -> Work | None:
         if not self._session.is_allowed(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import logging
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,6 +14,7 @@ from minirospy.core.idl.protocols import Message
 from minirospy.introspect.snapshot import Changes
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 from minirospy.web.graph import Arrival, Publication, SharedGraph
+from minirospy.web.json_text import dump_json, dump_json_in_pieces
 from minirospy.web.rosbridge import conversion, png
 from minirospy.web.rosbridge.cbor import encode_cbor
 from minirospy.web.rosbridge.services import ClientService
@@ -29,6 +29,8 @@ __all__ = ["RosbridgeEndpoint", "RosbridgeOptions"]
 _SUBPROTOCOL = "rosbridge_v2"
 _LOG_LINES = 20
 
+_MAX_QUICK_BODY = 64 * 1024  # bytes of a message that is encoded immediately: 8,000 numbers take 8 ms
+
 _T = TypeVar("_T")
 
 
@@ -40,6 +42,29 @@ class RosbridgeOptions:
     unregister_timeout: float = 10.0
     fragment_size: int | None = None
     authenticate: bool = False
+
+
+class _LargeWork:
+    """Runs work on large messages in one thread, one after another."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name  # of the thread
+        self._thread: ThreadPoolExecutor | None = None  # from the first work on
+        self._is_busy = asyncio.Lock()
+
+    async def __call__(self, work: Callable[[], _T]) -> _T:
+        """Return what some work returns."""
+        # Work that waits is not with the thread: the message of a client that leaves is freed immediately.
+        async with self._is_busy:
+            if self._thread is None:
+                self._thread = ThreadPoolExecutor(1, self._name)
+            return await asyncio.get_running_loop().run_in_executor(self._thread, work)
+
+    def close(self) -> None:
+        """End the thread, after the work that it does. Idempotent."""
+        if self._thread:
+            self._thread.shutdown(wait=False, cancel_futures=True)
+            self._thread = None
 
 
 class RosbridgeEndpoint:
@@ -60,8 +85,10 @@ class RosbridgeEndpoint:
         self._closing: dict[str, asyncio.Task[None]] = {}
         self.log = RateLimitedLogger(logging.getLogger(graph.node.log.name), _LOG_LINES)
 
-        self._thread: ThreadPoolExecutor | None = None
-        self._is_in_thread = asyncio.Lock()
+        self.in_thread = _LargeWork("rosbridge-large")
+        """Returns what some work on a large message from a client returns; clients wait for each other."""
+        self.encode = _LargeWork("rosbridge-encode")
+        """The same for large messages to clients."""
         self._types = ArrivingTypes()
         self._encoded: dict[str, tuple[Arrival, dict[str, bytes]]] = {}
         self._on_clients = on_clients
@@ -82,20 +109,11 @@ class RosbridgeEndpoint:
         return session
 
     def close(self) -> None:
-        """End the thread of large messages, after the one that it works on. Idempotent."""
-        if self._thread:
-            self._thread.shutdown(wait=False, cancel_futures=True)
-            self._thread = None
+        """End the threads, after the message that each works on. Idempotent."""
+        self.in_thread.close()
+        self.encode.close()
 
     # --- for sessions
-
-    async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """Return what some work on a large message returns; one thread does it for all clients, one after another."""
-        # What waits is not with the thread: the message of a client that leaves is freed immediately.
-        async with self._is_in_thread:
-            if self._thread is None:
-                self._thread = ThreadPoolExecutor(1, "rosbridge-large")
-            return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def left(self, session: RosbridgeSession) -> None:
         """Forget a client."""
@@ -132,22 +150,54 @@ class RosbridgeEndpoint:
         """Return the class of a message that came, None if nobody knows it."""
         return self._types.of(arrival.header)
 
+    @staticmethod
+    def is_quick(body: bytes | memoryview, compression: str = "none") -> bool:
+        """Return whether a message is encoded in a few milliseconds."""
+        return len(body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
+
     def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
         """Return a message as clients get it, encoded once for all of them. Raise BridgeError if it cannot be."""
+        found = self._encodings(topic, arrival)
+        made = found.get(compression)
+        if made is None:
+            made = found[compression] = _encoded(topic, class_, arrival, compression, dump_json)
+        return made
+
+    async def encoded_large(
+        self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str
+    ) -> bytes:
+        """Do the same in a thread, so that other clients do not wait; those that want this message wait for it."""
+        found = self._encodings(topic, arrival)
+
+        def encode() -> bytes:
+            # Another client may have waited for the same.
+            return found.get(compression) or _encoded(
+                topic, class_, arrival, compression, dump_json_in_pieces
+            )
+
+        if compression not in found:
+            found[compression] = await self.encode(encode)
+        return found[compression]
+
+    def _encodings(self, topic: str, arrival: Arrival) -> dict[str, bytes]:
+        """Return what is known of a message by its compression."""
         known = self._encoded.get(topic)
         if known is None or known[0] is not arrival:
             known = self._encoded[topic] = arrival, {}
-        made = known[1].get(compression)
-        if made is None:
-            made = known[1][compression] = _encoded(topic, class_, arrival, compression)
-        return made
+        return known[1]
 
 
 def _ignore(_: Changes) -> None:
     """Sessions look at the graph when they need it."""
 
 
-def _encoded(topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
+def _encoded(
+    topic: str,
+    class_: type[Message] | None,
+    arrival: Arrival,
+    compression: str,
+    dump: Callable[[object], str],
+) -> bytes:
     if compression == "cbor-raw":
         secs, nsecs = divmod(arrival.nanoseconds, 1_000_000_000)
         raw = {"secs": secs, "nsecs": nsecs, "bytes": bytes(arrival.body)}
@@ -157,9 +207,9 @@ def _encoded(topic: str, class_: type[Message] | None, arrival: Arrival, compres
     if compression == "cbor":
         return encode_cbor({"op": "publish", "topic": topic, "msg": conversion.cbor_values(message)})
     fields = {"op": "publish", "topic": topic, "msg": conversion.values(message)}
-    text = json.dumps(fields, separators=(",", ":"), allow_nan=False)
+    text = dump(fields)
     if compression == "png":
-        text = json.dumps({"op": "png", "data": png.encode(text)}, separators=(",", ":"))
+        text = dump({"op": "png", "data": png.encode(text)})
     return text.encode()
 
 

@@ -15,7 +15,13 @@ from enum import IntEnum
 from typing import Any
 
 from minirospy.base.errors import BridgeProtocolError
-from minirospy.web.json_text import MAX_QUICK_CHARACTERS, is_quick_text, load_json, load_json_in_pieces
+from minirospy.web.json_text import (
+    MAX_QUICK_CHARACTERS,
+    dump_json,
+    is_quick_text,
+    load_json,
+    load_json_in_pieces,
+)
 from minirospy.web.rosbridge import png
 from minirospy.web.rosbridge.cbor import decode_cbor, encode_cbor
 
@@ -39,6 +45,7 @@ __all__ = [
     "decode",
     "decode_in_pieces",
     "encode",
+    "encode_messages",
     "fragments",
     "is_quick",
     "parse",
@@ -450,14 +457,29 @@ OPERATIONS = (
 # --- out
 
 
-def encode(fields: Fields, compression: Compression = "none") -> str | bytes:
-    """Return a message as text, with CBOR as bytes."""
+def encode(
+    fields: Fields, compression: Compression = "none", dump: Callable[[object], str] = dump_json
+) -> str | bytes:
+    """Return a message as text, with CBOR as bytes; ``dump`` makes JSON of it."""
     if compression in ("cbor", "cbor-raw"):
         return encode_cbor(fields)
-    text = json.dumps(fields, separators=(",", ":"), allow_nan=False)
+    text = dump(fields)
     if compression == "png":
-        return json.dumps({"op": "png", "data": png.encode(text)}, separators=(",", ":"))
+        return dump({"op": "png", "data": png.encode(text)})
     return text
+
+
+def encode_messages(
+    fields: Fields,
+    compression: Compression,
+    fragment_size: int | None,
+    dump: Callable[[object], str] = dump_json,
+) -> list[str | bytes]:
+    """Return the messages that carry one: itself, or its fragments if it is a text and a size is given."""
+    data = encode(fields, compression, dump)
+    if isinstance(data, bytes) or not fragment_size:
+        return [data]
+    return [*fragments(data, fragment_size, fields.get("id"))]
 
 
 def fragments(text: str, size: int, id_: Id) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeVar
 
 from minirospy.aio.handle import serialized
 from minirospy.aio.raw import service_header
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from minirospy.aio.services import Service
     from minirospy.web.rosbridge.session import RosbridgeSession
 
-__all__ = ["ClientService", "InThread", "call"]
+__all__ = ["ClientService", "InThread", "Response", "call"]
 
 _T = TypeVar("_T")
 
@@ -30,9 +30,22 @@ class InThread(Protocol):
     async def __call__(self, work: Callable[[], _T]) -> _T: ...
 
 
+class Response(NamedTuple):
+    """A service's response as it came, and its class."""
+
+    message_class: type[Message]
+    data: bytes
+
+    def message(self) -> Message:
+        """Return it as a message. Raise what the class raises for bytes that do not fit."""
+        message = self.message_class()
+        message.deserialize(self.data)
+        return message
+
+
 async def call(
     graph: SharedGraph, name: str, arguments: object, in_thread: InThread | None = None
-) -> Message:
+) -> Response:
     """Return a service's response. Raise BridgeError, ServiceException, ROSSerializationException.
 
     ``in_thread`` runs the conversion of arguments that are large.
@@ -56,9 +69,7 @@ async def call(
         return serialized(request)
 
     data = await in_thread(body) if in_thread else body()
-    response = found._response_class()
-    response.deserialize(await graph.call(service, found._md5sum, data))
-    return response
+    return Response(found._response_class, await graph.call(service, found._md5sum, data))
 
 
 class ClientService:

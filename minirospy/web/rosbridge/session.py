@@ -9,7 +9,7 @@ import asyncio
 import logging
 import sys
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from minirospy.base.errors import BridgeError
@@ -113,18 +113,17 @@ class RosbridgeSession:
 
     # --- for services and topics
 
-    def send(
-        self, fields: Mapping[str, object], compression: str = "none", fragment_size: int | None = None
-    ) -> None:
+    def send(self, fields: Mapping[str, object]) -> None:
         """Send a message that is not one of a topic."""
-        data = protocol.encode(fields, compression)
-        if isinstance(data, bytes):
-            self.client.send_binary(data)
-            return
-        size = fragment_size or self.endpoint.options.fragment_size
-        id_ = fields.get("id")
-        for text in protocol.fragments(data, size, id_) if size else (data,):  # type: ignore[arg-type]
-            self.client.send_text(text)
+        self.send_encoded(protocol.encode_messages(fields, "none", self.endpoint.options.fragment_size))
+
+    def send_encoded(self, messages: Sequence[str | bytes]) -> None:
+        """Send messages that are JSON as text, or CBOR."""
+        for message in messages:
+            if isinstance(message, bytes):
+                self.client.send_binary(message)
+            else:
+                self.client.send_text(message)
 
     def status(self, level: StatusLevel, text: str, id_: object = None) -> None:
         """Send a status, where the client has asked for this level."""

@@ -6,6 +6,7 @@ import asyncio
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import BridgeError
+from minirospy.core.idl.protocols import Message
 from minirospy.web.graph import Arrival
 from minirospy.web.rosbridge import protocol
 from minirospy.web.rosbridge.protocol import StatusLevel
@@ -108,21 +109,51 @@ class ClientTopic:
         compression = self._merged.compression
         try:
             class_ = None if compression == "cbor-raw" else self._endpoint.class_of(arrival)
+            if not self._endpoint.is_quick(arrival.body, compression):
+                self._session.client.hold_work(is_held=True)
+                self._session.spawn(self._send_large(arrival, class_, self._merged))
+                return
             data = self._endpoint.encoded(self.name, class_, arrival, compression)
         except BridgeError as error:
-            if str(error) not in self._reported and len(self._reported) < 10:
-                self._reported.add(str(error))
-                self._session.status(StatusLevel.ERROR, f"subscribe: {error}")
+            self._report(error)
             return
+        size = self._fragment_size(self._merged, data)
+        self._queue(data, self._fragments(data, size, arrival) if size else None, self._merged)
 
-        client, newest_only = self._session.client, self._merged.queue_length == 1
-        size = self._merged.fragment_size or self._endpoint.options.fragment_size
-        if compression.startswith("cbor"):
-            client.send_message(self.name, b"", data, newest_only=newest_only)
-        elif size and len(data) > size:
-            id_ = f"publish:{self.name}:{arrival.nanoseconds}"
-            client.send_texts(
-                self.name, protocol.fragments(data.decode(), size, id_), newest_only=newest_only
+    async def _send_large(self, arrival: Arrival, class_: type[Message] | None, merged: Merged) -> None:
+        """Send a message that takes long to encode, while the session's other messages wait behind it."""
+        try:
+            data = await self._endpoint.encoded_large(self.name, class_, arrival, merged.compression)
+            size = self._fragment_size(merged, data)
+            texts = (
+                await self._endpoint.encode(lambda: self._fragments(data, size, arrival)) if size else None
             )
+            if not self._is_closed:
+                self._queue(data, texts, merged)
+        except BridgeError as error:
+            self._report(error)
+        finally:
+            self._session.client.hold_work(is_held=False)
+
+    def _fragment_size(self, merged: Merged, data: bytes) -> int | None:
+        """Return the characters of the fragments into which a message is cut; None if it is sent whole."""
+        size = merged.fragment_size or self._endpoint.options.fragment_size
+        is_cut = size and len(data) > size and not merged.compression.startswith("cbor")
+        return size if is_cut else None
+
+    def _fragments(self, data: bytes, size: int, arrival: Arrival) -> list[str]:
+        return protocol.fragments(data.decode(), size, f"publish:{self.name}:{arrival.nanoseconds}")
+
+    def _queue(self, data: bytes, texts: list[str] | None, merged: Merged) -> None:
+        client, newest_only = self._session.client, merged.queue_length == 1
+        if merged.compression.startswith("cbor"):
+            client.send_message(self.name, b"", data, newest_only=newest_only)
+        elif texts is not None:
+            client.send_texts(self.name, texts, newest_only=newest_only)
         else:
             client.send_text_message(self.name, data, newest_only=newest_only)
+
+    def _report(self, error: BridgeError) -> None:
+        if str(error) not in self._reported and len(self._reported) < 10:
+            self._reported.add(str(error))
+            self._session.status(StatusLevel.ERROR, f"subscribe: {error}")

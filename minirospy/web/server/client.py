@@ -215,6 +215,10 @@ class WebClient:
         """Do work that takes long for the client in its turn; it keeps ``message`` until then."""
         self._connection.in_turn(work, message)
 
+    def hold_work(self, *, is_held: bool) -> None:
+        """Stop or continue what :meth:`in_turn` was given, while the last work goes on in a thread: its order is kept."""
+        self._connection.hold_jobs(are_held=is_held)
+
     def pause(self) -> None:
         """Handle no more of what the client sends, until :meth:`resume`."""
         self._connection.hold(is_held=True)

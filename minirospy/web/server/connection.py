@@ -118,6 +118,7 @@ class Connection:
         self._is_held_back = False  # while the client has sent as many frames as it may in this second
         self._is_paused = False  # while the session works on an earlier message, see hold()
         self._worked_on = 0  # bytes of that message
+        self._are_jobs_held = False  # while a job goes on in a thread, see hold_jobs()
         self._held = 0  # bytes that the session holds for the client, see session_holds()
         self._is_in_turn = False  # while _work() runs
         # Calls _handshake_late at first, then what watches an open connection, then _abort for a closing one.
@@ -262,7 +263,7 @@ class Connection:
 
         The oldest work is dropped if more waits than may be sent.
         """
-        if self._is_in_turn:
+        if self._is_in_turn and not self._are_jobs_held:
             work()
             return
         if not self.is_open:
@@ -271,6 +272,12 @@ class Connection:
         self._site.turns.start(self._turn)
         if self._jobs:
             self._count()
+
+    def hold_jobs(self, *, are_held: bool) -> None:
+        """Stop or continue the work for the client, while the last of it goes on in a thread."""
+        self._are_jobs_held = are_held
+        if not are_held and self._jobs:
+            self._site.turns.start(self._turn)
 
     def session_holds(self, count: int) -> None:
         """Count the bytes that the session holds for the client."""
@@ -296,7 +303,7 @@ class Connection:
         return is_left
 
     def _do_some_jobs(self, end: float) -> bool:
-        while self._jobs and self.is_open:
+        while self._jobs and self.is_open and not self._are_jobs_held:
             work = self._jobs.pop()
             try:
                 work()
@@ -304,7 +311,7 @@ class Connection:
                 _log.exception("a message for %s could not be sent", self.peer)
                 self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on a message")
             if self._loop.time() >= end and self.is_open:
-                return bool(self._jobs or self._websocket.has_unread)
+                return bool((self._jobs and not self._are_jobs_held) or self._websocket.has_unread)
         return False
 
     def _handle_frames(self, end: float) -> bool:

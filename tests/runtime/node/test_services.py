@@ -46,7 +46,7 @@ EXITS: dict[bytes, tuple[BaseException, bytes]] = {
     b"generator": (GeneratorExit(), b"error processing request: GeneratorExit"),
     b"interrupt": (KeyboardInterrupt(), b"error processing request: KeyboardInterrupt"),
 }
-"""The same, of what is no Exception: in a coroutine it is asyncio's to decide."""
+"""The same for exceptions that are not an Exception; asyncio itself handles those of a coroutine, except SystemExit."""
 
 
 class Scene(NamedTuple):
@@ -180,6 +180,16 @@ def test_handler_that_raises_is_answered_and_served_on(scene: Scene, service: st
     with pytest.raises(CallFailed) as caught:
         client.call(request_)
     assert caught.value.text == FAULTS[request_][1]
+    assert client.call(b"abc") == b"cba"
+    client.close()
+
+
+@pytest.mark.parametrize("request_", [b"exit", b"exit without a status"])
+def test_coroutine_that_calls_exit_is_answered_and_its_loop_goes_on(scene: Scene, request_: bytes) -> None:
+    client = scene.client("/loop", persistent=True)
+    with pytest.raises(CallFailed) as caught:
+        client.call(request_)
+    assert caught.value.text == EXITS[request_][1]
     assert client.call(b"abc") == b"cba"
     client.close()
 
