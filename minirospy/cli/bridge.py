@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.command.parser import Misuse, Parser
-from minirospy.command.verbs import Command
+from minirospy.command.verbs import Command, with_options
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
@@ -16,6 +16,37 @@ if TYPE_CHECKING:
     from minirospy.web.tokens import Tokens
 
 __all__ = ["COMMAND", "main"]
+
+
+class BridgeArguments(NamedTuple):
+    """The command line of `minirospy bridge`."""
+
+    port: int | None
+    rosbridge_port: int | None
+    no_rosbridge: bool
+    listen: bool
+    address: str
+    token: str | None
+    read_token: str | None
+    show_tokens: bool
+    new_tokens: bool
+    read_only: bool
+    origin: Sequence[str]
+    host_name: Sequence[str]
+    topics: Sequence[str]
+    deny_topics: Sequence[str]
+    services: Sequence[str]
+    deny_services: Sequence[str]
+    params: Sequence[str]
+    deny_params: Sequence[str]
+    publish: Sequence[str]
+    cert: str
+    key: str
+    buffer: int
+    connections: int
+    name: str
+    status: bool
+    json: bool
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -148,53 +179,27 @@ def _parser() -> Parser:
     return parser
 
 
-def _bridge(
-    port: int | None,
-    rosbridge_port: int | None,
-    no_rosbridge: bool,
-    listen: bool,
-    address: str,
-    token: str | None,
-    read_token: str | None,
-    show_tokens: bool,
-    new_tokens: bool,
-    read_only: bool,
-    origin: Sequence[str],
-    host_name: Sequence[str],
-    topics: Sequence[str],
-    deny_topics: Sequence[str],
-    services: Sequence[str],
-    deny_services: Sequence[str],
-    params: Sequence[str],
-    deny_params: Sequence[str],
-    publish: Sequence[str],
-    cert: str,
-    key: str,
-    buffer: int,
-    connections: int,
-    name: str,
-    status: bool,
-    json: bool,
-) -> int:
+def _bridge(given: BridgeArguments) -> int:
     from minirospy.web.serve import require_libraries
 
-    token = _given_token("token", token, "MINIROSPY_BRIDGE_TOKEN")
-    read_token = _given_token("read-token", read_token, "MINIROSPY_BRIDGE_READ_TOKEN")
-    if status:
-        return _show_status(port, rosbridge_port, token, as_json=json)
-    port = 8765 if port is None else port
+    token = _given_token("token", given.token, "MINIROSPY_BRIDGE_TOKEN")
+    read_token = _given_token("read-token", given.read_token, "MINIROSPY_BRIDGE_READ_TOKEN")
+    if given.status:
+        return _show_status(given.port, given.rosbridge_port, token, as_json=given.json)
+    port = 8765 if given.port is None else given.port
     _check_range("port", port, 0, 65535)
+    rosbridge_port = given.rosbridge_port
     if rosbridge_port is None:
         rosbridge_port = 9090 if port else 0
     _check_range("rosbridge-port", rosbridge_port, 0, 65535)
-    if show_tokens:
-        kept = _tokens("", "", beyond=True, renews=new_tokens)
+    if given.show_tokens:
+        kept = _tokens("", "", beyond=True, renews=given.new_tokens)
         print(f"read-write: {kept.write}\nread-only: {kept.read}")
         return 0
-    if json:
+    if given.json:
         raise Misuse("--json is for --status")
-    _check_range("buffer", buffer, 1, 1 << 40)
-    _check_range("connections", connections, 1, 100_000)
+    _check_range("buffer", given.buffer, 1, 1 << 40)
+    _check_range("connections", given.connections, 1, 100_000)
     require_libraries()
 
     from minirospy.base.name_filter import NameFilter
@@ -206,40 +211,40 @@ def _bridge(
     from minirospy.web.serve import run
     from minirospy.web.server.connection import Limits
 
-    address = address or ("0.0.0.0" if listen else "127.0.0.1")
-    if not is_loopback(address) and not listen:
+    address = given.address or ("0.0.0.0" if given.listen else "127.0.0.1")
+    if not is_loopback(address) and not given.listen:
         raise Misuse(f"--address {address} lets other machines connect: add --listen")
-    tokens = _tokens(token, read_token, beyond=listen, renews=new_tokens)
+    tokens = _tokens(token, read_token, beyond=given.listen, renews=given.new_tokens)
     options = BridgeOptions(
         address=address,
         foxglove_port=port,
-        rosbridge_port=None if no_rosbridge else rosbridge_port,
-        rosapi=not no_rosbridge,
-        transforms=not no_rosbridge,
+        rosbridge_port=None if given.no_rosbridge else rosbridge_port,
+        rosapi=not given.no_rosbridge,
+        transforms=not given.no_rosbridge,
         access=Access(
-            hosts=(*host_name, *host_names()),
-            origins=tuple(origin),
+            hosts=(*given.host_name, *host_names()),
+            origins=tuple(given.origin),
             read_token=tokens.read,
-            write_token="" if read_only else tokens.write,
-            requires_token=listen or bool(token or read_token),
-            default_is_read=read_only,
+            write_token="" if given.read_only else tokens.write,
+            requires_token=given.listen or bool(token or read_token),
+            default_is_read=given.read_only,
         ),
-        limits=Limits(queue=buffer, connections=connections),
+        limits=Limits(queue=given.buffer, connections=given.connections),
         filters=Filters(
-            topics=NameFilter.of(topics, deny_topics),
-            publishable=NameFilter.of(publish, deny_topics),
-            services=NameFilter.of(services, deny_services),
-            parameters=NameFilter.of(params, deny_params),
+            topics=NameFilter.of(given.topics, given.deny_topics),
+            publishable=NameFilter.of(given.publish, given.deny_topics),
+            services=NameFilter.of(given.services, given.deny_services),
+            parameters=NameFilter.of(given.params, given.deny_params),
         ),
         capabilities=CAPABILITIES,
-        certificate=cert,
-        key=key,
+        certificate=given.cert,
+        key=given.key,
     )
 
     async def start(node: Node) -> Bridge:
         return Bridge(node, options)
 
-    return run(name, (), start, lambda bridge: _announce(bridge, options, tokens))
+    return run(given.name, (), start, lambda bridge: _announce(bridge, options, tokens))
 
 
 def _show_status(port: int | None, rosbridge_port: int | None, token: str, *, as_json: bool) -> int:
@@ -313,4 +318,4 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
     sys.stdout.flush()
 
 
-COMMAND = Command("minirospy bridge", _parser, _bridge)
+COMMAND = Command("minirospy bridge", _parser, with_options(BridgeArguments, _bridge))

@@ -1,16 +1,18 @@
 """Commands, each a parser and a typed function, and families of such verbs under one name.
 
 The function's parameters have the names of the parser's arguments: `Command.run` passes them by name. So the parser is
-available without running the command, and the function can be called without a command line.
+available without running the command, and the function can be called without a command line. A function with many arguments
+takes one record of them: see :func:`with_options`.
 """
 
 from __future__ import annotations
 
+import functools
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from minirospy.base.errors import MinirospyError, UsageError
 from minirospy.base.names import parse_arguments
@@ -18,7 +20,9 @@ from minirospy.base.suggestions import did_you_mean
 from minirospy.command.command import NO_MASTER, WordedError, Wording, complain, ros_words, run
 from minirospy.command.parser import CommandLineError, Misuse, Parser
 
-__all__ = ["Command", "Family", "HelpStatus", "Verb", "deferred_verb"]
+__all__ = ["Command", "Family", "HelpStatus", "Verb", "deferred_verb", "with_options"]
+
+_Options = TypeVar("_Options")
 
 
 class Command(NamedTuple):
@@ -67,6 +71,22 @@ def deferred_verb(name: str, summary: str, module: str, attribute: str = "VERB")
         return found
 
     return Verb(name, summary, lambda: verb().parser(), lambda **arguments: verb().body(**arguments))
+
+
+def with_options(
+    options: Callable[..., _Options], body: Callable[[_Options], int | None]
+) -> Callable[..., int | None]:
+    """Return a function that takes a parser's arguments by name and calls ``body`` with a record of them.
+
+    ``options`` is the record's class, whose fields have the names of the parser's arguments: a NamedTuple, since importing
+    dataclasses takes longer than a command does.
+    """
+
+    @functools.wraps(options)  # so that inspect.signature lists the fields
+    def call(**arguments: object) -> int | None:
+        return body(options(**arguments))
+
+    return call
 
 
 class HelpStatus(NamedTuple):

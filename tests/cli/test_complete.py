@@ -171,6 +171,16 @@ def test_function_takes_what_its_parser_parses(typed: str, leaf: Command | Verb)
     assert taken - names <= {"arguments", "args", "variables", "cmake_words"}
 
 
+def test_functions_with_many_arguments_take_a_record() -> None:
+    for typed in ("roslaunch", "rosbag play", "rosbag record", "minirospy bridge"):
+        body = dict(LEAVES)[typed].body
+        parameters = inspect.signature(body).parameters.values()
+        assert len(parameters) > 20
+        assert {parameter.kind for parameter in parameters} == {inspect.Parameter.POSITIONAL_OR_KEYWORD}, (
+            typed
+        )
+
+
 @pytest.mark.parametrize(("typed", "leaf"), LEAVES, ids=[typed for typed, _ in LEAVES])
 def test_every_verb_and_option_is_completed(typed: str, leaf: Command | Verb) -> None:
     """A new argument that takes a value names its completer, or `nothing`."""

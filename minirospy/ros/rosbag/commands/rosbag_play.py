@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.base.errors import ROSInterruptException, UsageError
 from minirospy.command.parser import Misuse, Parser
-from minirospy.command.verbs import Command, Verb
+from minirospy.command.verbs import Command, Verb, with_options
 
 if TYPE_CHECKING:
     from minirospy.ros.rosbag.recording.schedule import PlayOptions
@@ -21,6 +21,35 @@ __all__ = ["COMMAND", "VERB", "main"]
 _MAX_RATE = 1e6
 _MAX_HZ = 1e4
 _FOREVER = 1e12
+
+
+class PlayArguments(NamedTuple):
+    """The command line of rosbag play."""
+
+    bagfiles: list[str]
+    prefix: str
+    quiet: bool
+    immediate: bool
+    pause: bool
+    queue: int
+    clock: bool
+    hz: float
+    delay: float
+    rate: float
+    start: float
+    duration: float
+    skip_empty: float | None
+    loop: bool
+    keep_alive: bool
+    try_future_version: bool
+    topics: list[str]
+    pause_topics: list[str]
+    bags: list[str]
+    wait_for_subscribers: bool
+    rate_control_topic: str
+    rate_control_max_delay: float
+    foxglove: bool
+    foxglove_port: int
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -84,67 +113,42 @@ def _parser() -> Parser:
     return parser
 
 
-def _play(
-    bagfiles: list[str],
-    prefix: str,
-    quiet: bool,
-    immediate: bool,
-    pause: bool,
-    queue: int,
-    clock: bool,
-    hz: float,
-    delay: float,
-    rate: float,
-    start: float,
-    duration: float,
-    skip_empty: float | None,
-    loop: bool,
-    keep_alive: bool,
-    try_future_version: bool,
-    topics: list[str],
-    pause_topics: list[str],
-    bags: list[str],
-    wait_for_subscribers: bool,
-    rate_control_topic: str,
-    rate_control_max_delay: float,
-    foxglove: bool,
-    foxglove_port: int,
-) -> int:
+def _play(given: PlayArguments) -> int:
     from minirospy.base.names import parse_arguments
     from minirospy.ros.rosbag.recording.schedule import PlayOptions
 
-    paths = parse_arguments([*bagfiles, *bags]).plain
+    paths = parse_arguments([*given.bagfiles, *given.bags]).plain
     if not paths:
         text = "You must specify at least 1 bag file to play back."
         raise Misuse(text, text)
-    for name, value, most in (("--rate", rate, _MAX_RATE), ("--hz", hz, _MAX_HZ)):
+    for name, value, most in (("--rate", given.rate, _MAX_RATE), ("--hz", given.hz, _MAX_HZ)):
         if not 1 / _MAX_RATE <= value <= most:
             raise UsageError(f"{name} must be above 0, and at most {most:g}")
 
     options = PlayOptions(
-        prefix=prefix,
-        immediate=immediate,
-        paused=pause,
-        queue_size=max(0, queue),
-        clock=clock,
-        clock_hz=hz,
-        delay=_nanoseconds("--delay", delay),
-        rate=rate,
-        start=_nanoseconds("--start", start),
-        duration=_nanoseconds("--duration", duration),
-        skip_empty=None if skip_empty is None else _nanoseconds("--skip-empty", skip_empty),
-        loop=loop,
-        keep_alive=keep_alive,
-        topics=frozenset(parse_arguments(topics).plain),
-        pause_topics=frozenset(parse_arguments(pause_topics).plain),
-        wait_for_subscribers=wait_for_subscribers,
-        rate_control_topic=rate_control_topic,
-        rate_control_max_delay=_nanoseconds("--rate-control-max-delay", rate_control_max_delay),
-        quiet=quiet,
+        prefix=given.prefix,
+        immediate=given.immediate,
+        paused=given.pause,
+        queue_size=max(0, given.queue),
+        clock=given.clock,
+        clock_hz=given.hz,
+        delay=_nanoseconds("--delay", given.delay),
+        rate=given.rate,
+        start=_nanoseconds("--start", given.start),
+        duration=_nanoseconds("--duration", given.duration),
+        skip_empty=None if given.skip_empty is None else _nanoseconds("--skip-empty", given.skip_empty),
+        loop=given.loop,
+        keep_alive=given.keep_alive,
+        topics=frozenset(parse_arguments(given.topics).plain),
+        pause_topics=frozenset(parse_arguments(given.pause_topics).plain),
+        wait_for_subscribers=given.wait_for_subscribers,
+        rate_control_topic=given.rate_control_topic,
+        rate_control_max_delay=_nanoseconds("--rate-control-max-delay", given.rate_control_max_delay),
+        quiet=given.quiet,
     )
-    if not 0 <= foxglove_port < 65536:
-        raise UsageError(f"--foxglove-port {foxglove_port} is not between 0 and 65535")
-    return _run(paths, options, foxglove_port if foxglove else None)
+    if not 0 <= given.foxglove_port < 65536:
+        raise UsageError(f"--foxglove-port {given.foxglove_port} is not between 0 and 65535")
+    return _run(paths, options, given.foxglove_port if given.foxglove else None)
 
 
 def _nanoseconds(name: str, seconds: float) -> int:
@@ -192,6 +196,6 @@ VERB = Verb(
     "rosbag play",
     "Play back the contents of one or more bag files in a time-synchronized fashion.",
     _parser,
-    _play,
+    with_options(PlayArguments, _play),
 )
-COMMAND = Command("play", _parser, _play)
+COMMAND = Command("play", _parser, with_options(PlayArguments, _play))

@@ -7,16 +7,46 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.base.errors import BagCompressionError, ROSInterruptException, UsageError
 from minirospy.command.parser import Misuse, Parser, attach_completer
-from minirospy.command.verbs import Command, Verb
+from minirospy.command.verbs import Command, Verb, with_options
 
 if TYPE_CHECKING:
     from minirospy.ros.rosbag.recording.options import RecordOptions
 
 __all__ = ["COMMAND", "VERB", "main", "without_split_size"]
+
+
+class RecordArguments(NamedTuple):
+    """The command line of rosbag record."""
+
+    topics: list[str]
+    all: bool
+    regex: bool
+    publish: bool
+    exclude: str
+    quiet: bool
+    output_prefix: str
+    output_name: str
+    split: bool
+    max_splits: int
+    size: int | None
+    duration: str
+    buffsize: int
+    chunksize: int | None
+    limit: int
+    node: str
+    bz2: bool
+    lz4: bool
+    tcpnodelay: bool
+    udp: bool
+    repeat_latched: bool
+    min_space: str
+    topic: list[str]
+    mcap: bool
+    zstd: bool
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -105,91 +135,66 @@ def _parser() -> Parser:
     return parser
 
 
-def _record_verb(output_prefix: str, output_name: str, **others: Any) -> int:
+def _record_verb(given: RecordArguments) -> int:
     # `rosrun rosbag record` accepts both options, and the name takes precedence.
-    if output_prefix and output_name:
+    if given.output_prefix and given.output_name:
         text = "Can't set both prefix and name."
         raise Misuse(text, text)
-    return _record(output_prefix=output_prefix, output_name=output_name, **others)
+    return _record(given)
 
 
-def _record(
-    topics: list[str],
-    all: bool,
-    regex: bool,
-    publish: bool,
-    exclude: str,
-    quiet: bool,
-    output_prefix: str,
-    output_name: str,
-    split: bool,
-    max_splits: int,
-    size: int | None,
-    duration: str,
-    buffsize: int,
-    chunksize: int | None,
-    limit: int,
-    node: str,
-    bz2: bool,
-    lz4: bool,
-    tcpnodelay: bool,
-    udp: bool,
-    repeat_latched: bool,
-    min_space: str,
-    topic: list[str],
-    mcap: bool,
-    zstd: bool,
-) -> int:
+def _record(given: RecordArguments) -> int:
     from minirospy.base.names import is_legal_name, parse_arguments
     from minirospy.ros.rosbag.recording.options import MEGABYTE, RecordOptions, parse_duration, parse_size
 
-    names = (*parse_arguments(topics).plain, *topic)
-    if not names and not all and not node:
+    names = (*parse_arguments(given.topics).plain, *given.topic)
+    if not names and not given.all and not given.node:
         text = "You must specify a topic name or else use the '-a' option."
         raise Misuse(text, text)
-    if split and not duration and not size:
+    if given.split and not given.duration and not given.size:
         text = "Split specified without giving a maximum duration or size"
         raise Misuse(text, text)
     for name in names:
-        if not regex and not is_legal_name(name):
+        if not given.regex and not is_legal_name(name):
             raise UsageError(f"{name!r} is not a legal name of a topic: letters, digits, _ and /")
-    _check_range("Buffer size", buffsize)
+    _check_range("Buffer size", given.buffsize)
+    chunksize = given.chunksize
     if chunksize is not None:
         _check_range("Chunk size", chunksize)
-    elif mcap:
+    elif given.mcap:
         chunksize = 4096
     else:
         chunksize = 768
-    if size is not None and size < 0:
+    if given.size is not None and given.size < 0:
         raise UsageError("Split size must be 0 or positive")
-    if limit > 0 and not names:
+    if given.limit > 0 and not names:
         raise UsageError("Specifying a count is not valid with automatic topic subscription.")
 
     return _run(
         RecordOptions(
             topics=names,
-            all_topics=all,
-            regex=regex,
-            exclude=exclude,
-            node=node,
-            prefix=output_name or output_prefix,
-            append_date=not output_name,
-            split=split,
-            max_splits=max(0, max_splits) if split else 0,
-            max_size=(size or 0) * MEGABYTE,
-            max_duration=parse_duration(duration) if duration else 0,
-            buffer_size=buffsize * MEGABYTE,
+            all_topics=given.all,
+            regex=given.regex,
+            exclude=given.exclude,
+            node=given.node,
+            prefix=given.output_name or given.output_prefix,
+            append_date=not given.output_name,
+            split=given.split,
+            max_splits=max(0, given.max_splits) if given.split else 0,
+            max_size=(given.size or 0) * MEGABYTE,
+            max_duration=parse_duration(given.duration) if given.duration else 0,
+            buffer_size=given.buffsize * MEGABYTE,
             chunk_size=chunksize * 1024,
-            limit=max(0, limit),
-            min_space=parse_size(min_space),
-            min_space_text=min_space,
-            compression=_compression(bz2, lz4, zstd, mcap),
-            tcp_nodelay=tcpnodelay,
-            repeat_latched=repeat_latched,
-            publish=publish,
-            mcap=mcap,
+            limit=max(0, given.limit),
+            min_space=parse_size(given.min_space),
+            min_space_text=given.min_space,
+            compression=_compression(given.bz2, given.lz4, given.zstd, given.mcap),
+            tcp_nodelay=given.tcpnodelay,
+            repeat_latched=given.repeat_latched,
+            publish=given.publish,
+            mcap=given.mcap,
         ),
-        quiet=quiet,
+        quiet=given.quiet,
     )
 
 
@@ -229,6 +234,9 @@ def _check_range(what: str, value: int) -> None:
 
 
 VERB = Verb(
-    "rosbag record", "Record a bag file with the contents of specified topics.", _parser, _record_verb
+    "rosbag record",
+    "Record a bag file with the contents of specified topics.",
+    _parser,
+    with_options(RecordArguments, _record_verb),
 )
-COMMAND = Command("record", _parser, _record)
+COMMAND = Command("record", _parser, with_options(RecordArguments, _record))

@@ -7,14 +7,14 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.base import private_files
 from minirospy.base.environment import Environment
 from minirospy.base.errors import LaunchError, MinirospyError, NotFoundError, UsageError
 from minirospy.command.command import RosText, WordedError, warn
 from minirospy.command.parser import AssignmentParser, Misuse, Parser
-from minirospy.command.verbs import Command
+from minirospy.command.verbs import Command, with_options
 from minirospy.ros.roslaunch.launcher.arg_docs import resolved_arg_docs
 from minirospy.ros.roslaunch.launcher.command import shell_line
 from minirospy.ros.roslaunch.launcher.files import LaunchFileNotFoundError, find_files
@@ -74,9 +74,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     return COMMAND.main(argv)
 
 
-def _roslaunch(**words: Any) -> int:
+def _roslaunch(options: LaunchOptions) -> int:
     try:
-        return _launch(LaunchOptions(**words))
+        return _launch(options)
     except LaunchFileNotFoundError as error:
         raise WordedError(error, RosText(f"RLException: {error.ros_text}")) from error
     except LaunchError as error:
@@ -381,7 +381,7 @@ _SHOWS: dict[str, Callable[[LaunchSpec, str, Packages], None]] = {
 }
 """If several of these options are given, the first one in this table applies."""
 
-COMMAND = Command("roslaunch", _parser, _roslaunch)
+COMMAND = Command("roslaunch", _parser, with_options(LaunchOptions, _roslaunch))
 
 
 if __name__ == "__main__":
