@@ -99,7 +99,8 @@ class Peer:
     def in_executor(self, work):
         """Run a function in the executor's thread and return its result.
 
-        Entities for which the executor waits are not added or removed meanwhile: rclpy shows an action to the executor before it is complete, and destroys it while the executor uses it.
+        Entities for which the executor waits are not added or removed meanwhile:
+        rclpy shows an action to the executor before it is complete, and destroys it while the executor uses it.
         """
         done = concurrent.futures.Future()
 
