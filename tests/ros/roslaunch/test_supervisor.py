@@ -48,7 +48,7 @@ class Clock:
 
 
 class Events(queue.SimpleQueue):  # type: ignore[type-arg]
-    """A queue whose timeouts expire at once on the test's clock; it blocks while no node is to be respawned."""
+    """A queue whose timeouts expire immediately on the test's clock; it blocks while no node is to be respawned."""
 
     def __init__(self, clock: Clock, supervisor: Supervisor) -> None:
         self.clock = clock
