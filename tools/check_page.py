@@ -2,8 +2,8 @@
 
     python tools/check_page.py
 
-The checkers come from npm into ``tools/page/node_modules``, in the versions of ``tools/page/package-lock.json``. Without a
-node that they run on, or if npm cannot install them outside of CI, one line says that the page is not checked. Exit status
+npm installs the checkers in ``tools/page/node_modules``, in the versions of ``tools/page/package-lock.json``. Without a
+suitable node, or if npm cannot install them outside of CI, one line reports that the page is not checked. The exit status is
 0, or that of the first check that fails.
 """
 
@@ -39,7 +39,7 @@ CHECKS = (
 
 
 def find_node() -> str | None:
-    """Return the path of a node on which the checkers run; None if there is none."""
+    """Return the path of a node that can run the checkers; None if there is none."""
     node = shutil.which("node")
     if node is None:
         return None
@@ -49,7 +49,7 @@ def find_node() -> str | None:
 
 
 def install() -> bool:
-    """Install the checkers if they are missing or of other versions; return whether they are installed."""
+    """Install the checkers if they are missing or outdated; return whether they are installed."""
     lock, installed = TOOLS / "package-lock.json", MODULES / ".package-lock.json"
     if installed.exists() and installed.stat().st_mtime >= lock.stat().st_mtime:
         return True

@@ -1,6 +1,6 @@
-"""`python tools/commands.py`: write the lists of commands that are not Python, from the registry of commands.
+"""`python tools/commands.py`: write the non-Python lists of commands from the registry of commands.
 
-They are the words that bash, zsh, fish and PowerShell complete, and the entry points of the conda recipe. ``--check`` writes
+They are the completion words of bash, zsh, fish and PowerShell, and the entry points of the conda recipe. ``--check`` writes
 nothing, and exits with 1 if a list is out of date; a test does that, too.
 """
 
@@ -56,11 +56,11 @@ LISTS: dict[str, tuple[str, Callable[[], str]]] = {
     "minirospy/workspace/shell/ros.ps1": (r"(?<=\n\$_ros_commands = @\(\n).*?(?=\n\))", _powershell),
     "packaging/conda/meta.yaml": (r"(?<=\n  entry_points:\n).*?(?=\n\nrequirements:)", _recipe),
 }
-"""File -> the place of its list, and the list."""
+"""File -> the position of its list, and the list."""
 
 
 def outdated(*, write: bool = False) -> list[str]:
-    """Return the files whose list is not that of the registry; ``write``: and mend them."""
+    """Return the files whose list differs from the registry; with ``write``, also correct them."""
     found = []
     for name, (place, make) in LISTS.items():
         file = ROOT / name

@@ -1,8 +1,10 @@
-"""The fast tests on every Python from 3.10 on that is found: `make pythons`, or `python tools/pythons.py [-- ARGUMENT ...]`.
+"""Run the fast tests on every Python from 3.10 on: `make pythons`, or `python tools/pythons.py [-- ARGUMENT ...]`.
 
-Each gets an environment in build/pythons, and runs the tests with `-X dev`: a socket or file that is not closed fails its test.
-Versions as arguments (`python tools/pythons.py 3.10 3.14t`, or `oldest newest`) choose some; a path of an interpreter is taken as
-it is. What stands behind `--` goes to pytest. Exit status: 1 where a test failed on one of them.
+Each gets an environment in build/pythons, and runs the tests with `-X dev`: a socket or file that is not closed fails its
+test.
+Versions as arguments (`python tools/pythons.py 3.10 3.14t`, or `oldest newest`) choose some; a path of an interpreter is
+used as
+it is. Arguments after `--` are passed to pytest. The exit status is 1 if a test failed on one of them.
 """
 
 from __future__ import annotations
@@ -50,7 +52,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def choose(words: Sequence[str], found: Sequence[str]) -> list[str]:
-    """Return the versions that words choose of those found, which are in order. Raise LookupError."""
+    """Return the versions that ``words`` select from those found, which are sorted. Raise LookupError."""
     with_gil = [name for name in found if not name.endswith("t")] or list(found)
     names = {{"oldest": with_gil[0], "newest": with_gil[-1]}.get(word, word) for word in words}
     if missing := names - set(found):
@@ -65,7 +67,7 @@ def _version(python: str) -> str:
 
 
 def _environment(python: str, label: str) -> Path:
-    """Return the interpreter of an environment with this checkout and what its tests need; it is made once."""
+    """Return the interpreter of an environment with this checkout and its test dependencies; create it once."""
     folder = FOLDER / label
     inner = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     stamp = folder / ".installed"

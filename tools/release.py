@@ -1,8 +1,8 @@
-"""Builds and checks what is released: `make release`. Out come sdist, wheel and SBOM in `dist/`; nothing is uploaded.
+"""Build and check a release: `make release`. It writes sdist, wheel and SBOM to `dist/`; nothing is uploaded.
 
-Both are built from the files of the last commit, twice, and have to be the same bytes. Then `twine check`, the wheel's size and
-contents, and `minirospy demo` in a new environment of every Python from 3.10 on that is on the path or of pyenv.
-Exit status: 1 where anything is wrong, each fault on one line.
+sdist and wheel are built from the files of the last commit, twice, and must be byte-identical. Then follow `twine check`, the
+wheel's size and contents, and `minirospy demo` in a new environment of every Python from 3.10 on that is on PATH or in pyenv.
+The exit status is 1 if anything is wrong, with each fault on one line.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ _INCLUDED = {
     "minirospy/share/rpi_feros/": "rpi_feros/",
     "minirospy/share/launch/": "launch/",
 }
-"""Folders of the wheel and where their files are in the sources, as in hatch_build.py."""
+"""Folders of the wheel -> the location of their files in the sources, as in hatch_build.py."""
 
 _VENDORED = "minirospy/web/dashboard/page/vendor/"
 
 
 class ReleaseError(Exception):
-    """A step that failed; the text says which one, and why."""
+    """A failed step; the text names the step and the reason."""
 
 
 def main() -> int:
@@ -54,7 +54,7 @@ def main() -> int:
             raise ReleaseError(
                 f"not all is committed, but a release is built from the last commit:\n{changed}"
             )
-        # One commit for both builds, also where somebody commits meanwhile.
+        # Use one commit for both builds, even if another one is made meanwhile.
         commit, epoch = _run("git", "log", "-1", "--format=%H %ct").split()
         dist = ROOT / "dist"
         with tempfile.TemporaryDirectory() as scratch:
@@ -90,7 +90,7 @@ def main() -> int:
 
 
 def faults_of_wheel(contents: Mapping[str, int], size: int, tracked: Collection[str]) -> list[str]:
-    """Return what is wrong with a wheel of ``size`` bytes: ``contents`` are its files, ``tracked`` those of the sources."""
+    """Return the faults of a wheel of ``size`` bytes: ``contents`` are its files, ``tracked`` those of the sources."""
     sources = set(tracked)
     faults = []
     if size >= MAX_BYTES:
@@ -120,7 +120,7 @@ def faults_of_wheel(contents: Mapping[str, int], size: int, tracked: Collection[
 
 
 def faults_of_metadata(text: str, urls: Mapping[str, str]) -> list[str]:
-    """Return what is wrong with a METADATA file whose addresses should be ``urls``, and where the README's links lead."""
+    """Return the faults of a METADATA file: its addresses should be ``urls``, and the README's links must lead there."""
     metadata = message_from_string(text)
     given = [f"{label}, {url}" for label, url in urls.items()]
     faults = []
@@ -176,9 +176,9 @@ def unpack(archive: tarfile.TarFile, folder: Path) -> None:
 
 
 def _build(folder: Path, commit: str, epoch: str, *, elsewhere: bool = False) -> list[Path]:
-    """Build a commit, the wheel out of the unpacked sdist; return both files.
+    """Build a commit, the wheel from the unpacked sdist; return both files.
 
-    ``elsewhere``: as in the shell of somebody else, with another time zone, language, file mode and order of sets.
+    ``elsewhere``: as in another user's shell, with another time zone, language, file mode and set order.
     """
     source = folder / "minirospy"
     archive = subprocess.run(["git", "archive", commit], cwd=ROOT, check=True, capture_output=True).stdout
@@ -220,7 +220,8 @@ def find_pythons() -> dict[str, str]:
             text=True,
             check=False,
         )
-        # pyenv's commands exist also for versions that are not chosen; Debian's have no ensurepip without python3-venv.
+        # pyenv's commands exist also for versions that are not selected; Debian's have no ensurepip without
+        # python3-venv.
         if done.returncode == 0:
             major, minor, is_free = map(int, done.stdout.split())
             versions.setdefault((major, minor, is_free), path)
@@ -252,7 +253,7 @@ def _try_out(python: str, wheel: Path, scratch: Path) -> None:
 
 
 def _run(*command: str, environ: Mapping[str, str] | None = None, cwd: str | Path = ROOT) -> str:
-    """Run a command and return what it prints. Raise ReleaseError with its output."""
+    """Run a command and return its output. Raise ReleaseError with its output."""
     done = subprocess.run(
         command,
         env=environ,

@@ -1,7 +1,7 @@
-"""What a wheel is made of, as CycloneDX 1.5 (https://cyclonedx.org/docs/1.5/json/): `python tools/sbom.py WHEEL > FILE`.
+"""Write a wheel's bill of materials as CycloneDX 1.5 (https://cyclonedx.org/docs/1.5/json/): `python tools/sbom.py WHEEL > FILE`.
 
-In comes the wheel alone: its metadata, the page's libraries with their licences, the packages of message definitions. The same
-wheel and time give the same bytes. Versions of dependencies are those that pip will choose: the file has the ranges.
+The input is only the wheel: its metadata, the page's libraries with their licences, the packages of message definitions. The
+same wheel and time give the same bytes. pip will choose the versions of dependencies: the file has their ranges.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Json = dict[str, object]
 
 
 class SbomError(Exception):
-    """A wheel whose parts are not what they are said to be; the text names the file."""
+    """A wheel whose parts differ from their description; the text names the file."""
 
 
 def make_sbom(wheel: Path, seconds: int) -> str:
@@ -59,7 +59,7 @@ def make_sbom(wheel: Path, seconds: int) -> str:
                 "licenses": [{"license": {"id": project["License"]}}],
                 "hashes": [{"alg": "SHA-256", "content": digest}],
                 "purl": root,
-                # What is in the wheel itself; what pip installs with it is below.
+                # The contents of the wheel itself; packages that pip installs with it are below.
                 "components": parts,
             },
         },
@@ -88,13 +88,13 @@ def _requirement(line: str) -> Json:
 
 
 def _page_libraries(files: dict[str, bytes]) -> list[Json]:
-    """Return the libraries of npm that the dashboard's page has."""
+    """Return the npm libraries of the dashboard's page."""
     found: list[Json] = []
     for folder, entry in json.loads(files[f"{VENDOR}versions.json"]).items():
         inside: list[Json] = []
         described = {Path(path).name: digest for path, digest in entry["files"].items()}
         if bundle := entry.get("bundle"):
-            # What esbuild makes of the parts of the library that the page uses.
+            # esbuild's output for the parts of the library that the page uses.
             described[bundle["file"]] = bundle["sha256"]
         for file, expected in described.items():
             name = VENDOR + folder + "/" + (f"{file}.txt" if file == "LICENSE" else file)
@@ -135,7 +135,7 @@ def _definitions(files: dict[str, bytes]) -> list[Json]:
             "name": texts["name"],
             "version": texts["version"],
             "description": (manifest.findtext("description") or "").strip(),
-            # "BSD" of ROS's packages is not one of SPDX's names.
+            # "BSD" in ROS's packages is not an SPDX name.
             "licenses": [{"license": {"name": texts["license"]}}],
         }
         found.append(part)

@@ -1,4 +1,4 @@
-"""Hooks of MkDocs for `make site`: some pages outside of docs/ are pages of the site, and links work in both places.
+"""Hooks of MkDocs for `make site`: include some pages outside of docs/, and make links work in both places.
 
 In the sources README.md links to `docs/bags.md`, and `docs/bags.md` to `../README.md`; on the site both are in one folder.
 """
@@ -18,18 +18,18 @@ PAGES = {
     "CHANGELOG.md": "CHANGELOG.md",
     "tests/README.md": "tests.md",
 }
-"""Pages outside of docs/, and what they are called on the site (README.md would be its start page)."""
+"""Pages outside of docs/ -> their names on the site (README.md would be its start page)."""
 
 _LINK = re.compile(r"(\]\()(?!https?:|#|mailto:)([^)\s]+)(\))")
 
 
 def place_on_site(page: str) -> str:
-    """Return the path on the site of a file of the sources."""
+    """Return the site path of a source file."""
     return PAGES.get(page, page.removeprefix("docs/"))
 
 
 def link_on_site(target: str, page: str) -> str:
-    """Return what a link in ``page`` (a path in the sources) leads to on the site."""
+    """Return the target on the site of a link in ``page`` (a path in the sources)."""
     name, mark, anchor = target.partition("#")
     if not name:
         return target
@@ -55,7 +55,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Make the links of a page those of the site."""
+    """Convert a page's links to those of the site."""
     place = page.file.src_uri
     original = {there: here for here, there in PAGES.items()}.get(place, f"docs/{place}")
     return _LINK.sub(lambda link: link[1] + link_on_site(link[2], original) + link[3], markdown)

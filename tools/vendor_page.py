@@ -1,10 +1,11 @@
-"""Refreshes the libraries of the dashboard's page from npm: `python tools/vendor_page.py`, then look at `git diff`.
+"""Refresh the libraries of the dashboard's page from npm: `python tools/vendor_page.py`, then check `git diff`.
 
-``versions.json`` in the folder names each package, its version, npm's digest of its archive, and the files that are taken, with
-the SHA-256 of each. A new version: change it there, delete its "integrity", and run this. npm has to be installed.
+``versions.json`` in the folder has each package, its version, npm's digest of its archive, and the files to take, with
+the SHA-256 of each. For a new version: change it there, delete its "integrity", and run this. npm must be installed.
 
-A package with a "bundle" becomes one file, by the esbuild that is named there: what a script next to this one exports of the
-package, and nothing else. The page has no build step: the file is in the repository.
+A package with a "bundle" becomes one file, by the esbuild version given there: the exports that a script next to this one
+takes
+from the package, and nothing else. The page has no build step: the file is in the repository.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def main() -> int:
 
 
 def _bundle(bundle: dict[str, str], scratch: Path) -> bytes:
-    """Return one minified module with what the entry exports; the package is in ``scratch/node_modules``."""
+    """Return one minified module with the entry's exports; the package is in ``scratch/node_modules``."""
     entry = Path(shutil.copy(Path(__file__).parent / bundle["entry"], scratch))
     words = ["npx", "--yes", f"esbuild@{bundle['esbuild']}", entry.name, "--bundle", "--minify"]
     options = ["--format=esm", "--target=es2022", "--legal-comments=none", "--log-level=error"]

@@ -1,4 +1,4 @@
-"""The asyncio API: nodes in one loop talk to each other, and to nodes of the rospy API, over real sockets."""
+"""The asyncio API: nodes in one loop communicate with each other, and with nodes of the rospy API, over real sockets."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ Main = Callable[[], Coroutine[Any, Any, None]]
 
 
 def run(main: Main) -> None:
-    """Run a test's coroutine in a new loop, which it leaves without a task."""
+    """Run a test's coroutine in a new loop; assert that no task remains."""
 
     async def bounded() -> None:
         await asyncio.wait_for(main(), SECONDS)
@@ -56,7 +56,7 @@ def run(main: Main) -> None:
 
 @pytest.fixture
 def graph(master: str) -> Iterator[MasterProxy]:
-    """Return a proxy of the master, for the test's own thread."""
+    """Yield a proxy of the master, for the test's own thread."""
     proxy = MasterProxy(master, "/test")
     yield proxy
     proxy.close()
@@ -269,7 +269,7 @@ def test_queue_size_zero_is_refused(master: str) -> None:
 
 
 def test_publish_waits_with_queue_size_none(master: str) -> None:
-    """3 MB a message and a reader that has stopped: what is written has been taken by its socket."""
+    """3 MB per message and a reader that has stopped: data counts as written when its socket has accepted it."""
 
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
@@ -387,7 +387,7 @@ def test_wrong_values_are_refused_immediately(master: str) -> None:
 
 def test_undecodable_message_is_logged(master: str, caplog: pytest.LogCaptureFixture) -> None:
     class Wrong(String):
-        """The bytes of a String, read as too long a number of them."""
+        """The bytes of a String, deserialized as a too large count."""
 
         def deserialize(self, data: Any) -> Any:
             raise ValueError("no such bytes")
@@ -606,7 +606,7 @@ def test_errors_of_a_service_call(master: str, caplog: pytest.LogCaptureFixture)
 
 
 def test_service_is_registered_once_and_can_be_closed(graph: MasterProxy) -> None:
-    """Before the master has heard of it, too."""
+    """This includes closing it before the master has registered it."""
 
     async def main() -> None:
         async with Node("n") as node:

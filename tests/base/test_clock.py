@@ -1,4 +1,4 @@
-"""Clocks: sleeping by a time that the test sets."""
+"""Clocks: sleeping with a time that the test sets."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ SECOND = 10**9
 
 
 class Sleeping(threading.Thread):
-    """A thread that sleeps by a simulated clock. It waits when this is made, and again after each :meth:`at`."""
+    """A thread that sleeps with a simulated clock.
+
+    It is waiting when the constructor returns, and again after each :meth:`at`.
+    """
 
     def __init__(self, clock: SimulatedClock, nanoseconds: int) -> None:
         super().__init__(daemon=True)
@@ -51,7 +54,7 @@ class Sleeping(threading.Thread):
             self.outcome = error
 
     def at(self, now: int) -> None:
-        """Set the time, and return when the thread has looked at it and waits on."""
+        """Set the time, and return when the thread has seen it and waits again."""
         self.clock.set(now)
         assert self.waits.acquire(timeout=30)
 
@@ -62,7 +65,7 @@ class Sleeping(threading.Thread):
 
 
 def lines_until(step: int, is_set: bool, handle: Callable[[SignalSafeEvent], object]) -> int:
-    """Set or wait for an event; before that thread's line number ``step`` a handler runs in it. Return its lines."""
+    """Set or wait for an event; run a handler in the same thread before its line number ``step``. Return the number of lines."""
     event = SignalSafeEvent()
     lines = 0
 
@@ -88,7 +91,7 @@ def lines_until(step: int, is_set: bool, handle: Callable[[SignalSafeEvent], obj
 
 
 def wait_elsewhere(event: SignalSafeEvent) -> None:
-    """Join a thread that waits for the event, as a hook joins one that sleeps."""
+    """Join a thread that waits for the event, as a hook joins a thread that sleeps."""
     thread = threading.Thread(target=event.wait, args=(0.001,), daemon=True)
     thread.start()
     thread.join()
@@ -99,7 +102,7 @@ def wait_elsewhere(event: SignalSafeEvent) -> None:
 def test_signal_handler_may_use_an_event_at_any_moment(
     is_set: bool, handle: Callable[[SignalSafeEvent], object]
 ) -> None:
-    """It runs in the thread that it interrupts, between any two lines of what that calls."""
+    """The handler runs in the thread that it interrupts, between any two lines of the event's methods."""
     step = 1
     while lines_until(step, is_set, handle) >= step:
         step += 1

@@ -1,4 +1,4 @@
-"""environment: what the variables mean, and what is refused."""
+"""environment: the meaning of the variables, and refused values."""
 
 from __future__ import annotations
 
@@ -182,7 +182,7 @@ def test_minirospy_local_with_ipv6_binds_its_loopback() -> None:
     ],
 )
 def test_minirospy_local_reaches_a_master_of_this_machine_by_loopback(uri: str, reached: str) -> None:
-    """A master that listens on 127.0.0.1 is not at the address that this machine's name has."""
+    """A master that listens on 127.0.0.1 cannot be reached at the address of this machine's host name."""
     environ = {"MINIROSPY_LOCAL": "1", "ROS_MASTER_URI": uri}
     assert Environment.read(environ).master_uri == reached
     assert master_and_namespace(environ)[0] == reached
@@ -207,7 +207,7 @@ def test_minirospy_local_is_on_or_off(text: str, local: bool) -> None:
 
 
 def test_an_unknown_minirospy_local_is_refused() -> None:
-    """A misspelt value must not open what was meant to be closed."""
+    """A misspelt value must not allow access that was meant to be closed."""
     with pytest.raises(UsageError, match=r"MINIROSPY_LOCAL \[yes please\] is neither 1 nor 0"):
         Environment.read({"MINIROSPY_LOCAL": "yes please"})
 

@@ -1,4 +1,4 @@
-"""Text of strangers, shown: nothing that a terminal would obey, no line that was not there."""
+"""Display of untrusted text: no terminal control sequences, no additional lines."""
 
 from __future__ import annotations
 

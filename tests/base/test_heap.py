@@ -1,4 +1,4 @@
-"""base/heap: what a master frees is free for others."""
+"""base/heap: memory that a master frees is returned to the system."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_freed_bodies_are_given_back_to_the_system() -> None:
         for is_called in (True, False)
     ]
     assert taken[0] < 10
-    # Without the call the small blocks hold the large ones between them.
+    # Without the call, the small blocks keep the large ones between them allocated.
     assert taken[1] > 50
 
 

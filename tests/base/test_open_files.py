@@ -1,4 +1,4 @@
-"""Files that another process has open, which Windows neither replaces nor removes; elsewhere its refusal is imitated."""
+"""Files that another process has open, which Windows neither replaces nor removes; other systems imitate its refusal."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from minirospy.board.server import _LogOnDemand
 
 @pytest.fixture
 def paths(tmp_path: Path) -> tuple[Path, Path]:
-    """Return a new file, and the one that it is to replace."""
+    """Return a new file, and the file that it replaces."""
     new, old = tmp_path / "new", tmp_path / "old"
     new.write_text("new")
     old.write_text("old")
@@ -26,7 +26,7 @@ def paths(tmp_path: Path) -> tuple[Path, Path]:
 
 @pytest.fixture
 def refused(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], threading.Event]:
-    """Return a function that has os.replace fail, as on Windows, so many times; the event is set at the first failure."""
+    """Return a function that makes os.replace fail several times, as on Windows; the event is set at the first failure."""
 
     def refuse(times: int) -> threading.Event:
         replace, failed, left = os.replace, threading.Event(), [times]

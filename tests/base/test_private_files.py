@@ -59,7 +59,7 @@ def test_open_file_refuses_a_symbolic_link_to_nothing(
     tmp_path: Path, has_flag: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if has_flag:
-        # As if it had been made between the look and the opening.
+        # As if it had been created between the check and the opening.
         monkeypatch.setattr(os.path, "islink", lambda path: False)
     else:
         monkeypatch.setattr(private_files, "_FLAGS", 0)
@@ -89,7 +89,7 @@ def test_open_text_empties_or_appends(tmp_path: Path) -> None:
 
 
 def test_read_file_reads_what_has_another_name_too(tmp_path: Path, mine: Path) -> None:
-    """Backups are made by hard links; reading one does no harm."""
+    """Backups use hard links; reading one is harmless."""
     os.link(mine, tmp_path / "name")
     assert private_files.read_file(tmp_path / "name") == (b"precious", mine.stat().st_mtime)
 
@@ -137,7 +137,7 @@ def test_journal_follows_no_link(
     journal.remove()
 
     assert mine.read_text() == "precious"
-    # A symbolic link is not read either. The content of a hard link is its own.
+    # A symbolic link is not read either. A hard link is removed without changing the file.
     assert left
     assert not left.recovered.records
 

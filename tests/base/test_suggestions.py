@@ -1,4 +1,4 @@
-"""Suggestions for names that do not exist: what is meant, and nothing that is far-fetched."""
+"""Suggestions for names that do not exist: plausible names, and no far-fetched ones."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_words_that_may_have_been_meant(word: str, known: tuple[str, ...], expec
     ("name", "known", "expected"),
     [
         ("/buton_state", "/button_state", True),
-        # Of another robot, and another topic that starts so: the user waits for this one.
+        # A topic of another robot, and another topic with the same prefix: the user waits for this one.
         ("/robot2/scan", "/robot10/scan", False),
         ("/camera/image", "/camera/image_raw", False),
     ],

@@ -1,4 +1,4 @@
-"""XML texts that unfold to gigabytes are refused by each reader of ours; what real ROS reads is read."""
+"""Each XML reader refuses texts that expand to gigabytes, and reads those that real ROS reads."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LAUGHS = (
     + "".join(f'<!ENTITY a{n} "' + f"&a{n - 1};" * 6 + '">' for n in range(1, 9))
     + "]>"
 )
-"""Unfolds to 17 MB wherever ``&a8;`` is: expat lets it pass within its own limit, 100 times the text plus 8 MiB."""
+"""Expands to 17 MB at each ``&a8;``: expat accepts it within its own limit, 100 times the text plus 8 MiB."""
 
 READERS: dict[str, tuple[str, Callable[[str], object], type[Exception]]] = {
     "robot description": ("robot", parse_robot, UrdfError),

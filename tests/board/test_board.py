@@ -1,4 +1,4 @@
-"""One board, several processes: shared, kept, started once, and replaced when it dies."""
+"""One board used by several processes: shared, persistent, started once, and replaced when it dies."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_many_start_one_server() -> None:
     edges = opened[1].watch([12], timeout=40)
     opened[2].press(12)
     assert next(edges).level == 1
-    # Those that lost the race may still be on their way out; one stays.
+    # Servers that lost the race may still be exiting; one remains.
     wait_until(lambda: len(servers(BoardDirectory.find())) == 1)
 
     for child in children:

@@ -1,4 +1,4 @@
-"""`minirospy board`, as scripts use it."""
+"""`minirospy board` as scripts use it."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_watch_prints_a_line_for_each_edge() -> None:
             [sys.executable, "-c", code, "watch", "7", "-n", "2"], stdout=subprocess.PIPE, text=True
         ) as child,
     ):
-        # When it listens cannot be seen from here: move the pin until it has heard enough.
+        # Whether it listens yet is not visible here: toggle the pin until it has received enough.
         for number in range(1, 400):
             board.set(7, number % 2)
             try:
@@ -194,7 +194,7 @@ def test_the_picture_of_a_person(encoding: str) -> None:
     body, scanner = ("█", "▲") if encoding == "utf-8" else ("#", "^")
     (top, *_, bottom) = [number for number, line in enumerate(lines) if body * 3 in line]
     (foot,) = [number for number, line in enumerate(lines) if scanner in line]
-    # 0.1 m a line: the person's body reaches from 0.4 m to 0.6 m.
+    # 0.1 m per line: the person's body extends from 0.4 m to 0.6 m.
     assert (foot - top, foot - bottom) == (6, 4)
 
 
@@ -216,7 +216,7 @@ def test_keys_press_buttons_and_move_the_person(
         def type_until(keys: bytes, condition: Callable[[], bool]) -> None:
             os.write(ours, keys)
             while not condition():
-                # What it draws has to be read, or it waits. The change may reach this process after the drawing of it.
+                # Its output must be read, or it blocks. The change may reach this process after its drawing.
                 if select.select([ours], [], [], 0.05)[0]:
                     os.read(ours, 65536)
 

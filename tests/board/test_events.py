@@ -1,4 +1,4 @@
-"""Which edges count: the clock is the test's."""
+"""Which edges count, with a clock that the test controls."""
 
 from __future__ import annotations
 

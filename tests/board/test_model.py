@@ -1,4 +1,4 @@
-"""The board as a pure model."""
+"""The pure model of the board."""
 
 from __future__ import annotations
 

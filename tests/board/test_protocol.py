@@ -1,4 +1,4 @@
-"""A board's messages: golden bytes, round trips, and what is refused."""
+"""A board's messages: golden bytes, round trips, and refused messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""RPi.GPIO's API on the virtual board: what it does, and its exact words when it refuses."""
+"""RPi.GPIO's API on the virtual board: its behaviour, and its exact error messages."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def _prepare(gpio: Gpio) -> None:
             "Bouncetime must be greater than 0",
         ),
         (
-            # In seconds, where milliseconds are meant.
+            # In seconds, but the unit is milliseconds.
             lambda g: g.add_event_detect(11, GPIO.RISING, bouncetime=0.2),
             TypeError,
             NO_INTEGER.format("float"),
@@ -265,7 +265,7 @@ def test_cleanup(bcm: Gpio, board: Board) -> None:
 def test_cleanup_forgets_the_numbering_also_where_no_channel_is_left(bcm: Gpio) -> None:
     bcm.setwarnings(False)
     bcm.cleanup()
-    assert bcm.getmode() == GPIO.BCM  # no pin was touched yet
+    assert bcm.getmode() == GPIO.BCM  # no pin is set up yet
     bcm.setup(7, GPIO.OUT)
     bcm.cleanup(7)
     assert bcm.getmode() == GPIO.BCM
@@ -281,7 +281,7 @@ def test_cleanup_undoes_a_setup_that_a_signal_has_ended(
     ask = link.call
 
     def interrupted(operation: Setup) -> None:
-        # The board has done it, and the signal comes before its answer.
+        # The board has set the pin, and the signal arrives before its response.
         del vars(link)["call"]
         ask(operation)
         if not hook_cleans_up:
@@ -311,7 +311,7 @@ def test_a_signal_handlers_cleanup_lets_the_interrupted_call_end(bcm: Gpio, boar
     calls = {Gpio.input.__code__, Gpio.output.__code__}
 
     def interrupt(frame: FrameType, event: str, argument: object) -> None:
-        # What a signal at the first step of the call does: its handler runs before anything else.
+        # Simulate a signal at the first step of the call: its handler runs before anything else.
         if event == "call" and frame.f_code in calls:
             sys.setprofile(None)
             with dispatching_signal():
@@ -462,12 +462,12 @@ def test_pwm_object_ends_with_its_last_reference() -> None:
 
 
 def heard(board: Board, pin: int) -> int:
-    """Return the level once ``board`` has received all that the server did until now."""
+    """Return the level once ``board`` has received all of the server's changes."""
     board._link.call(None)
     return board.get(pin)
 
 
 def _synchronize(gpio: Gpio, board: Board) -> None:
-    """Return when both have heard of all that happened until now."""
+    """Return when both have received all changes."""
     gpio._linked().call(None)
     board._link.call(None)

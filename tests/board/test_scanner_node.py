@@ -1,4 +1,4 @@
-"""The simulated scanner as a node: what it publishes, and the ways to move the person before it."""
+"""The simulated scanner as a node: its messages, and the ways to move the person in front of it."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ def scanner(master: str) -> Iterator[subprocess.Popen[str]]:
         said, _ = node.communicate(timeout=30)
         assert "Traceback" not in said
         assert node.returncode == 0
-        # The room is empty when it closes.
+        # The room is empty when the node closes.
         asyncio.run(asyncio.wait_for(until_person_is(board, None), SECONDS))
 
 
 async def until_person_is(board: Board, wanted: object) -> None:
-    """Wait for the move on each board: each has its own connection."""
+    """Wait for the move on each board, which has its own connection."""
     await until(lambda: board.person == wanted)
 
 
@@ -92,7 +92,7 @@ def test_scan_follows_a_moved_person(scanner: subprocess.Popen[str]) -> None:
 def test_raw_data_match_the_scan(scanner: subprocess.Popen[str]) -> None:
     async def main() -> None:
         with Board() as board:
-            # Beside the reflector on the wall ahead.
+            # Next to the reflector on the wall ahead.
             board.move_person((0.0, 0.3))
             async with Node("test", namespace="sick_safetyscanners", rosout=False) as node:
                 await until_paths_are(node, PROTECTIVE)

@@ -1,4 +1,4 @@
-"""A small graph for the commands: one node that publishes, listens and serves."""
+"""A small graph for the command tests: one node that publishes, subscribes and serves."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BIN = Path(sys.executable).parent
 
 
 class Robot(NamedTuple):
-    """The node, its loop, what it has heard on /listen, and the reasons it was asked to stop for."""
+    """The node, its loop, the messages received on /listen, and the reasons of shutdown requests."""
 
     node: Node
     loop: LoopThread
@@ -36,7 +36,7 @@ class Robot(NamedTuple):
     stopped: list[str]
 
     def publish(self, topic: str, message: Any) -> None:
-        """Publish; late subscribers get it too."""
+        """Publish a latched message, which late subscribers receive too."""
         buffer = BytesIO()
         message.serialize(buffer)
         body = buffer.getvalue()
@@ -45,7 +45,7 @@ class Robot(NamedTuple):
 
 @pytest.fixture
 def robot(master: str) -> Iterator[Robot]:
-    """/robot: publishes /button_state, /ns/chatter, /poly (latched), subscribes to /listen, serves /set_led_state, /fail."""
+    """Run /robot: it publishes /button_state, /ns/chatter, /poly, subscribes to /listen, serves two services."""
     loop = LoopThread("robot")
     stopped: list[str] = []
     heard: list[bytes] = []
@@ -100,7 +100,7 @@ def _fail(_: object, __: object) -> bytes:
 
 
 class Result(NamedTuple):
-    """How a command ended, and what it printed."""
+    """A command's exit status and output."""
 
     status: int
     out: str
@@ -111,7 +111,7 @@ Command = Callable[..., Result]
 
 
 def without_ros_words(err: str) -> str:
-    """Return what minirospy adds to stderr: without the usage and the errors in ROS's words, which test_wording.py tests."""
+    """Return minirospy's additions to stderr, without ROS's usage and error messages, which test_wording.py tests."""
     own = re.compile(r"(?!usage: )[a-z][\w.-]*( \w+)?: (?!error: )|WARNING: |did you mean ")
     lines = err.splitlines(keepends=True)
     if not any(re.match(r"[a-z][\w.-]*( \w+)?: ERROR: ", line) for line in lines):
@@ -135,7 +135,7 @@ def command(capsys: pytest.CaptureFixture[str]) -> Command:
         capsys.readouterr()
         try:
             status: Any = main(list(argv))
-        except SystemExit as ended:  # argparse ends `-h` so
+        except SystemExit as ended:  # argparse exits this way for `-h`
             status = ended.code
         out, err = capsys.readouterr()
         assert "Traceback" not in err
@@ -146,7 +146,7 @@ def command(capsys: pytest.CaptureFixture[str]) -> Command:
 
 @pytest.fixture
 def program() -> Iterator[Callable[[Sequence[str]], subprocess.Popen[str]]]:
-    """Start a command's console script as a process; it is terminated when the test ends."""
+    """Return a function that starts a command's console script as a process, which is terminated after the test."""
     started: list[subprocess.Popen[str]] = []
 
     def start(words: Sequence[str]) -> subprocess.Popen[str]:

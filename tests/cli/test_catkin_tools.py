@@ -1,4 +1,4 @@
-"""cli/catkin_tools: what catkin prints of the same folders."""
+"""cli/catkin_tools: compared with catkin's output for the same folders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""cli/complete: what TAB offers; with a graph, without a master, and for anything that may be typed."""
+"""cli/complete: completions with a graph, without a master, and for any input."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give a busy machine time to answer."""
+    """Raise the time limits for a busy machine."""
     monkeypatch.setattr(completers, "LIVE_SECONDS", 30.0)
 
 
 def tab(line: str) -> list[str]:
-    """Return what is offered where ``line`` ends."""
+    """Return the completions at the end of ``line``."""
     words = line.split(" ")
     return candidates(len(words) - 1, words)
 
@@ -120,7 +120,7 @@ def test_console_scripts_that_are_installed_are_those_of_the_registry() -> None:
 
 
 def leaves(grammar: Command | Family | Verb, typed: str) -> Iterator[tuple[str, Command | Verb]]:
-    """Every verb, or the command itself, with what is typed for it."""
+    """Yield every verb, or the command itself, with its words."""
     if not isinstance(grammar, Family):
         yield typed, grammar
         return
@@ -138,7 +138,7 @@ LEAVES = [
 
 @pytest.mark.parametrize("entry", COMMANDS, ids=lambda entry: entry.target)
 def test_every_command_is_completed(entry: Entry) -> None:
-    """A command has a grammar, or a completer of its words; only `minirospy` and `complete` themselves have neither."""
+    """A command has a grammar or a completer of its words; only `minirospy` and `complete` themselves have neither."""
     grammar = entry.load_grammar()
     assert callable(entry.load_main())
     assert grammar is None or isinstance(grammar, Command | Family)
@@ -166,7 +166,7 @@ def test_function_takes_what_its_parser_parses(typed: str, leaf: Command | Verb)
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
         return
     taken = {parameter.name for parameter in parameters}
-    # Launch arguments and words for CMake are taken from among the words.
+    # Launch arguments and words for CMake are separated from the other words.
     assert names <= taken
     assert taken - names <= {"arguments", "args", "variables", "cmake_words"}
 
@@ -183,7 +183,7 @@ def test_functions_with_many_arguments_take_a_record() -> None:
 
 @pytest.mark.parametrize(("typed", "leaf"), LEAVES, ids=[typed for typed, _ in LEAVES])
 def test_every_verb_and_option_is_completed(typed: str, leaf: Command | Verb) -> None:
-    """A new argument that takes a value names its completer, or `nothing`."""
+    """A new argument that takes a value must name its completer, or `nothing`."""
     parser = leaf.parser()
     assert tab(f"{typed} -") == [option for action in parser._actions for option in action.option_strings]
     for action in parser._actions:
@@ -302,7 +302,7 @@ def test_types(workspace: Path) -> None:
     assert tab("rosservice find std_s") == ["std_srvs/"]
     assert tab("rostopic pub /new std_msgs/Boo") == ["std_msgs/Bool"]
     assert tab("rosmsg show nobody/") == []
-    # The name alone does as well.
+    # The type's name without its package is completed, too.
     assert tab("rosmsg show PoseWithCov") == ["PoseWithCovariance", "PoseWithCovarianceStamped"]
     assert tab("rossrv md5 SetB") == ["SetBool"]
     assert tab("rostopic find PoseW") == []
@@ -317,7 +317,7 @@ def test_a_message_to_be_changed(workspace: Path) -> None:
     assert tab("rostopic pub /t std_msgs/Empty ") == ['"{}"']
     assert tab("rostopic pub /t std_msgs/Bool true ") == []
     assert tab("rostopic pub /t std_msgs/Nothing ") == []
-    # A vertical tab represents a line feed: a candidate is one line.
+    # A vertical tab represents a line feed, because a candidate is one line.
     assert tab("rostopic pub /t geometry_msgs/Point ") == ['"x: 0.0\vy: 0.0\vz: 0.0"']
     assert tab("rostopic pub /t my_robot/Leds ") == [
         "\"leds:\v- name: ''\v  place:\v  - 0.0\v  - 0.0\von: false\""
@@ -331,7 +331,7 @@ def test_a_message_on_one_line() -> None:
 
 def test_names_stay_on_one_line(workspace: Path) -> None:
     words = ["rostopic", "pub", "/t", "my_robot/Leds", ""]
-    # YAML reads the name `on` as a truth.
+    # YAML reads the name `on` as a boolean.
     assert candidates(4, words, one_line=True) == ["\"{leds: [{name: '', place: [0.0, 0.0]}], on: false}\""]
 
 
@@ -340,7 +340,7 @@ def test_quotes_that_are_open_stay(workspace: Path) -> None:
     assert candidates(4, ["rostopic", "pub", '"/t"', "std_msgs/Bool", '"']) == ['"data: false"']
     assert candidates(2, ["rosed", "my_robot", '"my '], one_line=True) == ['"my map.yaml"']
     assert candidates(2, ["rosed", "my_robot", "config/deep/my\\ "]) == ["config/deep/my\\ map.yaml"]
-    # In single quotes a shell reads nothing at all: they end for a moment.
+    # A shell interprets nothing in single quotes: they are closed for the apostrophe.
     assert candidates(4, ["rostopic", "pub", "/t", "std_msgs/String", "'"]) == [r"'data: '\'''\'''"]
     words = ["roslaunch", "my_robot", "all.launch"]
     assert candidates(3, [*words, "name:="]) == [r"name:=a\ robot"]
@@ -363,7 +363,7 @@ def test_variables_and_home(workspace: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_nothing_in_a_text_is_history(robot: Robot) -> None:
-    """bash and zsh at a terminal put the last command in place of !! even within double quotes."""
+    """bash and zsh at a terminal replace !! by the last command, even within double quotes."""
     from minirospy.ros.rosparam.commands import rosparam
 
     assert rosparam.main(["set", "/greeting", "it's you!"]) == 0
@@ -384,7 +384,7 @@ _FROM_ROS = {
     ),
     "geometry_msgs/Polygon": "points:\n- x: 0.0\n  y: 0.0\n  z: 0.0",
 }
-"""What ROS 1's rosmsg-proto printed."""
+"""Output of ROS 1's rosmsg-proto."""
 
 
 @pytest.mark.parametrize("type_", _FROM_ROS)
@@ -411,7 +411,7 @@ def test_topics(robot: Robot) -> None:
     assert tab("rostopic info ns/") == ["ns/chatter"]
     assert tab("minirospy topic bw /but") == ["/button_state"]
     assert tab("rostopic echo -n 3 /but") == ["/button_state"]
-    # A remapping's other side.
+    # The right side of a remapping.
     assert tab("rosrun rospy_tutorials talker chatter:=/but") == ["chatter:=/button_state"]
 
 
@@ -419,7 +419,7 @@ def test_fields_of_a_topic(robot: Robot) -> None:
     assert tab("rostopic echo /poly/") == ["/poly/header/", "/poly/polygon/"]
     assert tab("rostopic echo /poly/header/s") == ["/poly/header/seq", "/poly/header/stamp"]
     assert tab("rostopic echo /poly/header/stamp/") == ["/poly/header/stamp/secs", "/poly/header/stamp/nsecs"]
-    # Shells read brackets as a pattern.
+    # Shells interpret brackets as a pattern.
     assert tab("rostopic echo /poly/polygon/points[0]/y") == [r"/poly/polygon/points\[0\]/y"]
     assert tab("rostopic echo /poly/nothing/") == []
     assert tab("rostopic hz /poly/") == []
@@ -496,7 +496,7 @@ def test_a_master_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mon
         monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
         monkeypatch.setattr(completers, "LIVE_SECONDS", 0.2)
         took: list[float] = []
-        # A call gives up after five by itself; a machine that stalls meanwhile gets two more attempts.
+        # A call gives up after five seconds; on a machine that stalls, try it up to three times.
         while len(took) < 3 and min(took, default=9.0) > 4:
             start = time.monotonic()
             assert tab("rostopic echo ") == []

@@ -1,4 +1,4 @@
-"""minirospy doctor and roswtf: a graph with something wrong in it, and the lines that say what."""
+"""minirospy doctor and roswtf: a graph with a fault, and the lines that report it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Start = Callable[[Sequence[str]], Any]
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let what runs answer as late as a busy machine does; what does not run refuses immediately."""
+    """Raise the time limits for a busy machine; an address at which nothing listens refuses immediately."""
     connect_within(30.0, monkeypatch)
 
 
@@ -38,7 +38,7 @@ def connect_within(seconds: float, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def other(master: str) -> Iterator[Callable[[str, InterfaceType], None]]:
-    """Let a node /other subscribe to a topic with a type."""
+    """Return a function that makes a node /other subscribe to a topic with a type."""
     loop = LoopThread("other")
     node = Node("/other", Environment.read())
     loop.run(node.start())
@@ -57,7 +57,7 @@ def closed_port() -> int:
 
 
 def lines(out: str, check: str) -> list[str]:
-    """Return what was printed about a check."""
+    """Return the lines that were printed about a check."""
     return [line for line in out.splitlines() if f" {check}: " in line]
 
 
@@ -82,7 +82,7 @@ def test_a_graph_that_is_well(robot: Any, command: Any) -> None:
     assert (
         "nobody publishes /any (/robot), /listen (/robot) -> start the publisher" in lines(out, "topics")[0]
     )
-    # The doctor's own node is gone.
+    # The doctor has unregistered its own node.
     assert command("rosnode", "list").out == "/robot\n"
 
 
@@ -119,7 +119,7 @@ def test_nodes_that_are_dead_nowhere_or_others(
 def test_a_suspended_node_and_a_suspended_master(
     robot: Any, master: str, command: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As after Ctrl-Z: the system accepts connections for a process that does not run."""
+    """As after Ctrl-Z: the system accepts connections for a stopped process."""
     connect_within(1.5, monkeypatch)
     with socket.create_server(("127.0.0.1", 0)) as suspended:
         uri = f"http://localhost:{suspended.getsockname()[1]}/"
@@ -155,7 +155,7 @@ def test_topics_of_different_types(robot: Any, other: Any, command: Any) -> None
 
 
 def test_a_connection_that_is_not_made(robot: Any, other: Any, command: Any) -> None:
-    """The types' names are the same, their definitions are not."""
+    """The types have the same name and different definitions."""
     other("/button_state", InterfaceType(Bool._type, "0" * 32))
     status, out, _ = command("doctor")
     assert status == 1

@@ -21,7 +21,7 @@ MARK = "OWNED"
 
 
 class HostilePublisher:
-    """A node of raw sockets: answers every XML-RPC call as requestTopic, every connection with its header."""
+    """A node of raw sockets: answers every XML-RPC call as requestTopic, and every connection with its header."""
 
     def __init__(self, header: dict[str, str], messages: list[bytes]) -> None:
         self._reply = serialize_header(header) + b"".join(map(serialize_frame, messages))
@@ -33,7 +33,7 @@ class HostilePublisher:
             threading.Thread(target=self._accept, args=(server, serve), daemon=True).start()
 
     def close(self) -> None:
-        """Close all sockets; the threads end with them."""
+        """Close all sockets, which makes the threads exit."""
         for each in (self._rpc, self._data, *self._kept):
             each.close()
 
@@ -74,7 +74,7 @@ class HostilePublisher:
 
 @pytest.fixture
 def hostile(master: str, request: pytest.FixtureRequest) -> Iterator[HostilePublisher]:
-    """Return a publisher of /evil with the header and messages of the parameter; the master holds a harmless type."""
+    """Return a publisher of /evil with the parameter's header and messages; the master has a harmless type for it."""
     header, messages = request.param
     publisher = HostilePublisher(header, messages)
     proxy = MasterProxy(master, "/evil_node")
@@ -87,7 +87,7 @@ def hostile(master: str, request: pytest.FixtureRequest) -> Iterator[HostilePubl
 
 
 def attack(type_: str, definition: str = "int32 a\n") -> tuple[dict[str, str], list[bytes]]:
-    """Return the parameter of ``hostile``."""
+    """Return a parameter for the fixture ``hostile``."""
     header = {"type": type_, "md5sum": "0" * 32, "message_definition": definition, "callerid": "/evil_node"}
     return header, [bytes(4)] * 5
 
@@ -124,7 +124,7 @@ def test_no_command_runs_the_code_of_a_publisher(
     (tmp_path / "evil_module.py").write_text(f"open({MARK!r}, 'w').close()\n")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     command = [str(BIN / name), verb, *options, "/evil"]
-    # Each ends by itself: at the definition that is refused, or after the one message that it waits for.
+    # Each command exits: at the refused definition, or after the one message that it waits for.
     done = subprocess.run(
         command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=False
     )

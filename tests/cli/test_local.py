@@ -1,4 +1,4 @@
-"""`roscore --local` and MINIROSPY_LOCAL=1: one word, and nothing of this machine's graph is reached from outside."""
+"""`roscore --local` and MINIROSPY_LOCAL=1: the graph cannot be reached from other machines."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BIN = Path(sys.executable).parent
 
 @contextlib.contextmanager
 def started(*command: str, until: str, **environ: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Start a command; yield it, and what it printed up to a line that contains ``until``."""
+    """Start a command; yield it, and its output up to a line that contains ``until``."""
     process = subprocess.Popen(
         [str(BIN / command[0]), *command[1:]],
         stdout=subprocess.PIPE,
@@ -61,7 +61,7 @@ def run(*command: str, **environ: str) -> subprocess.CompletedProcess[str]:
 
 
 def listening(process: psutil.Process) -> set[str]:
-    """Return the addresses that a process and its children listen on."""
+    """Return the addresses on which a process and its children listen."""
     found: set[str] = set()
     for each in (process, *process.children(recursive=True)):
         # psutil 6 renamed it.
@@ -72,7 +72,7 @@ def listening(process: psutil.Process) -> set[str]:
 
 @pytest.fixture
 def elsewhere(monkeypatch: pytest.MonkeyPatch) -> Mapping[str, str]:
-    """Return the variables that a day in the laboratory leaves in ~/.bashrc."""
+    """Set and return variables that a user's ~/.bashrc may have from other work."""
     monkeypatch.delenv("ROS_HOSTNAME")
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
     monkeypatch.setenv("ROS_IP", "192.0.2.7")
@@ -91,7 +91,7 @@ def test_a_local_roscore_listens_on_loopback_alone(how: str, elsewhere: Mapping[
             "`export MINIROSPY_LOCAL=1`\n" in printed
         )
         assert f"ROS_MASTER_URI=http://localhost:{port}/\n" in printed
-        # Its own /rosout node too.
+        # Its own /rosout node listens there, too.
         assert listening(psutil.Process(process.pid)) == {"127.0.0.1"}
         names = run("rosnode", "list", ROS_MASTER_URI=f"http://localhost:{port}", MINIROSPY_LOCAL="1")
         assert names.stdout == "/rosout\n"

@@ -1,6 +1,6 @@
-"""Every command and verb x everything that goes wrong: one clear line, the documented status, no traceback, no hang.
+"""Every command and verb with every kind of failure: one clear line, the documented status, no traceback, no hang.
 
-The rows are the commands' own lists (pyproject.toml, and the help of each): a verb without a row in ``ROWS`` fails.
+The rows are the commands' own lists (pyproject.toml, and each command's help): a verb without a row in ``ROWS`` fails.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes, signals and d
 
 
 class Row(NamedTuple):
-    """What is typed behind a verb.
+    """The words after a verb, for each case.
 
-    ``good``: something that works on the graph of the fixture ``graph``; None if that starts a program or a
-    master. ``unknown``: with a name that nobody has; "" where the verb takes no name. ``dead``: about the node that
-    does not answer. ``uses_master``: whether it needs a master. ``streams``: only Ctrl-C ends it. ``quiet``: an unknown name
-    is an empty answer, as of a search. ``waits``: it is waited for, with a warning.
+    ``good``: works on the graph of the fixture ``graph``; None if the command starts a program or a
+    master. ``unknown``: with a name that does not exist; "" if the verb takes no name. ``dead``: about the node that
+    does not answer. ``uses_master``: whether it needs a master. ``streams``: runs until Ctrl-C. ``quiet``: an unknown name
+    gives an empty result, as of a search. ``waits``: the command waits for the name, with a warning.
     """
 
     good: str | None = ""
@@ -56,7 +56,7 @@ class Row(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """A kind of definitions, with the types that its rows name."""
+    """A kind of definitions, and the types that its rows use."""
 
     known: str
     unknown: str
@@ -124,12 +124,12 @@ ROWS = {
 ELSEWHERE = re.compile(
     r"ros(bag|dep|pack|stack|launch|wtf|test|unit)|catkin|xacro|check_urdf|urdf_to|rqt|rviz|smach_viewer"
 )
-"""Commands with their own matrices or tests."""
+"""Commands that have their own matrices or tests."""
 
 USAGE_ERROR = 2
-EX_USAGE = 64
-"""Of an unknown verb, as ROS has it."""
+EX_USAGE = 64  # exit status of ROS for an unknown verb
 
+# Exit status for a name that does not exist, if it is not 1: as in ROS.
 ROS_STATUS = {
     "minirospy": USAGE_ERROR,
     "rosservice args": 2,
@@ -139,25 +139,23 @@ ROS_STATUS = {
     "rosmsg package": EX_USAGE,
     "rossrv package": EX_USAGE,
 }
-"""The exit status where a name does not exist, unless it is 1: as ROS has it."""
 
+# Stderr of a command that succeeds: the nodes that do not answer.
 REPORTED_BY_ROS = {"rosnode cleanup": "ERROR: connection refused to [http://localhost:1/]\n"}
-"""What is on stderr of a command that succeeds: the nodes that do not answer."""
 
-USAGE_STATUS = {"rosbag": 0, "rosgraph": 255}
-"""The exit status of a usage error, unless it is 2: as ROS has it."""
+USAGE_STATUS = {"rosbag": 0, "rosgraph": 255}  # exit status of a usage error, if it is not 2: as in ROS
 
 GRAPH = [name for name, row in ROWS.items() if row.uses_master]
 
 
 def scripts() -> dict[str, tuple[str, str]]:
-    """Return the commands that are installed -> module and function."""
+    """Return the installed commands -> module and function."""
     found = {name: target.partition(":") for name, target in console_scripts().items()}
     return {name: (module, function) for name, (module, _, function) in found.items()}
 
 
 class Recorded(io.StringIO):
-    """What a command says; ``on_text`` is called with each text."""
+    """Records a command's output; ``on_text`` is called with each string."""
 
     def __init__(self, on_text: Callable[[], object] = lambda: None) -> None:
         super().__init__()
@@ -186,7 +184,7 @@ def run(line: str, **streams: Any) -> Result:
     finally:
         for name, stream in before.items():
             if getattr(sys, name) is not put[name]:
-                getattr(sys, name).close()  # the command's own, in the place of one that was closed
+                getattr(sys, name).close()  # the command's own stream, which replaced a closed one
             setattr(sys, name, stream)
 
     return Result(
@@ -196,12 +194,12 @@ def run(line: str, **streams: Any) -> Result:
 
 
 def usage_out(line: str) -> str:
-    """Return what a usage error prints on standard output: nothing, but for rosgraph."""
+    """Return the stdout of a usage error: empty, except for rosgraph."""
     return run("rosgraph -h").out.partition("usage: ")[0] if line == "rosgraph" else ""
 
 
 def one_line(result: Result, line: str) -> str:
-    """Return the command's own line on stderr, without its start; only ROS's usage and error may stand before it."""
+    """Return the command's own line on stderr, without its start; only ROS's usage and error may precede it."""
     name = line.split(maxsplit=1)[0]
     match = re.fullmatch(rf"{name}: ERROR: ([^\n]*)\n", without_ros_words(result.err))
     assert match, (line, result)
@@ -209,13 +207,13 @@ def one_line(result: Result, line: str) -> str:
 
 
 def verbs(name: str) -> list[str]:
-    """Return the verbs of a command, by its help."""
+    """Return the verbs in a command's help."""
     return re.findall(rf"^\t{name} (\S+)\t", run(f"{name} -h").out, re.M)
 
 
 @pytest.fixture(scope="module")
 def lines() -> list[str]:
-    """Each command, or each of its verbs, as their help has them."""
+    """Return the commands and their verbs, as listed in the help."""
     found = []
     for name in scripts():
         if not ELSEWHERE.match(name):
@@ -225,7 +223,7 @@ def lines() -> list[str]:
 
 @pytest.fixture
 def graph(robot: Robot, master: str, monkeypatch: pytest.MonkeyPatch) -> Robot:
-    """Return the robot, with loggers and a parameter; of /ghost only the services and topics are registered."""
+    """Return the robot, with loggers and a parameter; /ghost has only registrations of services and topics."""
     loggers = GetLoggersResponse()
     loggers.loggers.append(importlib.import_module("roscpp.msg").Logger("rosout", "info"))
     answer = io.BytesIO()
@@ -255,7 +253,7 @@ def _no_such_host(*_: object, **__: object) -> None:
 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let calls to a master or node that does not answer time out soon."""
+    """Shorten the time limits of calls to a master or node that does not answer."""
     monkeypatch.setattr(master_proxy, "RpcClient", lambda uri, *_, **__: RpcClient(uri, 0.05))
 
 
@@ -289,8 +287,8 @@ def test_a_typo_in_an_option(lines: list[str]) -> None:
 
 
 def test_an_option_that_no_command_has() -> None:
-    """Every installed command refuses it."""
-    # What xacro says of its options are the package's own words.
+    """Every installed command refuses an unknown option."""
+    # xacro's errors for options have the package's own text.
     for name in scripts().keys() - {"xacro"}:
         result = run(f"{name} --nonsense")
         usage = USAGE_STATUS.get(name, 1 if name in ("rospack", "rosstack") else USAGE_ERROR)
@@ -301,13 +299,13 @@ def test_an_option_that_no_command_has() -> None:
 
 
 def test_a_missing_argument(lines: list[str]) -> None:
-    """What the usage does not have in brackets must be typed."""
+    """Arguments that the usage does not have in brackets are required."""
     for line in lines:
         usage = run(f"{line} -h").out.partition("\n\n")[0].partition(line)[2]
         while "[" in usage:
             usage = re.sub(r"\[[^][]*\](\.\.\.)?", "", usage)
 
-        # What ROS's usage does not have in brackets, though it may be left out.
+        # Optional arguments that ROS's usage does not have in brackets.
         if usage.split() and line not in (
             "minirospy",
             "rosgraph",
@@ -325,7 +323,7 @@ def test_a_missing_argument(lines: list[str]) -> None:
 
 
 def test_the_other_name_of_each_command() -> None:
-    """`minirospy topic` is `rostopic`."""
+    """`minirospy topic` is the same as `rostopic`."""
     twins = {
         "master": "roscore",
         "make": "catkin_make",
@@ -357,7 +355,7 @@ ROS_OUTPUT = {
     "rosversion": "Cannot locate [nope]\n",
     "rosrun": f"[rosrun] Couldn't find executable named nope below {ROOT / 'msgs' / 'std_msgs'}\n",
 }
-"""What the real commands print to stdout about a name that nothing has."""
+"""Stdout of the real commands for a name that does not exist."""
 
 
 @pytest.mark.parametrize("line", [name for name, row in ROWS.items() if row.unknown and not row.waits])
@@ -388,7 +386,7 @@ def test_a_name_that_nobody_has(line: str, graph: Robot) -> None:
 def test_no_master(uri: str, status: int, says: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", uri)
     if "invalid" in uri:
-        # Asked of the network, this takes seconds where there is none.
+        # A real lookup takes seconds without a network.
         monkeypatch.setattr(socket, "getaddrinfo", _no_such_host)
 
     for line in GRAPH:
@@ -456,7 +454,7 @@ PRINTING = [name for name, row in ROWS.items() if row.good is not None]
 @posix
 @pytest.mark.parametrize("line", PRINTING)
 def test_a_closed_pipe(line: str, graph: Robot) -> None:
-    """`| head -1`."""
+    """The reader closes the pipe, as in `| head -1`."""
     reader, writer = os.pipe()
     os.close(reader)
     with open(writer, "w", encoding="utf-8") as pipe:
@@ -481,7 +479,7 @@ def test_a_full_disk(line: str, graph: Robot) -> None:
 
 @pytest.mark.parametrize("line", [name for name in PRINTING if not ROWS[name].streams])
 def test_closed_streams(line: str, graph: Robot) -> None:
-    """`<&- >&- 2>&-`, and a Windows program without a console."""
+    """The streams are closed, as by `<&- >&- 2>&-`, or in a Windows program without a console."""
     words = f"{line} {ROWS[line].good}"
     assert run(words, stdin=None, stdout=None).err == REPORTED_BY_ROS.get(line, "")
     assert run(words, stdin=None, stdout=None, stderr=None).status in (0, 1)
@@ -516,7 +514,7 @@ def test_an_output_that_cannot_encode(graph: Robot) -> None:
     ],
 )
 def test_words_that_are_no_text(line: str, graph: Robot) -> None:
-    """A byte that is not UTF-8, as Python passes it on."""
+    """An argument has a byte that is not UTF-8, in Python's surrogate form."""
     result = run(f"{line} \udcff")
     assert (result.status, result.out) == (USAGE_ERROR, RULE if line == "rosnode info" else "")
     assert "not UTF-8 text" in one_line(result, line)
@@ -526,7 +524,7 @@ def test_words_that_are_no_text(line: str, graph: Robot) -> None:
 
 
 def _until_ctrl_c(line: str, text: str = "") -> Result:
-    """Run a command; Ctrl-C once it has printed something, or ``text`` as a part of its errors."""
+    """Run a command; send Ctrl-C once it has printed something, or ``text`` as part of its errors."""
     main = threading.main_thread().ident
     assert main is not None
     once = partial(next, iter([True]), False)
@@ -548,7 +546,7 @@ def _until_ctrl_c(line: str, text: str = "") -> Result:
     + ["rosservice call --wait /nope", "rosnode ping /robot", "rostopic pub /t std_msgs/Bool 1"],
 )
 def test_ctrl_c(line: str, graph: Robot) -> None:
-    """It ends with 0, and says no more than a warning."""
+    """The command exits with 0, and prints at most a warning."""
     result = _until_ctrl_c(line)
     assert result.status == 0
     assert re.fullmatch(r"(WARNING: [^\n]*\n)*", result.err)
@@ -558,7 +556,7 @@ def test_ctrl_c(line: str, graph: Robot) -> None:
 @posix
 @pytest.mark.parametrize("line", ["rostopic echo", "rostopic hz", "rostopic bw", "rostopic delay"])
 def test_the_nearest_of_a_topic_that_is_waited_for(line: str, graph: Robot) -> None:
-    """Below real ROS's own warning, which scripts may read."""
+    """The suggestion follows real ROS's own warning, which scripts may read."""
     assert _until_ctrl_c(f"{line} /buton_state", "did you mean").err == (
         "WARNING: topic [/buton_state] does not appear to be published yet\ndid you mean /button_state?\n"
     )
@@ -569,7 +567,7 @@ def test_the_nearest_of_what_else_is_waited_for(graph: Robot) -> None:
     assert _until_ctrl_c("rosservice call --wait /set_led_stat", "did you mean").err == (
         "WARNING: service [/set_led_stat] is not there yet\ndid you mean /set_led_state?\n"
     )
-    # A service that is known and does not answer is near nobody but itself.
+    # A service that is registered and does not answer has no suggestions.
     assert (
         _until_ctrl_c("rosservice call --wait /haunt").err == "WARNING: service [/haunt] is not there yet\n"
     )

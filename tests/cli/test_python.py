@@ -1,4 +1,4 @@
-"""`minirospy python FILE`, as a separate installation needs it."""
+"""`minirospy python FILE`, which users of a separate installation need."""
 
 from __future__ import annotations
 

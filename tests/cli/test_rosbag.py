@@ -1,4 +1,4 @@
-"""The command rosbag: what its verbs print and write, and which exit status they have."""
+"""The command rosbag: output, files and exit statuses of its verbs."""
 
 from __future__ import annotations
 
@@ -250,7 +250,7 @@ def test_filter_refuses_in_one_line(
     Path("x.txt").write_text("text", encoding="utf-8")
     found = command("rosbag", "filter", *words)
     assert (found.status, found.err) == (status, said)
-    # The error is not behind the progress, in the same line.
+    # The error is not on the same line as the progress.
     assert found.out[-1:] in ("", "\n")
     assert len(messages(bag)) == 100
 
@@ -291,7 +291,7 @@ def test_terminal_shows_a_bar(bag: Path) -> None:
     ) as process:
         os.close(terminal)
         shown = b""
-        with contextlib.suppress(OSError):  # Linux: EIO when the other end is closed
+        with contextlib.suppress(OSError):  # Linux raises EIO when the other end is closed
             while data := os.read(controller, 4096):
                 shown += data
     os.close(controller)
@@ -414,7 +414,7 @@ def test_bag_whose_chunk_header_is_damaged_stays_as_it_is(bag: Path, command: Co
 
 
 def test_record_takes_the_size_behind_split(capsys: pytest.CaptureFixture[str]) -> None:
-    """As scripts have it that are older than --size; the second error is of a later step."""
+    """Scripts that are older than --size use this form; the second error is of a later step."""
     assert rosbag.main(["record", "/a", "--split", "5", "--lz4", "-j"]) == 2
     out, err = capsys.readouterr()
     assert out == ""

@@ -1,4 +1,4 @@
-"""The command rosbag check and fix: what they print and write (compared with the real command's by hand: docs/commands.md)."""
+"""The commands rosbag check and fix: output and files (compared with the real commands by hand: docs/commands.md)."""
 
 from __future__ import annotations
 

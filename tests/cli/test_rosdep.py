@@ -1,4 +1,4 @@
-"""rosdep: what packages need that is not here."""
+"""rosdep: dependencies that are not installed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from minirospy.ros.rosdep.commands.rosdep import main
 
 @pytest.fixture
 def source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a folder with two packages, of which one needs the other, and more."""
+    """Return a folder with two packages; one depends on the other and on further packages."""
     needs = {
         "lamp": "<depend>rospy</depend><depend>std_msgs</depend><buildtool_depend>catkin</buildtool_depend>"
         "<exec_depend>python3-yaml</exec_depend><exec_depend>python3-no-such-thing</exec_depend>",

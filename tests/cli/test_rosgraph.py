@@ -1,4 +1,4 @@
-"""The command rosgraph; and rosmaster, whose graph is empty."""
+"""The commands rosgraph and rosmaster, whose graph is empty."""
 
 from __future__ import annotations
 

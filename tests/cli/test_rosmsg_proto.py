@@ -29,7 +29,7 @@ def test_fields_left_out_and_empty_arrays(command: Any) -> None:
 
 
 def test_layouts_as_the_real_one_has_them(command: Any) -> None:
-    """Bytes are no list; from the first wide value on all is narrow; lines go on below the 80th column."""
+    """Bytes are not a list; from the first wide value on, all values are narrow; lines continue past the 80th column."""
     image = command("rosmsg_proto", "msg", "sensor_msgs/Image", "-H").out
     assert "  stamp: {secs: 0, nsecs: 0}\n" in image
     assert image.endswith('\nstep: 0\ndata: !!binary ""\n')

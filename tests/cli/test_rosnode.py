@@ -1,4 +1,4 @@
-"""rosnode: its lines as real ROS prints them, and its exit statuses."""
+"""rosnode: output as in real ROS, and exit statuses."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_info_shows_connections(robot: Any, program: Start, command: Any) -> Non
     (name,) = [each for each in command("rosnode", "list").out.split() if each != "/robot"]
     there = command("rosnode", "info", "/robot").out
     assert f"Connections:\n * topic: /button_state\n    * to: {name}\n    * direction: outbound" in there
-    # A Unix socket has no ports: real ROS prints nothing for a connection without them.
+    # A Unix socket has no ports: real ROS prints nothing for a connection without ports.
     is_unix = sys.platform == "linux"
     transport, ports = ("UNIXROS", "") if is_unix else ("TCPROS", r" \(\d+ - \S+:\d+\) \[\d+\]")
     assert re.search(rf"outbound{ports}\n    \* transport: {transport}\n", there)
@@ -153,7 +153,7 @@ def test_a_node_that_hangs_is_not_killed(
         assert err.startswith(
             f"rosnode: ERROR: node [/hung] does not answer at {uri} (timed out after 0.1 s): "
         )
-        # The robot has time to answer.
+        # Give the robot time to answer.
         slave = nodes._slave
         monkeypatch.setattr(
             nodes,

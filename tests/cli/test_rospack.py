@@ -1,4 +1,4 @@
-"""rospack: its lines and exit statuses; tests/interop/test_interop_rospack.py holds them beside the real one's."""
+"""rospack: output and exit statuses; tests/interop/test_interop_rospack.py compares them with the real one's."""
 
 from __future__ import annotations
 
@@ -184,7 +184,7 @@ def test_profile(command: Any, tree: Path) -> None:
 
 
 def test_finding_imports_little(tree: Path) -> None:
-    """`rospack find` is called in loops: what it does not need, it does not import."""
+    """`rospack find` is called in loops, so it imports only the modules that it needs."""
     code = (
         "import sys; from minirospy.ros.rospack.commands.rospack import main; main(['find', 'a']); "
         "print({'asyncio', 'pyexpat', 'yaml', 'numpy', 'subprocess'} & set(sys.modules))"

@@ -1,4 +1,4 @@
-"""rosparam: its lines as real ROS prints them, and its exit statuses."""
+"""rosparam: output as in real ROS, and exit statuses."""
 
 from __future__ import annotations
 

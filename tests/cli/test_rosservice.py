@@ -1,4 +1,4 @@
-"""rosservice: its lines as real ROS prints them, and its exit statuses."""
+"""rosservice: output as in real ROS, and exit statuses."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def test_unknown_and_silent_services(robot: Any, master: str, command: Any) -> N
 
 
 def test_waiting_for_a_service(master: str, command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The wait polls until the service is registered; here it is, after the first look."""
+    """The command polls until the service is registered; here it is registered after the first poll."""
     looked = threading.Event()
     monkeypatch.setattr("minirospy.introspect.services.time.sleep", lambda _: looked.set())
     probes = iter([None, None, "std_srvs/SetBool"])
@@ -179,7 +179,7 @@ def test_a_service_that_does_not_answer(master: str, command: Any) -> None:
         ghost.register_service("/gone", "rosrpc://localhost:9", "http://localhost:9/")
     for verb in ("type", "call", "args", "info"):
         status, out, err = command("rosservice", verb, "/gone")
-        # What the master knows is printed all the same.
+        # The master's information is printed nevertheless.
         assert (status, out) == (2, "Node: /ghost\nURI: rosrpc://localhost:9\n" if verb == "info" else "")
         assert err.startswith("rosservice: ERROR: service [/gone] does not answer at rosrpc://localhost:9 (")
         assert "`rosnode cleanup` forgets nodes that have ended" in err
@@ -205,7 +205,7 @@ def test_a_terminal_asks_for_missing_values(robot: Any) -> None:
 
 
 def test_words_for_values_work_in_nested_headers() -> None:
-    """As real rosservice: `auto` is a stamped header, `now` the time."""
+    """As in real rosservice: `auto` is a stamped header, `now` the current time."""
     from sensor_msgs.srv import SetCameraInfoRequest
 
     from minirospy.introspect.services import fill_request

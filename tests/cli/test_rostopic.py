@@ -1,4 +1,4 @@
-"""rostopic: its lines as real ROS prints them, its exit statuses, and streams that end quietly."""
+"""rostopic: output as in real ROS, exit statuses, and streams that are closed quietly."""
 
 from __future__ import annotations
 
@@ -276,7 +276,7 @@ def test_hz_and_bw(robot: Any, program: Start) -> None:
     feeder.start()
     try:
         average = 0.0
-        # A machine that stalls makes an average wrong, but not for long.
+        # A stall of the machine distorts an average only briefly.
         while not 5.0 < average < 40.0:
             line = rate.stdout.readline()
             while not line.startswith("average rate: "):
@@ -301,7 +301,7 @@ def test_hz_and_bw(robot: Any, program: Start) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a Unix pipe")
 def test_a_closed_pipe_is_quiet(robot: Any, program: Start) -> None:
-    """`rostopic echo | head -1`."""
+    """The reader closes the pipe, as in `rostopic echo | head -1`."""
     echo = program(["rostopic", "echo", "/button_state"])
     assert echo.stdout is not None
     assert echo.stderr is not None
@@ -339,7 +339,7 @@ def test_list_imports_little(robot: Any) -> None:
 
 
 def _interrupt(process: subprocess.Popen[str]) -> None:
-    """Ctrl-C."""
+    """Send Ctrl-C."""
     process.send_signal(signal.SIGINT if sys.platform != "win32" else signal.SIGTERM)
 
 
@@ -371,7 +371,7 @@ def test_pub_of_the_empty_text(robot: Any, command: Any, monkeypatch: pytest.Mon
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a Unix pipe")
 def test_pub_of_a_pipe_that_stays_open(robot: Any, program: Start) -> None:
-    """`rostopic echo /a | rostopic pub /b TYPE`: each message goes out when it has come, not when all have."""
+    """For `rostopic echo /a | rostopic pub /b TYPE`: each message is published when it has arrived, not at end of file."""
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool"])
     assert pub.stdin is not None
     for text, heard in (("data: True\n---\n", [b"\x01"]), ("data: False\n---\n", [b"\x01", b"\x00"])):
@@ -390,7 +390,7 @@ def test_a_killed_tool_does_not_stay_registered(robot: Any, program: Start, comm
 
 
 def test_time_by_the_clock_topic(robot: Any, program: Start) -> None:
-    """With /use_sim_time, `now` and the time of arrival are those of /clock."""
+    """With /use_sim_time, `now` and the arrival time are those of /clock."""
     with closing(MasterProxy(robot.node.environment.master_uri, "/test")) as master:
         master.set_param("/use_sim_time", True)
     type_ = InterfaceType(Clock._type, Clock._md5sum, Clock._full_text)
@@ -398,12 +398,12 @@ def test_time_by_the_clock_topic(robot: Any, program: Start) -> None:
     robot.publish("/clock", Clock(genpy.Time(100)))
     row = program(["rostopic", "echo", "-p", "-n1", "/button_state"])
     now = program(["rostopic", "pub", "-1", "-v", "--use-rostime", "/t", "std_msgs/Time", "now"])
-    # A node goes by /clock and listens to it with one subscription.
+    # A node uses and echoes /clock with one subscription.
     clock = program(["rostopic", "echo", "-n1", "/clock"])
 
     assert clock.communicate(timeout=30)[0] == "clock: \n  secs: 100\n  nsecs:         0\n---\n"
     out, err = row.communicate(timeout=30)
-    # The message may have come before the clock's.
+    # The message may arrive before the clock's first.
     assert re.fullmatch(r"%time,field.data\n(100000000000|0),1\n", out)
     assert err == "WARNING: may be using simulated time\n"
     assert now.stdout is not None
@@ -430,7 +430,7 @@ def test_hz_of_a_field_and_bw_of_several_topics(robot: Any, program: Start) -> N
 
 
 def test_the_words_that_a_launch_file_adds(robot: Any, command: Any, program: Start) -> None:
-    """`<node pkg="rostopic" type="rostopic" args="pub ..."/>`: __name:=, __ns:=, __log:= and remappings."""
+    """For `<node pkg="rostopic" type="rostopic" args="pub ..."/>`: __name:=, __ns:=, __log:= and remappings."""
     everything = command("rostopic", "list").out
     assert command("rostopic", "list", "__name:=x", "__log:=/x.log", "_p:=1").out == everything
     assert command("rostopic", "type", "chatter", "__ns:=ns").out == "std_msgs/String\n"

@@ -34,7 +34,7 @@ def test_of_all(command: Command) -> None:
 
 
 def test_of_what_minirospy_brings_along(command: Command) -> None:
-    """The releases of ROS that the definitions are those of, not a number of our own."""
+    """The version is that of the ROS release from which the definitions are, not minirospy's."""
     for package, version in (
         ("std_msgs", "0.5.13"),
         ("sensor_msgs", "1.13.1"),

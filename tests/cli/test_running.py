@@ -1,4 +1,4 @@
-"""roscore, rosrun, roslaunch and the demo as real processes: what they print, start and leave behind."""
+"""roscore, rosrun, roslaunch and the demo as real processes: their output, child processes, and leftovers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such 
 
 
 def launched(file: Path) -> subprocess.CompletedProcess[str]:
-    """roslaunch of a file whose nodes end by themselves."""
+    """Run roslaunch on a file whose nodes exit by themselves."""
     return subprocess.run(
         [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=100, check=False
     )
@@ -38,7 +38,7 @@ def launched(file: Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def port(monkeypatch: pytest.MonkeyPatch) -> int:
-    """Return a free port, which ROS_MASTER_URI names."""
+    """Return a free port, and set ROS_MASTER_URI to it."""
     number = free_port()
     monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{number}")
     return number
@@ -51,7 +51,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     (folder / "package.xml").write_text("<package><name>pkg</name></package>")
     (folder / "wait.py").write_text(
-        # One write a line: roslaunch writes to the same pipe at the same time.
+        # A single write per line: roslaunch writes to the same pipe at the same time.
         "#!/usr/bin/env python3\n"
         "import sys, time\nsys.stdout.write(' '.join(['waiting', *sys.argv[1:]]) + '\\n')\nsys.stdout.flush()\n"
         "try:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    print('interrupted', flush=True)\n"
@@ -70,7 +70,7 @@ def started() -> Iterator[list[subprocess.Popen[str]]]:
     running: list[subprocess.Popen[str]] = []
     yield running
     for process in running:
-        # With all that it started: an orphan would hold the pipe open.
+        # Stop its children too: an orphan would keep the pipe open.
         with contextlib.suppress(psutil.Error):
             for child in psutil.Process(process.pid).children(recursive=True):
                 child.kill()
@@ -87,7 +87,7 @@ def start(running: list[subprocess.Popen[str]], *command: str) -> subprocess.Pop
 
 
 def read_until(process: subprocess.Popen[str], word: str) -> str:
-    """Return what is printed up to the line that has ``word``."""
+    """Return the output up to the line that contains ``word``."""
     assert process.stdout
     said = ""
     for line in process.stdout:
@@ -219,7 +219,7 @@ def test_roslaunch_starts_a_master_and_leaves_nothing_behind(
 
     proxy.close()
     children = psutil.Process(launch.pid).children(recursive=True)
-    # The master, both nodes, and what would end them if roslaunch were killed.
+    # The master, both nodes, and the guardian that stops them if roslaunch is killed.
     assert len(children) == 4
 
     launch.send_signal(signal.SIGINT)
@@ -255,8 +255,8 @@ def test_a_required_node_ends_all(master: str, package: Path, code: int, status:
 def test_nodes_run_without_log_files(
     master: str, package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What they print comes to the terminal instead."""
-    # An unbuffered node writes the end of its line separately: a line of roslaunch may come between.
+    """Their output goes to the terminal."""
+    # An unbuffered node writes the line end separately: a line of roslaunch may come between.
     monkeypatch.setenv("PYTHONUNBUFFERED", "")
     (tmp_path / "file").touch()
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "file"))
@@ -368,7 +368,7 @@ def test_undeclared_launch_argument_is_a_warning(package: Path, capsys: pytest.C
 def test_the_line_of_a_node_where_no_master_is_named(
     package: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As real ROS has it, so that the line does the same in every terminal."""
+    """The line matches real ROS's, so that it works in every terminal."""
     file = package / "a.launch"
     file.write_text('<launch><node name="n" ns="g" pkg="pkg" type="wait.py"/></launch>')
     assert roslaunch.main(["--args", "/g/n", str(file)]) == 0

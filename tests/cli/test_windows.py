@@ -1,4 +1,4 @@
-"""cli/windows: the windows of rqt, as plug-ins and as ROS packages."""
+"""cli/windows: rqt's windows, as plug-ins and as ROS packages."""
 
 from __future__ import annotations
 

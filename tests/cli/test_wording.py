@@ -1,6 +1,6 @@
-"""What commands print in ROS's own words, before their own line: scripts and ROS's tests match it.
+"""ROS's own messages of commands, before minirospy's own line: scripts and ROS's tests match them.
 
-The texts are ROS's; tests/interop compares them with what the real commands print.
+The texts are ROS's; tests/interop compares them with the real commands' output.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def test_help_begins_with_that_of_ros(
         ("rostopic", (64, 64, 64, 64)),
         ("rosnode", (64, 64, 0, 64)),
         ("rosservice", (64, 64, 64, 64)),
-        # Real ROS ends with 0 for an unknown verb of rosparam, which hides the error from scripts.
+        # Real ROS exits with 0 for an unknown verb of rosparam, which hides the error from scripts.
         ("rosparam", (0, 0, 0, 64)),
         ("rosmsg", (0, 64, 0, 64)),
     ],

@@ -1,15 +1,15 @@
-"""Shut a node down at each step of its init_node: one forked process for one step.
+"""Shut a node down at each step of its init_node, with one forked process per step.
 
-A step is a call of a function, of Python or C, or its return: where Python runs signal handlers. At each of them a signal has
-to end the process with status 0 and without a word, its hooks have run once, no thread waits for another, and the master,
-which ROS_MASTER_URI names, does not know the node.
+A step is a call of a function in Python or C, or its return: Python runs signal handlers at these points. At each of them, a
+signal must end the process with status 0 and without output, after its hooks have run once, without a deadlock, and the
+master (ROS_MASTER_URI) must not know the node any more.
 
 usage: python signal_steps.py WAY [EVERY]
 
-``passes``: the signal comes at the step, and the main thread goes on. ``stands``: it stands at the step until the signal is
-dispatched there. ``elsewhere``: another thread shuts the node down while the main thread stands at the step. ``twice``: two
-signals, of which the second may interrupt the hook, and the wait for the master. With EVERY 30 each thirtieth step is tried.
-Prints the faults, exit status 1 where there are some.
+``passes``: the signal arrives at the step, and the main thread continues. ``stands``: the main thread stays at the step until
+the signal is dispatched there. ``elsewhere``: another thread shuts the node down while the main thread stays at the step.
+``twice``: two signals, of which the second may interrupt the hook, and the wait for the master. EVERY 30 tests each thirtieth
+step. Prints the faults; the exit status is 1 if there are any.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from roscpp import msg, srv  # noqa: F401
 
 from minirospy.base.errors import RpcRefused
 
-# What init_node imports: the steps of an import are not those of a node.
+# Import the modules of init_node: an import's steps do not count as the node's.
 from minirospy.client import params, shutdown, startup  # noqa: F401
 from minirospy.client.session import current_session
 from minirospy.runtime.master import log_file  # noqa: F401
@@ -42,11 +42,10 @@ from minirospy.runtime.transport import loop
 
 _AT_ONCE = 3
 _numbers = itertools.count()
-_GUARD = 60.0
-"""Seconds after which a process is taken to hang; a machine that runs tests may stand still for some."""
+_GUARD = 60.0  # seconds after which a process is considered hung; a machine that runs tests may stall
+# Maximum seconds at a step: in a critical section or before the library's thread has started, no signal is
+# dispatched.
 _STAND = 0.3
-"""Seconds that the main thread stands at most at a step: one in a critical section dispatches nothing, nor one before the
-library's thread has started."""
 
 
 def passes() -> None:
@@ -84,13 +83,14 @@ _WAYS = {way.__name__: way for way in (passes, stands, twice, elsewhere)}
 
 
 def run_node(name: str, at: int, way: Callable[[], None], notes: int) -> None:
-    """Make this process a node that is shut down at a step; write the steps that it counted, and where it was, to ``notes``.
+    """Make this process a node that is shut down at a step; write the counted steps and the position to ``notes``.
 
-    Step 0: it is not.
+    At step 0 it is not shut down.
     """
-    # What depends on the machine's pace: an interrupt of a main thread that goes on, a report of what takes long.
+    # Disable timeouts that depend on the machine's speed: the interrupt of a running main thread, the report of slow
+    # work.
     shutdown._GRACE_SECONDS = shutdown._REPORT_SECONDS = 1000.0
-    # Limits that hide that two threads wait for each other.
+    # Raise the limits that would hide a deadlock.
     loop._CLOSE_SECONDS = registration._SILENT_SECONDS = registration._STILL_SILENT_SECONDS = 1000.0
     signal.signal(signal.SIGINT, signal.default_int_handler)
     steps = hooks = 0
@@ -143,7 +143,7 @@ class Trial:
     """A forked process that is shut down at one step."""
 
     def __init__(self, at: int, way: Callable[[], None]) -> None:
-        """Start it."""
+        """Start the process."""
         self.name = f"at_{at}_{next(_numbers)}"
         self._output, self._notes = _file(), _file()
         self._is_twice = way is twice
@@ -163,7 +163,7 @@ class Trial:
 
     @property
     def has_ended(self) -> bool:
-        """Return whether it has ended; one that hangs is killed."""
+        """Return whether it has exited; kill a process that hangs."""
         if time.monotonic() > self._end:
             os.kill(self._pid, signal.SIGKILL)
         pid, status = os.waitpid(self._pid, os.WNOHANG)
@@ -171,7 +171,7 @@ class Trial:
         return pid != 0
 
     def result(self, master: MasterProxy) -> tuple[str, str]:
-        """Return what it noted, and what is wrong with how it has ended; "" where nothing is."""
+        """Return its notes, and the fault of its exit; "" if there is none."""
         texts = []
         for file in (self._output, self._notes):
             with file:
@@ -179,7 +179,7 @@ class Trial:
                 texts.append(file.read().decode())
         output, notes = texts
         if self._is_twice:
-            # What the second signal has interrupted may warn, and stay in the master's lists.
+            # The second signal may cause a warning, and leave the node in the master's lists.
             output = output if "Traceback" in output else ""
         else:
             with contextlib.suppress(RpcRefused):
@@ -192,7 +192,7 @@ class Trial:
 def main(way: str, every: str = "1") -> int:
     """Try the steps; return the exit status."""
     master = MasterProxy(os.environ["ROS_MASTER_URI"], "/signal_steps")
-    # What is imported and cached at the first call is not to be counted as steps of init_node.
+    # Imports and caches of the first call must not count as steps of init_node.
     master.get_pid()
     counting = Trial(0, _WAYS[way])
     while not counting.has_ended:

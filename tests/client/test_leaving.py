@@ -1,4 +1,4 @@
-"""However a node ends, it leaves the graph: the master knows it no more, and its process ends with status 0."""
+"""A node leaves the graph however it shuts down: the master does not know it any more, and its process exits with status 0."""
 
 from __future__ import annotations
 

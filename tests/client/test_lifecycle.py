@@ -1,4 +1,4 @@
-"""A node's life where real rospy hangs or breaks: signals, forks, threads, pytest. What both do is in tests/referee."""
+"""A node's lifecycle in cases in which real rospy hangs or fails: signals, forks, threads, pytest. tests/referee has the rest."""
 
 from __future__ import annotations
 
@@ -27,12 +27,11 @@ from minirospy.runtime.transport.loop import LoopThread
 POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals, and no fork")
 
 
-GUARD = 45.0
-"""Seconds after which a program is taken to hang; a machine that runs tests may stand still for some."""
+GUARD = 45.0  # seconds after which a program is considered hung; a machine that runs tests may stall
 
 
 def read_line(process: subprocess.Popen[str]) -> str:
-    """Return a line that a program prints. What came with it would be lost to communicate(), so nothing else is read."""
+    """Return a line that a program prints. Read no more than that: communicate() would miss buffered data."""
     assert process.stdout
     line = b""
     while not line.endswith(b"\n") and (byte := os.read(process.stdout.fileno(), 1)):
@@ -41,7 +40,7 @@ def read_line(process: subprocess.Popen[str]) -> str:
 
 
 def start(script: str, *arguments: str) -> subprocess.Popen[str]:
-    """Return a program that has said "ready"."""
+    """Return a program that has printed "ready"."""
     process = subprocess.Popen(
         [sys.executable, "-W", "ignore", "-c", script, *arguments],
         stdout=subprocess.PIPE,
@@ -54,12 +53,12 @@ def start(script: str, *arguments: str) -> subprocess.Popen[str]:
     return process
 
 
+# At the start of a slow program: on a busy machine it would report what it waits for.
 NO_REPORT = "from minirospy.client import shutdown; shutdown._REPORT_SECONDS = 1000.0\n"
-"""Begins a program that takes its time: on a busy machine it would report what it waits for."""
 
 
 def deliver(process: subprocess.Popen[str], number: int) -> None:
-    """Send a signal and wait until the process has it: of two that are pending it gets one."""
+    """Send a signal and wait until the process has received it: of two pending ones it receives one."""
     process.send_signal(number)
     if sys.platform != "linux":
         time.sleep(0.1)
@@ -73,9 +72,9 @@ def deliver(process: subprocess.Popen[str], number: int) -> None:
 
 
 def signalled(script: str, number: int) -> tuple[int, str, str, float]:
-    """Return a program's exit status, what it says after the signal, and how long it takes."""
+    """Return a program's exit status, its output after the signal, and its duration."""
     process = start(script)
-    # Its input stays open: a program that reads it is to end by the signal.
+    # Its stdin stays open: a program that reads it must exit because of the signal.
     open_input, process.stdin = process.stdin, None
     assert open_input
     with open_input:
@@ -85,12 +84,11 @@ def signalled(script: str, number: int) -> tuple[int, str, str, float]:
         return process.returncode, output, errors, time.monotonic() - start_time
 
 
-SECONDS = 3.0
-"""A second is what is promised; a machine that tests may be busy."""
+SECONDS = 3.0  # one second is promised; a machine that runs tests may be busy
 
 
 def in_time(program: Callable[[], float]) -> None:
-    """Check that ``program`` ends within SECONDS. A machine that stalls meanwhile gets two more attempts."""
+    """Check that ``program`` exits within SECONDS. If the machine stalls, try up to three times."""
     took = [program()]
     while min(took) >= SECONDS and len(took) < 3:
         took.append(program())
@@ -118,7 +116,7 @@ finally:
 """
 
 ONE_SIGNAL = {
-    # What a program does; what it prints from the signal on.
+    # The program's code; its output from the signal on.
     "time.sleep": ("ready(); time.sleep(60)", "hook finally atexit"),
     "a lock": ("ready(); threading.Event().wait()", "hook finally atexit"),
     "a busy loop": ("ready()\nwhile True: pass", "hook finally atexit"),
@@ -147,7 +145,8 @@ ONE_SIGNAL = {
     ),
 }
 TWO_SIGNALS = {
-    # What a program does; what it prints between the two, as well as on stderr what it waits for; what it prints then.
+    # The program's code; its output between the signals, including on stderr what it waits for; its output
+    # afterwards.
     "a slow loop that polls": (
         "while not rospy.is_shutdown(): ready(); time.sleep(60)",
         "hook",
@@ -234,14 +233,14 @@ def test_a_second_signal_ends_a_program_that_goes_on(master: str, what: str, num
     process.send_signal(number)
     process.wait(GUARD)
     if child := re.search(r"process child \((\d+)\)", report):
-        # It goes on without its parent, with the pipes.
+        # It outlives its parent, and has the pipes open.
         os.kill(int(child[1]), signal.SIGKILL)
     output, errors = process.communicate(timeout=GUARD)
     assert (process.returncode, output.split(), errors) == (0, then.split(), "")
 
 
 def read_report(process: subprocess.Popen[str]) -> str:
-    """Return the line on stderr that says what a shutdown waits for."""
+    """Return the line on stderr that reports what a shutdown waits for."""
     assert process.stderr
     line = process.stderr.readline()
     assert line.startswith("shutdown: still waiting for ")
@@ -316,7 +315,7 @@ def test_c_code_is_awaited_and_finally_runs(master: str, signals: int, prints: s
         assert process.stdin
         process.stdin.write(("INTERRUPT" if signals == 1 else "KEYBOARD_INTERRUPT") + "\n")
     else:
-        # communicate() closes its input, and so would end the call of C code.
+        # communicate() closes stdin, and so would end the call of C code.
         process.wait(timeout=GUARD)
     output, errors = process.communicate(timeout=GUARD)
     assert (process.returncode, errors) == (status, "")
@@ -325,9 +324,9 @@ def test_c_code_is_awaited_and_finally_runs(master: str, signals: int, prints: s
 
 @POSIX_ONLY
 def test_hooks_run_in_time_while_the_main_thread_is_in_c_code(master: str) -> None:
-    """The half second after which another thread runs them is the state machine's, tested there with a manual clock.
+    """The half second after which another thread runs them belongs to the state machine, which is tested with a manual clock.
 
-    The program counts the ticks in it: the time on a busy machine shows nothing.
+    The program counts the ticks in it: elapsed time on a busy machine shows nothing.
     """
     process = start(IN_C_CODE)
     process.send_signal(signal.SIGTERM)
@@ -395,7 +394,7 @@ finally:
 
 @contextlib.contextmanager
 def master_that_stops(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], object]]:
-    """Run a master; what is yielded stops it: it accepts connections, and answers nothing."""
+    """Run a master; yield a function that stops it: it then accepts connections, but never answers."""
     loop, go_on = LoopThread("test-master"), threading.Event()
     serving = Master()
     loop.run(serving.start())
@@ -431,9 +430,9 @@ def test_a_second_signal_ends_the_wait_for_a_silent_master(
 @POSIX_ONLY
 @pytest.mark.parametrize("way", ["passes", "stands", "elsewhere", "twice"])
 def test_a_shutdown_at_any_step_of_init_node(master: str, way: str) -> None:
-    """Nothing is printed, no thread waits for another, and nothing stays behind in the master.
+    """Nothing is printed, there is no deadlock, and nothing remains registered at the master.
 
-    Each hundredth step; ``python tests/client/signal_steps.py stands`` tries all of them.
+    Tests each hundredth step; ``python tests/client/signal_steps.py stands`` tests all of them.
     """
     done = subprocess.run(
         [sys.executable, str(Path(__file__).with_name("signal_steps.py")), way, "100"],
@@ -446,7 +445,7 @@ def test_a_shutdown_at_any_step_of_init_node(master: str, way: str) -> None:
 
 @POSIX_ONLY
 def test_nohup(master: str) -> None:
-    """What ignores SIGHUP goes on when the terminal is closed."""
+    """A program that ignores SIGHUP continues when the terminal is closed."""
     process = start("""
 import signal, rospy
 signal.signal(signal.SIGHUP, signal.SIG_IGN)
@@ -461,7 +460,7 @@ print("still there")
 
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux has process namespaces")
 def test_the_first_process_of_a_container(master: str) -> None:
-    """The kernel gives it no signal that it does not handle."""
+    """The kernel does not deliver a signal to it that it does not handle."""
     unshare = ["unshare", "--pid", "--fork", "--kill-child"]
     if (
         not shutil.which("unshare")
@@ -518,7 +517,7 @@ print("cleaned up", flush=True)
 
 @POSIX_ONLY
 def test_a_program_that_stands_still_keeps_its_time(master: str) -> None:
-    """What it is granted after a signal is time in which it can run, on a machine that stalls, too."""
+    """Its grace period after a signal is time in which it can run, also on a machine that stalls."""
     process = start("""
 import signal, time, rospy
 rospy.init_node("still")
@@ -958,7 +957,7 @@ except rospy.ROSInitException as error:
 
 @POSIX_ONLY
 def test_a_hook_does_not_log_into_a_line_that_is_being_written(master: str) -> None:
-    """Files and streams are not re-entrant: a signal in the middle of a line waits for its end."""
+    """Files and streams are not re-entrant: a signal in the middle of a line waits until the line is written."""
     process = start("""
 import atexit, logging, os, signal
 import rospy
@@ -990,7 +989,7 @@ rospy.loginfo("line")
 
 @POSIX_ONLY
 def test_a_fork_is_left_to_the_system_until_it_polls(master: str) -> None:
-    """A Python handler would wait for the C code that a worker of a pool is in: now and then for ever."""
+    """A Python handler would wait for the C code of a pool's worker, sometimes forever."""
     process = start("""
 import os, signal, sys, time
 import rospy

@@ -1,4 +1,4 @@
-"""Log lines where minirospy does better than rospy; what is the same is in tests/referee."""
+"""Improvements of minirospy's logging over rospy's; tests/referee compares the common behaviour."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.usefixtures("master")
 
 
 def run(program: str, *arguments: str, **environment: str) -> tuple[str, str]:
-    """Return the stdout and stderr of a program that ends well, without the times in its lines."""
+    """Return the stdout and stderr of a program that exits with 0, without the times in its lines."""
     done = subprocess.run(
         [sys.executable, "-c", program, *arguments],
         env={**os.environ, "ROSCONSOLE_FORMAT": "[${severity}] ${message}", **environment},
@@ -179,7 +179,7 @@ rospy.logfatal("fatal")
     )
     os.close(theirs)
     written = b""
-    # Linux raises an error at the end of a terminal.
+    # Linux raises an error when the terminal is closed.
     with contextlib.suppress(OSError):
         while data := os.read(ours, 10_000):
             written += data

@@ -1,4 +1,4 @@
-"""Parameters where minirospy does better than rospy; what is the same is in tests/referee."""
+"""Improvements of minirospy's parameters over rospy's; tests/referee compares the common behaviour."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from minirospy.runtime.transport.loop import LoopThread
 
 @pytest.fixture
 def serving(monkeypatch: pytest.MonkeyPatch) -> Iterator[Master]:
-    """Return a master of the test's own, whose tables it can look into."""
+    """Return a master whose tables the test can read."""
     loop = LoopThread("test-master")
 
     async def start() -> Master:
@@ -33,7 +33,7 @@ def serving(monkeypatch: pytest.MonkeyPatch) -> Iterator[Master]:
 
 
 def run(program: str) -> list[str]:
-    """Return the lines of a program that ends well."""
+    """Return the output lines of a program that exits with 0."""
     done = subprocess.run(
         [sys.executable, "-c", program],
         capture_output=True,

@@ -1,4 +1,4 @@
-"""Where services of ours do better than rospy's, on purpose: what rospy answers with a hang or a dead proxy."""
+"""Deliberate improvements of services over rospy's, for cases in which rospy hangs or leaves a dead proxy."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ Program = subprocess.Popen[str]
 
 @pytest.fixture
 def started(master: str) -> Iterator[list[Program]]:
-    """Programs to be ended with the test."""
+    """Yield a list of programs that are stopped after the test."""
     programs: list[Program] = []
     yield programs
     for program in programs:
@@ -101,7 +101,7 @@ def hear(program: Program) -> str:
 
 
 def test_a_persistent_proxy_outlives_its_server(started: list[Program]) -> None:
-    """rospy's raises AttributeError at each call from then on."""
+    """rospy's proxy raises AttributeError at each call from then on."""
     client = start(started, PERSISTENT)
     for name in ("one", "two"):
         server = start(started, SERVER, name)
@@ -154,7 +154,7 @@ def test_closing_a_persistent_proxy_ends_the_call_of_another_thread(started: lis
 
 
 def test_a_proxy_follows_a_service_that_moves(started: list[Program]) -> None:
-    """It connects to the last known address first; the answer comes from the node that the master names."""
+    """It connects to the last known address first; the response comes from the node that the master returns."""
     client = start(started, PERSISTENT.replace("persistent=True", "persistent=False"))
     servers = []
     for name in ("one", "two"):
@@ -183,7 +183,7 @@ def test_a_shutdown_ends_a_call_that_waits(started: list[Program]) -> None:
 
 
 def test_a_request_that_does_not_fit_is_answered(started: list[Program], master: str) -> None:
-    """rospy's thread dies of it, and the client waits for ever."""
+    """rospy's thread exits, and the client waits forever."""
     server = start(started, SERVER, "server")
     assert hear(server) == "ready"
     proxy = MasterProxy(master, "/test")
@@ -203,7 +203,7 @@ def test_a_request_that_does_not_fit_is_answered(started: list[Program], master:
 
 
 def test_a_call_of_what_is_not_there_fails_with_one_error(started: list[Program]) -> None:
-    """rospy prints its own internals before it."""
+    """rospy also prints its own internals."""
     client = start(
         started,
         """

@@ -18,7 +18,7 @@ from minirospy.runtime.transport.loop import LoopThread
 
 @pytest.fixture(autouse=True)
 def session(monkeypatch: pytest.MonkeyPatch) -> Session:
-    """Return a session without a node, in place of the process's."""
+    """Return a session without a node, in place of the process's session."""
     own = Session()
     monkeypatch.setattr(sessions._Process, "session", own)
     return own
@@ -52,7 +52,7 @@ def test_the_next_session_keeps_name_clock_and_listeners_alone(session: Session)
     assert following.parameter_listeners == [print]
     assert (following.init_arguments, following.node, following.lifecycle.hooks) == (None, None, [])
     assert not following.is_shutdown()
-    # The old one stays what it was, for the publishers that were made in it.
+    # The old session is unchanged, for the publishers that were created in it.
     assert session.is_shutdown()
 
 
@@ -80,7 +80,7 @@ def test_what_waits_for_a_node_runs_once_it_is_ready(session: Session) -> None:
 
 
 def test_a_signal_while_a_call_of_the_loop_starts_waits_for_its_start(session: Session) -> None:
-    """The thread holds a lock then, for which the end of the loop would wait."""
+    """The thread has a lock at that point, for which closing the loop would wait."""
     was_requested: list[bool] = []
 
     class Loop:

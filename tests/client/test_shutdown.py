@@ -1,4 +1,4 @@
-"""The rules of a shutdown, by a manual clock; and the moments between a signal and what the main thread does about it."""
+"""The rules of a shutdown, with a manual clock; and the moments between a signal and the main thread's reaction."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def machine() -> ShutdownMachine:
 
 
 def timeline(machine: ShutdownMachine, start: float, end: float) -> list[tuple[float, Action]]:
-    """Return what ten ticks a second bring from ``start`` to ``end``, each with its time."""
+    """Return the actions of ten ticks a second from ``start`` to ``end``, each with its time."""
     times = [round(tenth / 10, 1) for tenth in range(round(start * 10), round(end * 10) + 1)]
     return [(now, action) for now in times for action in machine.tick(now)]
 
@@ -52,7 +52,7 @@ def test_hooks_run_elsewhere_where_the_main_thread_is_in_c_code(machine: Shutdow
     machine.signal(0.0)
     assert timeline(machine, 0.0, 0.9) == [(0.5, Action.RUN_HOOKS)]
     machine.phase = Phase.HOOKS
-    # However long they take, the main thread is not interrupted before is_shutdown() is true.
+    # However long hooks take, the main thread is not interrupted before is_shutdown() is true.
     assert timeline(machine, 1.0, 9.9) == [(2.0, Action.REPORT)]
     machine.phase = Phase.DOWN
     assert timeline(machine, 10.0, 20.0) == [(10.5, Action.INTERRUPT)]
@@ -75,7 +75,7 @@ def test_a_second_signal_ends_the_wait_for_the_master_alone(machine: ShutdownMac
     machine.phase = Phase.LEAVING
     assert machine.signal(1.0) == [Action.STOP_LEAVING]
     machine.phase = Phase.LEFT
-    # A main thread that goes on regardless is interrupted, as after one signal.
+    # A main thread that continues is interrupted, as after one signal.
     assert timeline(machine, 1.0, 1.9) == [(1.5, Action.INTERRUPT)]
     assert machine.signal(3.0) == [Action.EXIT]
 
@@ -135,7 +135,7 @@ def lifecycle() -> Lifecycle:
 
 @pytest.fixture
 def watchdog(lifecycle: Lifecycle) -> SignalWatchdog:
-    """Not installed: the handler is called as the system would call it."""
+    """Return a watchdog that is not installed: tests call the handler as the system would."""
     return SignalWatchdog(lifecycle, lambda: None, lambda: False)
 
 
@@ -144,7 +144,7 @@ def test_a_thread_that_was_notified_meanwhile_is_not_interrupted(
     lifecycle: Lifecycle, watchdog: SignalWatchdog, *, was_notified: bool
 ) -> None:
     lifecycle.signal_shutdown("test")
-    # The watchdog sends the interrupt; before it arrives, the program polls is_shutdown(), and goes to its clean-up.
+    # The watchdog sends the interrupt; before it arrives, the program polls is_shutdown(), and starts to clean up.
     watchdog._interrupt = Action.INTERRUPT
     watchdog._is_nudge = True
     if was_notified:
@@ -160,7 +160,7 @@ def test_a_thread_that_was_notified_meanwhile_is_not_interrupted(
 def test_a_signal_waits_for_the_next_call_of_rospy(
     lifecycle: Lifecycle, watchdog: SignalWatchdog, call: str
 ) -> None:
-    """Until then the program may be about to use what a hook releases."""
+    """Until then the program may be about to use an object that a hook releases."""
     watchdog._on_signal(signal.SIGINT, None)
     assert not lifecycle.is_shutdown_requested
     if call == "poll_shutdown":
@@ -190,7 +190,7 @@ def test_hooks_can_see_that_a_signal_has_interrupted_a_call(
     lifecycle.add_hook(lambda: seen.append(is_dispatching_signal()))
     watchdog._is_nudge = is_nudge
     watchdog._on_signal(signal.SIGINT, None)
-    # At the next call of rospy nothing else is interrupted.
+    # The next call of rospy is not interrupted again.
     lifecycle.deferral.poll()
     assert seen == [is_nudge]
     assert not is_dispatching_signal()
@@ -234,7 +234,7 @@ def test_hooks_run_once_though_signals_come_while_they_run(
 
 @pytest.fixture
 def no_collection() -> Iterator[None]:
-    """Collect no garbage: Python ignores what is raised in the callback of a weak reference."""
+    """Disable garbage collection: Python ignores exceptions in the callback of a weak reference."""
     gc.disable()
     yield
     gc.enable()
@@ -244,7 +244,7 @@ def no_collection() -> Iterator[None]:
 def test_a_second_signal_at_any_step_of_a_shutdown_lets_it_finish(
     lifecycle: Lifecycle, watchdog: SignalWatchdog
 ) -> None:
-    """It may interrupt a hook, but leaves no shutdown behind that was claimed and is not carried out."""
+    """It may interrupt a hook, but never leaves a shutdown that is claimed and not carried out."""
     steps, at = 0, 1
 
     def count(frame: FrameType, event: str, argument: object) -> None:
@@ -267,7 +267,7 @@ def test_a_second_signal_at_any_step_of_a_shutdown_lets_it_finish(
             sys.setprofile(profile)
         if steps < at:
             break
-        # Interrupted before it started, it is started by the exit of the program.
+        # If it is interrupted before it starts, the program's exit starts it.
         assert lifecycle.left.is_set() or lifecycle.signal_shutdown("atexit")
         assert not lifecycle.deferral.is_active
 
@@ -278,7 +278,7 @@ def test_a_second_signal_at_any_step_of_a_shutdown_lets_it_finish(
 
 
 def test_an_interrupt_of_init_node_is_expected_while_hooks_run(lifecycle: Lifecycle) -> None:
-    """The wait for the master ends at the request: hooks may run in another thread."""
+    """The wait for the master ends at the shutdown request: hooks may run in another thread."""
     expected: list[bool] = []
     lifecycle.add_hook(lambda: expected.append(lifecycle.is_interrupt(lifecycle.interrupted("text"))))
     assert not lifecycle.is_interrupt(ROSInterruptException())
@@ -379,12 +379,12 @@ def test_a_nudge_is_no_signal_of_the_users(lifecycle: Lifecycle) -> None:
 
 
 class System:
-    """The clock, and the socket by which the system reports signals, of a watchdog that runs in the test's own thread."""
+    """The clock and the signal socket of a watchdog that runs in the test's own thread."""
 
     def __init__(
         self, watchdog: SignalWatchdog, signalled: float, turn: float, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """``signalled``: when the signal comes. ``turn``: how long a turn of the watchdog takes that nothing ends earlier."""
+        """``signalled``: the time of the signal. ``turn``: the duration of an undisturbed wait of the watchdog."""
         self.now = 0.0
         self.nudged: list[float] = []
         self._watchdog = watchdog
@@ -424,7 +424,7 @@ class System:
 def test_fifty_milliseconds_for_the_next_call_of_rospy_start_at_the_signal(
     watchdog: SignalWatchdog, monkeypatch: pytest.MonkeyPatch, turn: float
 ) -> None:
-    """However long nothing happened before."""
+    """Any idle time before does not matter."""
     system = System(watchdog, 1000.0, turn, monkeypatch)
     system.watch()
     assert system.nudged == [1000.0 + turn * math.ceil(0.05 / turn)]

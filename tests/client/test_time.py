@@ -1,4 +1,4 @@
-"""Time where minirospy does better than rospy; what is the same is in tests/referee."""
+"""Improvements of minirospy's time over rospy's; tests/referee compares the common behaviour."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ pytestmark = pytest.mark.usefixtures("master")
 
 
 def run(program: str) -> list[str]:
-    """Return the lines of a program that ends well, and soon."""
+    """Return the output lines of a program that exits soon and with 0."""
     done = subprocess.run(
         [sys.executable, "-c", "import rospy, threading\n" + program],
         capture_output=True,

@@ -1,6 +1,6 @@
-"""client/topics beyond rospy: what it warns of, waiting for subscribers, freshness, and what it survives.
+"""client/topics beyond rospy: warnings, waiting for subscribers, freshness, and robustness.
 
-What is as with rospy is in tests/referee/cases/topics*.py. Each test is a separate program, since a process has one node.
+tests/referee/cases/topics*.py compare the rest with rospy. Each test is a separate program, since a process has one node.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Start = Callable[[str], "subprocess.Popen[str]"]
 
 @pytest.fixture
 def start(master: str) -> Iterator[Start]:
-    """Start a program; it is killed in the end."""
+    """Return a function that starts a program; kill the programs after the test."""
     with ExitStack() as running:
 
         def run(code: str) -> subprocess.Popen[str]:
@@ -53,7 +53,7 @@ def start(master: str) -> Iterator[Start]:
 
 
 def finished(program: subprocess.Popen[str]) -> tuple[str, str]:
-    """Return what a program printed on stdout and on stderr; it ends by itself, with status 0."""
+    """Return a program's stdout and stderr; assert that it exits by itself, with status 0."""
     output, errors = program.communicate(timeout=60)
     assert program.returncode == 0, errors
     return output, errors
@@ -224,7 +224,7 @@ print(eventually(lambda: len(calls) == 6), calls)
 
 
 def test_slow_callback_gets_the_newest_message(start: Start) -> None:
-    """The classic trap: large images, a slow callback, queue_size=1, buff_size as it is by default."""
+    """The classic trap: large images, a slow callback, queue_size=1, and the default buff_size."""
     output, _ = finished(
         start("""
 rospy.init_node("camera")
@@ -244,7 +244,8 @@ assert eventually(lambda: 100 in heard)
 print(len(heard) < 10, heard[-1])
 """)
     )
-    # In order, the one after the first would be the second. What the sockets hold may still come before the newest.
+    # If all arrived in order, the second would follow the first. Messages in the sockets may still precede the
+    # newest.
     assert output == "True 100\n"
 
 

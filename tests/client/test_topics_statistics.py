@@ -1,4 +1,4 @@
-"""client/statistics: what a window counts, and how it adapts. Times are given, not waited for."""
+"""client/statistics: the counts of a window, and its adaptation. Times are arguments, not waited for."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SECOND = 10**9
 
 
 class Stamped:
-    """As much of a message as the counter looks at."""
+    """The parts of a message that the counter reads."""
 
     _has_header = True
 
@@ -21,7 +21,7 @@ class Stamped:
 
 
 def reports(counter: TopicStatisticsCounter, hertz: float, seconds: float) -> list[Report]:
-    """Return the reports on a publisher of so many messages a second."""
+    """Return the reports on a publisher of ``hertz`` messages a second."""
     times = [int(number / hertz * SECOND) + SECOND for number in range(int(hertz * seconds) + 1)]
     return [report for now in times if (report := counter.count(String(), TALKER, 7, now))]
 

@@ -1,4 +1,4 @@
-"""Masters, gateways and nodes of a fleet on one loop of the test: loopback alone, no multicast."""
+"""Masters, gateways and nodes of a fleet on one loop of the test: loopback only, no multicast."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SECONDS = 60.0
 
 
 class Place:
-    """A master with its nodes: a robot, or a control room."""
+    """A master with its nodes: a robot or a control room."""
 
     def __init__(self, fleet: Fleet, master: Master) -> None:
         self.fleet = fleet
@@ -38,7 +38,7 @@ class Place:
     def gateway(
         self, name: str = "", *, endpoint: str = "", listens: bool = False, **options: Any
     ) -> Gateway:
-        """Start a gateway: of a robot where it has a name, else of a control room."""
+        """Start a gateway: of a robot if it has a name, else of a control room."""
         endpoint = endpoint or self.fleet.endpoint
         network = NetworkOptions(listen=(endpoint,)) if listens else NetworkOptions(connect=(endpoint,))
         options.setdefault("imports", not name)
@@ -75,7 +75,7 @@ class Place:
 
 
 class Fleet:
-    """All that runs in a test."""
+    """All masters, gateways and nodes of a test."""
 
     def __init__(self) -> None:
         self.loop = LoopThread("test-fleet")
@@ -103,7 +103,7 @@ class Fleet:
         return place
 
     def until(self, condition: Callable[[], Any]) -> Any:
-        """Return when a condition, checked on the loop, holds: its value."""
+        """Check a condition on the loop repeatedly; return its value once it is true."""
 
         async def waiting() -> Any:
             while True:
@@ -131,7 +131,7 @@ class Fleet:
         self.until(are_gone)
 
     def stop(self, gateway: Gateway) -> None:
-        """End a gateway and its node, as a shutdown does."""
+        """Close a gateway and its node, as a shutdown does."""
 
         async def ending() -> None:
             await gateway.close()

@@ -1,6 +1,6 @@
-"""A robot that runs zenoh-bridge-ros1, as far as Zenoh sees it: written from that bridge's source, on eclipse-zenoh alone.
+"""A simulated robot with zenoh-bridge-ros1: written from that bridge's source, with eclipse-zenoh only.
 
-Nothing of minirospy is used: keys are put together here a second time.
+It uses no code of minirospy: the keys are built independently.
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ PERIOD = 1.0
 
 
 class Ros1Peer:
-    """Puts beacons, publishes, subscribes, offers services, calls them. ``endpoint``: where it connects, or ``listens``."""
+    """Puts beacons, publishes, subscribes, offers services, calls them.
+
+    It connects to ``endpoint``, or listens there if ``listens``.
+    """
 
     def __init__(
         self, endpoint: str, namespace: str = "*", mode: str = "client", *, listens: bool = False
@@ -32,7 +35,7 @@ class Ros1Peer:
         self.session: Any = zenoh.open(config)
         self.namespace = namespace
         self.received: dict[str, int] = {}
-        """The beacons of others, by their keys from the kind on, and how many of each."""
+        """Beacons of other peers: their keys from the kind on, and their number."""
         self._beacons: dict[str, Any] = {}
         self._declared: list[Any] = []
         self._ended = threading.Event()
@@ -46,7 +49,7 @@ class Ros1Peer:
         return f"{type_.encode().hex()}/{md5sum}/{self.namespace}/{name.strip('/')}"
 
     def announce(self, kind: str, type_: str, md5sum: str, name: str) -> None:
-        """Put beacons of a resource until :meth:`withdraw`."""
+        """Put a resource's beacons until :meth:`withdraw`."""
         self.announce_key(f"ros1_discovery_info/*/{kind}/{self.key(type_, md5sum, name)}")
 
     def announce_key(self, key: str) -> None:
@@ -88,7 +91,7 @@ class Ros1Peer:
         return found
 
     def serve(self, type_: str, md5sum: str, name: str, answer: Callable[[bytes], bytes]) -> None:
-        """Offer a service. As the bridge does: an error goes back as the text of it, and a query without payload gets nothing."""
+        """Offer a service as the bridge does: an error is returned as its text, and a query without payload gets no reply."""
 
         def asked(query: Any) -> None:
             with query:
@@ -106,7 +109,7 @@ class Ros1Peer:
         self._declared.append(queryable)
 
     def call(self, type_: str, md5sum: str, name: str, request: bytes) -> bytes:
-        """Return the first reply. Raise RuntimeError with an error reply, or without any."""
+        """Return the first reply. Raise RuntimeError for an error reply, or if there is none."""
         replies = self.session.get(
             self.key(type_, md5sum, name),
             payload=request,

@@ -1,4 +1,4 @@
-"""Gateways on loopback, with real sessions of Zenoh, real masters and nodes."""
+"""Gateways on loopback, with real Zenoh sessions, masters and nodes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
 
 @pytest.fixture
 def fleet() -> Iterator[Fleet]:
-    """Return masters, gateways and nodes on one loop."""
+    """Yield masters, gateways and nodes on one loop."""
     running = Fleet()
     yield running
     running.close()
@@ -155,19 +155,19 @@ def test_strings_flow_both_ways_without_loops(fleet: Fleet) -> None:
     robot, control = fleet.place(), fleet.place()
     control.gateway(listens=True)
     heard = collect(fleet, robot, "/chat", String)
-    # Before the gateway, which reads the header of a publisher that comes later: that counts as a subscriber, too.
+    # Start it before the gateway, which reads the header of a later publisher: that counts as a subscriber, too.
     said = publisher(fleet, robot, "/chat", String)
     robot.gateway("robot1")
     fleet.until_shown(control, "/robot1/chat")
     there = collect(fleet, control, "/robot1/chat", String)
     back = publisher(fleet, control, "/robot1/chat", String)
     fleet.run(said.wait_for_subscribers(2, SECONDS))
-    # The control room's gateway subscribes once it sees the publisher; the reader of the same room does immediately.
+    # The control room's gateway subscribes once it sees the publisher; the reader in the same room does immediately.
     fleet.run(back.wait_for_subscribers(2, SECONDS))
     fleet.run(said.publish("from the robot"))
     fleet.run(back.publish("from the room"))
     fleet.until(lambda: len(heard) >= 2 and len(there) >= 2)
-    # What came back to where it was published would come before these.
+    # Messages that came back to their origin would arrive before these.
     fleet.run(said.publish("again from the robot"))
     fleet.run(back.publish("again from the room"))
     both = ["again from the robot", "again from the room", "from the robot", "from the room"]
@@ -210,7 +210,7 @@ def test_an_action_runs_on_a_robot_and_is_cancelled(fleet: Fleet) -> None:
             ActionClient(client_node, "robot1/fibonacci", FibonacciAction) as client,
         ):
             await client.wait_for_server(SECONDS)
-            # The status alone has come by then.
+            # Only the status has arrived by then.
             await server._feedback.wait_for_subscribers(1, SECONDS)
             await server._result.wait_for_subscribers(1, SECONDS)
             goal = client.send(FibonacciGoal(order=3))
@@ -245,7 +245,7 @@ def test_a_robot_sees_the_control_room_where_it_imports(fleet: Fleet) -> None:
     client = robot.node("client")
     fleet.run(client.wait_for_service("/base/door", SECONDS))
     assert fleet.run(client.call("/base/door", SetBool, True)).message == "granted"
-    # What comes from the other side is not shown to it again: it would be before what is offered later.
+    # A topic from the other side is not exported to it again: it would arrive before this later topic.
     publisher(fleet, robot, "/later", String)
     fleet.until_shown(room, "/robot1/later")
     publisher(fleet, room, "/back", String, name="another")

@@ -1,4 +1,4 @@
-"""What peers of a fleet send and when they leave: nothing of it ends a task, fills a table or is lost for good."""
+"""Hostile peers of a fleet, and peers that leave: no task ends, no table fills up, no data is lost permanently."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def stub(**fields: object) -> Any:
 
 
 class Closing:
-    """A link whose close takes until it is let go on."""
+    """A link whose close blocks until it is released."""
 
     def __init__(self, token: TopicToken, gate: asyncio.Event) -> None:
         self.token = token
@@ -277,7 +277,7 @@ def test_calls_that_wait_do_not_hold_up_pings_and_reports() -> None:
     from minirospy.fleet.network import FleetNetwork
 
     class Query:
-        """A query of a peer; ``answer`` is what it gets."""
+        """A peer's query; ``answer`` is its reply."""
 
         key_expr, payload = "a/b", None
 
@@ -320,13 +320,13 @@ def test_calls_that_wait_do_not_hold_up_pings_and_reports() -> None:
         for query in queries:
             arrived["call"](query)
         assert await queries[-1].answer == f"the gateway is answering {_QUERIES} other queries".encode()
-        # The others of the burst are answered.
+        # The other queries of the burst are answered.
         assert not any(query.answer.done() for query in queries[:-1])
         ping = Query()
         arrived["ping"](ping)
         assert await ping.answer == b"pong"
 
-        # Nor do pings and reports take the place of calls.
+        # Pings and reports do not take the places of calls, either.
         queries = [Query() for _ in range(_CONTROL_QUERIES + 1)]
         for query in queries:
             arrived["status"](query)

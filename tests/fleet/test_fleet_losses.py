@@ -1,4 +1,4 @@
-"""What happens to a fleet when something breaks, lies or floods: each has the result that docs/fleet.md says."""
+"""Failures, false data and floods in a fleet: each has the result that docs/fleet.md describes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ __all__ = ["fleet"]
 
 
 class Proxy:
-    """A TCP proxy, which can stop passing bytes without closing anything, as a link that is cut."""
+    """A TCP proxy that can stop forwarding bytes without closing connections, like a link that is cut."""
 
     def __init__(self, fleet: Fleet, to: str) -> None:
         self._fleet = fleet
@@ -92,7 +92,7 @@ class Proxy:
 
 @pytest.fixture
 def quick(tmp_path: Path) -> str:
-    """Return a configuration of Zenoh in which a link that says nothing for two seconds is lost."""
+    """Return a Zenoh configuration in which a link without traffic for two seconds is lost."""
     file = tmp_path / "quick.json5"
     file.write_text("{ transport: { link: { tx: { lease: 2000 } } } } // of a test")
     return str(file)
@@ -168,14 +168,14 @@ def test_a_link_that_is_cut_is_noticed_and_mended(fleet: Fleet, quick: str) -> N
     try:
         gateway_of(robot, "robot1", NetworkOptions(connect=(proxy.endpoint,), config=quick))
         found = collect(fleet, control, "/robot1/map", String)
-        # A machine that stands still for two seconds loses the link, too.
+        # A machine that stalls for two seconds loses the link, too.
         fleet.until(lambda: len(found) >= 1)
 
         proxy.cut()
         fleet.until(lambda: not importer.robots)
         count = len(found)
         proxy.mend()
-        # The subscriber gets the latched message again, as from a publisher that was started again.
+        # The subscriber receives the latched message again, as from a restarted publisher.
         fleet.until(lambda: len(found) > count)
     finally:
         fleet.run(proxy.close())
@@ -186,7 +186,7 @@ async def _answers(importer: Importer) -> bool:
 
 
 def serve_never(fleet: Fleet, robot: Any) -> asyncio.Event:
-    """Serve /slow (std_srvs/Trigger) on a robot without a response; return the event of its first call."""
+    """Offer /slow (std_srvs/Trigger) on a robot, which never responds; return the event of its first call."""
     from std_srvs.srv import Trigger
 
     called = asyncio.Event()
@@ -205,7 +205,7 @@ def serve_never(fleet: Fleet, robot: Any) -> asyncio.Event:
 
 
 async def call_never(client: Any, called: asyncio.Event) -> asyncio.Future[Any]:
-    """Return a call of /robot1/slow that has arrived; repeat one that fails before, as where the machine stood still."""
+    """Return a call of /robot1/slow that has arrived; repeat one that fails earlier because the machine stalled."""
     from std_srvs.srv import Trigger
 
     while True:
@@ -237,7 +237,7 @@ def test_a_robot_that_is_silent_leaves_though_zenoh_keeps_its_tokens(
         gateway_of(robot, "robot1", NetworkOptions(connect=(proxy.endpoint,), config=str(slow)))
         client = control.node("client")
         fleet.until(lambda: importer._presence._answered)
-        # All are queried under one key, and each answers under its own.
+        # All are queried with one key, and each answers under its own.
         fleet.until(partial(_answers, importer))
 
         async def call() -> str:
@@ -439,7 +439,7 @@ def test_a_bad_configuration_is_one_line(fleet: Fleet, tmp_path: Path, text: str
 
 @pytest.fixture
 def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
-    """Return a function that starts `minirospy fleet`; the processes are ended with the test."""
+    """Return a function that starts `minirospy fleet`; stop the processes after the test."""
     running: list[subprocess.Popen[str]] = []
 
     def starting(*words: str, **environ: str) -> subprocess.Popen[str]:
@@ -465,7 +465,10 @@ def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
 
 
 def answered(start: Callable[..., subprocess.Popen[str]], *words: str) -> tuple[int, str]:
-    """Return the end of a command that has reached the fleet: on a busy machine connecting takes longer than it waits."""
+    """Return the status and output of a command that has reached the fleet.
+
+    On a busy machine, connecting takes longer than the command waits.
+    """
     while True:
         code, text = ended(start(*words))
         if "nothing of the fleet answers" not in text and "no answer" not in text:
@@ -476,7 +479,7 @@ def test_the_commands_from_start_to_kill(fleet: Fleet, start: Callable[..., subp
     robot, control = fleet.place(), fleet.place()
     publisher(fleet, robot, "/chat", String)
     endpoint = f"127.0.0.1:{free_port()}"
-    # The gateways come before their router.
+    # Start the gateways before their router.
     gateway = start("gateway", "--name", "robot1", "--connect", endpoint, ROS_MASTER_URI=robot.uri)
     room = start("control", "--connect", endpoint, ROS_MASTER_URI=control.uri)
     router = start("router", "--listen", endpoint)
@@ -598,7 +601,7 @@ def test_the_missing_library_is_named(
 
 
 def until_line(process: subprocess.Popen[str], text: str) -> str:
-    """Return the first line of a process that has a text."""
+    """Return the first line of a process that contains a text."""
     assert process.stdout is not None
     for line in process.stdout:
         if text in line:
@@ -618,19 +621,19 @@ def test_a_second_start_that_cannot_listen_does_not_end_the_first(
         assert code == 1
         assert "the fleet's network cannot be opened" in text
         assert "Traceback" not in text
-    # One that waits for a router that is not there has not taken the name either.
+    # A gateway that waits for a router that does not run has not taken the name.
     waiting = start(*words, "--connect", f"127.0.0.1:{free_port()}")
     until_line(waiting, "nothing of the fleet answers")
     assert running.poll() is None
 
-    # One that works does, and the first one says why it ends.
+    # A gateway that works takes the name, and the first one prints why it exits.
     start(*words, "--listen", f"127.0.0.1:{free_port()}")
     assert until_line(running, "shutdown request").endswith("new node registered with same name\n")
     assert ended(running)[0] == 0
 
 
 def test_robot_stops_where_its_commands_do_not_arrive_any_more(fleet: Fleet) -> None:
-    """The link is cut, and the loop of the robot's gateway is blocked: the zero needs neither."""
+    """The link is cut, and the loop of the robot's gateway is blocked: publishing zero needs neither."""
     robot, control = fleet.place(), fleet.place()
     control.gateway(listens=True)
     proxy = Proxy(fleet, fleet.endpoint)
@@ -663,7 +666,7 @@ def test_robot_stops_where_its_commands_do_not_arrive_any_more(fleet: Fleet) -> 
             blocked.set()
             released.wait()
 
-        # All loops of the test are this one; the receiver and the guard have their threads.
+        # All loops of the test run in this thread; the receiver and the guard have their own threads.
         proxy.cut()
         fleet.loop.loop.call_soon_threadsafe(block)
         try:
@@ -680,7 +683,7 @@ def test_robot_stops_where_its_commands_do_not_arrive_any_more(fleet: Fleet) -> 
 
 
 class RawSubscriber:
-    """A robot's base with no event loop: a subscriber of /cmd_vel by XML-RPC and TCPROS."""
+    """A robot's base without an event loop: a subscriber of /cmd_vel by XML-RPC and TCPROS."""
 
     def __init__(self) -> None:
         self._socket: socket.socket | None = None

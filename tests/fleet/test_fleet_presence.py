@@ -1,4 +1,4 @@
-"""Robots that do not answer, though their tokens stay: when they count as lost, and when they are there again."""
+"""Robots that do not answer although their tokens remain: when they count as lost, and when as back."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_a_robot_that_does_not_answer_twice_is_lost_until_it_does() -> None:
         assert fleet.presence.lost == {"b"}
         assert (fleet.queries, fleet.changes) == (3, 1)
 
-        # It is looked for more often than the others are checked, once each time.
+        # The lost robot is checked more often than the others, once each time.
         await loop.advance(10)
         assert (fleet.queries, fleet.changes) == (4, 1)
         fleet.answering = {"a", "b"}
@@ -115,7 +115,7 @@ def test_a_query_that_cannot_be_sent_says_nothing_of_any_robot() -> None:
             await loop.advance(seconds)
         assert not fleet.presence.lost, "b has never answered"
 
-        # One that is lost stays so.
+        # A lost robot stays lost.
         fleet.answering = set()
         for seconds in (60, 5):
             await loop.advance(seconds)

@@ -1,4 +1,4 @@
-"""Gateways with zenoh-bridge-ros1's keys: real sessions of Zenoh, masters and nodes, and a peer that has nothing of minirospy."""
+"""Gateways with zenoh-bridge-ros1's keys: real Zenoh sessions, masters and nodes, and a peer without code of minirospy."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ EMPTY = "std_srvs/Empty", "d41d8cd98f00b204e9800998ecf8427e"
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lose nothing, if the machine stands still, and repeat no line of the log."""
+    """Raise the time limits, so that nothing is lost if the machine stalls and no log line is repeated."""
     monkeypatch.setattr(ros1_keys, "LOST_SECONDS", SECONDS)
     monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger._SECONDS", 1000.0)
 
 
 @pytest.fixture
 def fleet() -> Iterator[Fleet]:
-    """Return masters, gateways and nodes on one loop."""
+    """Yield masters, gateways and nodes on one loop."""
     running = Fleet()
     yield running
     running.close()
@@ -58,19 +58,19 @@ def peer(fleet: Fleet) -> Iterator[Callable[..., Ros1Peer]]:
 
 
 def gateway(place: Place, namespace: str = "*", **options: Any) -> Ros1Side:
-    """Start a gateway with these keys; return that side of it."""
+    """Start a gateway with these keys; return its ROS 1 side."""
     found = place.gateway(ros1_namespace=namespace, **options).ros1
     assert found is not None
     return found
 
 
 def text(data: str) -> bytes:
-    """Return a std_msgs/String on the wire, written by hand."""
+    """Return a serialized std_msgs/String, written by hand."""
     return len(data).to_bytes(4, "little") + data.encode()
 
 
 def serve(fleet: Fleet, place: Place, name: str, node: str = "server") -> list[bool]:
-    """Offer a switch that refuses to be turned off; return the list of what it is asked."""
+    """Offer a switch that refuses to be turned off; return the list of its requests."""
     asked: list[bool] = []
 
     async def switch(request: Any) -> SetBoolResponse:
@@ -101,7 +101,7 @@ def test_topic_of_here_reaches_the_bridge(fleet: Fleet, peer: Callable[..., Ros1
     running = gateway(place, listens=True)
     robot = peer()
     fleet.until(lambda: robot.has_received("pub", *STRING, "/arm/chat"))
-    # Nobody reads: nothing is subscribed to here.
+    # There is no subscriber, so the gateway does not subscribe.
     assert running.topics["/arm/chat"].outbound is None
 
     found = robot.subscribe(*STRING, "/arm/chat")
@@ -121,7 +121,7 @@ def test_topic_of_the_bridge_is_shown_here_and_passed(fleet: Fleet, peer: Callab
     fleet.until_shown(place, "/arm/chat")
     found = collect(fleet, place, "/arm/chat", String)
     fleet.until(lambda: robot.has_received("sub", *STRING, "/arm/chat"))
-    # What is announced can be used: the first message arrives.
+    # An announced topic can be used: the first message arrives.
     sender = robot.publisher(*STRING, "/arm/chat")
     for number in range(100):
         sender.put(text(f"hello {number}"))
@@ -133,7 +133,7 @@ def test_topic_of_the_bridge_is_shown_here_and_passed(fleet: Fleet, peer: Callab
 def test_messages_without_any_beacon_are_passed_both_ways(
     fleet: Fleet, peer: Callable[..., Ros1Peer]
 ) -> None:
-    """A bridge is silent while another puts the same beacon; a program on Zenoh alone has none."""
+    """A bridge puts no beacon while another puts the same one; a program on Zenoh alone has none."""
     place = fleet.place()
     chat = publisher(fleet, place, "/out", String)
     received = collect(fleet, place, "/in", String)
@@ -240,7 +240,7 @@ def test_a_service_of_this_master_is_not_replaced(fleet: Fleet, peer: Callable[.
     client = place.node("client")
     assert fleet.run(client.call("/lamp", SetBool, True)).message == "on"
     assert fleet.run(client.call("/door", SetBool, True)).message == "there"
-    # One that starts here later goes before.
+    # A service that starts here later takes precedence.
     later = serve(fleet, place, "/door", "later")
     fleet.until(lambda: "/door" not in running.services)
     assert fleet.run(client.call("/door", SetBool, True)).message == "on"
@@ -263,7 +263,7 @@ def test_what_ends_there_leaves_this_master_and_comes_again(
     robot.withdraw("sub", *STRING, "/orders")
     fleet.until_gone(place, "/orders")
     assert "/chat" in place.names()
-    # Its process is killed: no more than silence says so.
+    # Its process is killed: only silence indicates that.
     robot.close()
     fleet.until_gone(place, "/chat")
 
@@ -291,7 +291,7 @@ def test_what_ends_here_is_announced_no_more(fleet: Fleet, peer: Callable[..., R
     )
     fleet.run(chat.close())
     fleet.until(lambda: running.status()["announced"] == 1)
-    # A beacon that was on its way comes before that of a later topic.
+    # A beacon that was in transit arrives before that of a later topic.
     publisher(fleet, place, "/later", String, name="later")
     fleet.until(lambda: robot.has_received("pub", *STRING, "/later"))
     robot.received.clear()
@@ -332,7 +332,7 @@ def test_gateways_of_two_masters_pass_these_keys_without_loops(
     found = {name: collect(fleet, place, "/chat", String) for name, place in places.items()}
 
     def received(of: str) -> list[list[str]]:
-        """Return what everybody got of a turn."""
+        """Return the messages that each place has received in a round."""
         texts = [*([each.data for each in messages] for messages in found.values())]
         every = [*texts, [each[4:].decode() for each in seen]]
         return [[each for each in messages if each.startswith(of)] for messages in every]
@@ -345,13 +345,13 @@ def test_gateways_of_two_masters_pass_these_keys_without_loops(
             await each.publish(f"try of {name}")
         return all(set(messages) == {"try of one", "try of two"} for messages in received("try"))
 
-    # Until everybody is connected to everybody.
+    # Repeat until all are connected to all.
     fleet.until(reaches_all)
     for turn in ("first", "second"):
         for name, each in said.items():
             fleet.run(each.publish(f"{turn} of {name}"))
         fleet.until(partial(all_received, turn))
-    # What came back would have come before the second turn.
+    # A message that came back would have arrived before the second round.
     assert [sorted(messages) for messages in received("first")] == [["first of one", "first of two"]] * 3
 
 
@@ -367,7 +367,7 @@ def test_a_second_gateway_of_these_keys_is_refused(fleet: Fleet) -> None:
 def test_what_another_gateway_of_this_master_passes_is_not_announced(
     fleet: Fleet, peer: Callable[..., Ros1Peer], caplog: pytest.LogCaptureFixture
 ) -> None:
-    """As where two start at the same moment, or zenoh-bridge-ros1 itself comes later."""
+    """As if two start at the same moment, or zenoh-bridge-ros1 itself starts later."""
     place = fleet.place()
     gateway(place, listens=True)
     chat = publisher(fleet, place, "/chat", String, name="ros1_to_zenoh_bridge", headers={MARK: "1"})
@@ -378,7 +378,7 @@ def test_what_another_gateway_of_this_master_passes_is_not_announced(
     fleet.until(lambda: robot.has_received("pub", *STRING, "/other"))
     assert [key.partition("/")[0] for key in robot.received] == ["pub"]
 
-    # Nor is a message, before the graph has been looked at.
+    # Messages are not forwarded, either, before the graph has been read.
     found = robot.subscribe(*STRING, "/chat")
     robot.announce("sub", *STRING, "/chat")
     mine = publisher(fleet, place, "/chat", String, name="mine")
@@ -465,7 +465,7 @@ def test_the_status_names_what_is_passed(fleet: Fleet, peer: Callable[..., Ros1P
     fleet.until(lambda: robot.has_received("sub", *STRING, "/chat"))
     robot.publisher(*STRING, "/chat").put(text("hello"))
     fleet.until(lambda: found)
-    # The robot's next beacon may come after its message.
+    # The robot's next beacon may arrive after its message.
     fleet.until(lambda: running.status()["seen"])
     status: Any = running.status()
     assert status["namespace"] == "*"

@@ -1,4 +1,4 @@
-"""The keys of zenoh-bridge-ros1 and its beacons, without a network; the clock is the test's."""
+"""The keys of zenoh-bridge-ros1 and its beacons, without a network, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tests.fleet.test_fleet_hostile import CLAIM
 
 MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 OTHER = "f" * 32
-# hex("std_msgs/String"), written out: what the bridge itself puts.
+# hex("std_msgs/String"), written out: as the bridge itself puts it.
 HEX = "7374645f6d7367732f537472696e67"
 CHAT = Resource("pub", "/arm/chat", "std_msgs/String", MD5)
 
@@ -122,7 +122,7 @@ def test_a_resource_is_lost_after_its_last_beacon() -> None:
 
 
 def test_resources_are_kept_after_the_process_did_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Zenoh's thread delivers the beacons of that time after the loop has gone on."""
+    """Zenoh's thread delivers the beacons of that time after the loop has continued."""
     clock = Mock()
     clock.monotonic.return_value = 0.0
     monkeypatch.setattr(ros1_side, "time", clock)
@@ -131,7 +131,7 @@ def test_resources_are_kept_after_the_process_did_not_run(monkeypatch: pytest.Mo
     side._sightings.received(CHAT, 0.0)
 
     def beat(times: Iterable[float]) -> list[Resource]:
-        """Let the beats come at these times; return what is known after them."""
+        """Let the beats arrive at these times; return the resources that are known after them."""
         left = [*times]
 
         async def sleep(_: float) -> None:
@@ -145,7 +145,7 @@ def test_resources_are_kept_after_the_process_did_not_run(monkeypatch: pytest.Mo
         return list(side._sightings)
 
     assert beat([0.2, 100.0]) == [CHAT]
-    # Its beacons do not come again.
+    # Its beacons do not arrive any more.
     assert beat([100.0 + 0.2 * number for number in range(30)]) == []
 
 
@@ -183,7 +183,7 @@ def test_a_beacon_that_another_puts_is_silent_until_that_one_ends() -> None:
     assert beacons.due(2.0) == []
     beacons.received("a")
     assert beacons.due(3.0) == []
-    # The other has ended: after a part of a period that chance gives.
+    # The other bridge has stopped: a beacon is due after a random part of a period.
     assert beacons.due(4.0) == []
     assert beacons.due(4.2) == []
     assert beacons.due(4.25) == ["a"]
@@ -191,7 +191,7 @@ def test_a_beacon_that_another_puts_is_silent_until_that_one_ends() -> None:
 
 
 def test_of_many_that_put_a_beacon_some_goes_on() -> None:
-    """Twenty gateways in lockstep for a minute: no gap is as long as what makes others think that it is lost."""
+    """Twenty gateways in lockstep for a minute: no gap is long enough for peers to consider the resource lost."""
     import random
 
     chance = random.Random(1).random

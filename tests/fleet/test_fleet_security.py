@@ -1,4 +1,4 @@
-"""Who may join a fleet, and what its networks are encrypted with: all of it by Zenoh's configuration file."""
+"""Which peers may join a fleet, and how its connections are encrypted: both set by Zenoh's configuration file."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def configuration(folder: Path, name: str, **transport: Any) -> str:
 
 @pytest.fixture
 def certificate(tmp_path: Path) -> tuple[str, str]:
-    """Return the files of a certificate for localhost, which is its own authority, and of its key."""
+    """Return the files of a self-signed certificate for localhost, and of its key."""
     if not shutil.which("openssl"):
         pytest.skip("openssl is not installed")
     key, cert = str(tmp_path / "key.pem"), str(tmp_path / "cert.pem")
     words = f"openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost -keyout {key} -out {cert}"
-    # A certificate that is its own authority must not say so itself: rustls takes none of an authority for a server.
+    # A self-signed certificate must not be marked as a CA: rustls does not accept a CA's certificate for a server.
     extensions = ["-addext", "subjectAltName=DNS:localhost", "-addext", "basicConstraints=critical,CA:FALSE"]
     subprocess.run([*words.split(), *extensions], check=True, capture_output=True)
     return key, cert

@@ -1,4 +1,4 @@
-"""Velocities that come over the fleet and stop coming: what follows them, by a clock that the test holds."""
+"""Velocities that arrive over the fleet and stop arriving: the messages that follow, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_other_and_broken_messages_stop_nothing() -> None:
 
 
 class Robot:
-    """A clock, what is published, and the guard's steps, which the test makes."""
+    """A clock, the published messages, and the guard's steps, which the test runs."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -85,7 +85,7 @@ class Robot:
             self.stream.publish(body(twist(speed)))
 
     def wake(self) -> None:
-        """Let the guard look at the clock."""
+        """Let the guard read the clock."""
         self.stream._guard.arm(_nothing, float("-inf"))
         wait_until(lambda: _nothing not in self.stream._guard._deadlines)
 
@@ -105,7 +105,7 @@ def test_stream_that_ends_is_followed_by_a_zero_once(caplog: pytest.LogCaptureFi
     robot.wake()
     wait_until(lambda: robot.published == [1, 2, 3, 0])
     wait_until(lambda: "/cmd_vel is stopped: no command came for 0.5 s" in caplog.text)
-    # It drives on as soon as commands come again.
+    # It drives on as soon as commands arrive again.
     robot.send(4, 5)
     robot.now += 1
     robot.wake()

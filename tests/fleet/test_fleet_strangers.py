@@ -1,4 +1,4 @@
-"""A stranger among the gateways: answers of rubbish or none, floods of names, a master that refuses; the robots go on."""
+"""A hostile peer in a fleet: wrong or missing answers, floods of names, a master that refuses; the robots keep working."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_answers_that_are_rubbish_or_never_come_harm_nobody(fleet: Fleet, handle
             fleet.call(lambda kind=kind: session.answer(f"{ROOT}/{kind}/{LIAR.gateway}/**", handler))
             for kind in ("ping", "status", "definition")
         ]
-        # Of the robot's type, so that it is asked for it first, and many more that it never tells.
+        # Topics of the robot's type, so that the peer is queried for it first, and many more that it never describes.
         token = TopicToken("liar", LIAR.gateway, "/things", "my_msgs/Thing", thing._md5sum, True, False)
         names = [token, *(token._replace(topic=f"/t{n}", md5sum=f"{n:032x}") for n in range(300))]
         for key in [claim_key(LIAR), *map(topic_key, names)]:
@@ -95,7 +95,7 @@ def test_a_call_is_answered_though_another_answers_the_same_key_never(fleet: Fle
     with stranger(fleet) as session:
         key = call_key("robot1", gateway.id, "/lamp", SetBool._md5sum)
         declared = fleet.call(lambda: session.answer(key, silence))
-        # Its own answer would never come: by then it is known to the control room.
+        # Its own answer would never arrive: by then the control room knows the type.
         with pytest.raises(QueryFailed):
             fleet.run(session.query(f"{ROOT}/nobody", seconds=0.5))
         assert fleet.run(client.call("/robot1/lamp", SetBool, True)).message == "on"
@@ -108,7 +108,7 @@ def test_a_query_that_ends_early_does_not_say_that_it_has_waited(fleet: Fleet) -
     serve_lamp(fleet, robot)
     control_room(fleet, control)
     gateway = robot.gateway("robot1")
-    # As a call that is cut by a broken link: Zenoh ends it without an answer, long before its time.
+    # For a call that is cut by a broken link, Zenoh finishes the query without an answer, long before its timeout.
     match = "no answer: nobody answers there, or the link broke after"
     with stranger(fleet) as session, pytest.raises(QueryFailed, match=match):
         fleet.run(session.query(f"{ROOT}/call/robot1/{gateway.id}x/none", seconds=3600.0))
@@ -125,7 +125,7 @@ def test_only_as_many_replies_as_wanted_are_kept() -> None:
 
     async def check() -> None:
         network = FleetNetwork(stub(close=lambda: None, get=get), asyncio.get_running_loop())
-        # The query never ends by itself.
+        # The query never finishes by itself.
         assert len(await network.queries("a/*", seconds=3600.0, most=10)) == 10
         assert await network.query("a/1", seconds=3600.0) == b"x"
         await network.close()

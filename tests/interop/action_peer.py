@@ -1,10 +1,10 @@
-"""One end of an action, for the interop tests: runs on actionlib and on ours alike. action_peer.cpp is its twin.
+"""An action client or server for the interop tests; runs on actionlib and on minirospy. action_peer.cpp is its C++ counterpart.
 
-`serve` prints "ready" and serves /interop_action until its input ends; `ask` sends goals and prints how they ended.
-Of a goal's number, the last digit says what it does: 1 succeeds with feedback, 2 aborts, 3 runs until it is preempted; the
-tens count the goals. The client reports by parameters how far it is, and the server waits for that: /sent is the last goal
-that was sent, for a client of actionlib in Python ignores what comes before its send_goal() has returned; /heard is the last
-one whose feedback has arrived, for that and the result have separate connections.
+`serve` prints "ready" and serves /interop_action until stdin is closed; `ask` sends goals and prints their final states.
+The last digit of a goal's number selects what the server does: 1 succeeds with feedback, 2 aborts, 3 runs until it is
+preempted; the other digits count the goals. The client reports its progress in parameters, for which the server waits: /sent
+is the last goal that was sent, because a client of actionlib in Python ignores everything that arrives before send_goal()
+returns; /heard is the last goal whose feedback has arrived, because feedback and result use separate connections.
 """
 
 import itertools
@@ -126,7 +126,7 @@ def ask():
     state = client.send_goal_and_wait(
         numbered(3), rospy.Duration.from_sec(0.3), rospy.Duration.from_sec(SECONDS)
     )
-    # Recalled where the cancel has overtaken the goal, which has another connection.
+    # The state is RECALLED if the cancel request overtakes the goal, which uses another connection.
     say("out of time", NAMES[state] in ("PREEMPTED", "RECALLED"))
     state = client.send_goal_and_wait(numbered(2), rospy.Duration.from_sec(SECONDS))
     say("in time", NAMES[state])

@@ -1,4 +1,4 @@
-"""action_peer.py for asyncio programs: the same words, by minirospy.ros.actionlib.actionlib.aio."""
+"""action_peer.py for asyncio programs: the same commands, with minirospy.ros.actionlib.actionlib.aio."""
 
 import asyncio
 import itertools
@@ -53,7 +53,7 @@ async def ask(node):
 
     async def send(kind):
         number = next(tens) + kind
-        # Nothing is lost of what comes while it is sent.
+        # Nothing that arrives during sending is lost.
         await node.set_param("/sent", number)
         return client.send(TestGoal(number))
 
@@ -97,7 +97,7 @@ async def ask(node):
     try:
         await goal
     except GoalError as error:
-        # Recalled where the cancel has overtaken the goal, which has another connection.
+        # The state is RECALLED if the cancel request overtakes the goal, which uses another connection.
         say("out of time", error.state.name in ("PREEMPTED", "RECALLED"))
     try:
         await (await send(2))

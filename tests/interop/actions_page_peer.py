@@ -1,4 +1,4 @@
-"""The action server /count on any rospy, real or ours: a line of its input lets the running goal take one step."""
+"""The action server /count on rospy or minirospy: each line on stdin lets the running goal take one step."""
 
 import queue
 import sys
@@ -18,7 +18,7 @@ def read():
 
 
 def execute(goal):
-    # Its client may not be connected to all of the topics yet.
+    # The client may not be connected to all of the topics yet.
     ends = (server.action_server.feedback_pub, server.action_server.result_pub)
     while not (all(end.get_num_connections() for end in ends) or rospy.is_shutdown()):
         rospy.sleep(0.02)

@@ -1,6 +1,8 @@
-"""Bags by Debian's rosbag, or ours: whichever the interpreter imports. usage: bag_peer.py write|read|copy FOLDER.
+"""Write and read bags with Debian's rosbag or minirospy's, as the interpreter imports it.
 
-`write` makes bags of every kind in FOLDER. `read` prints one line of JSON for each bag in FOLDER: what is in it.
+Usage: bag_peer.py write|read|copy FOLDER.
+
+`write` writes bags of every kind to FOLDER. `read` prints the contents of each bag in FOLDER as one line of JSON.
 `copy` copies none.bag in FOLDER message by message, to copy_COMPRESSION.bag.
 """
 
@@ -42,7 +44,7 @@ def write(folder: Path) -> None:
                     bag.write(topic, message, genpy.Time(100 + number, number * 1000))
     rosbag.Bag(str(folder / "empty.bag"), "w").close()
 
-    # What comes late, and at one time.
+    # Messages out of order, and several with the same time.
     with rosbag.Bag(str(folder / "shuffled.bag"), "w", chunk_threshold=10_000_000) as bag:
         for number in range(100):
             bag.write(f"/t{number % 4}", Int32(number), genpy.Time(1 + number * 7 % 50, 0))
@@ -52,7 +54,7 @@ def write(folder: Path) -> None:
         bag.write("/a", Int32(2), genpy.Time(2, 0))
         bag.write("/b", String("new"), genpy.Time(3, 0))
 
-    # As a recorder that was killed leaves it.
+    # Cut the file as a killed recorder would leave it.
     whole = (folder / "none.bag").read_bytes()
     at = whole.index(b"index_pos=") + len(b"index_pos=")
     (folder / "unindexed.bag").write_bytes(whole[:at] + bytes(8) + whole[at + 8 :])

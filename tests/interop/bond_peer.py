@@ -1,4 +1,7 @@
-"""One end of a bond: ours with our Python, Debian's with /usr/bin/python3. Prints what happens; breaks it at "break"."""
+"""One endpoint of a bond, minirospy's with our Python, Debian's with /usr/bin/python3.
+
+Prints events; breaks the bond at "break".
+"""
 
 import sys
 import threading
@@ -38,7 +41,7 @@ for line in sys.stdin:
         known = bond.wait_until_formed(rospy.Duration(200))
         beats = 0
         while beats < 3:
-            # Debian's notices silence only after the second heartbeat.
+            # Debian's bondpy detects silence only after the second heartbeat.
             beats += rospy.wait_for_message(sys.argv[1], Status, 200).instance_id != bond.instance_id
         say("known", known)
 bond.shutdown()

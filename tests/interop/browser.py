@@ -1,4 +1,4 @@
-"""Debian's chromium for tests, driven by the DevTools protocol over its WebSocket: act as a person does, wait for what is seen.
+"""Drive Debian's chromium in tests by the DevTools protocol over its WebSocket: act as a user does, wait for visible results.
 
 Source: https://chromedevtools.github.io/devtools-protocol.
 """
@@ -21,8 +21,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 CHROMIUM = shutil.which("chromium")
-PATIENCE = 200.0
-"""Seconds for a state to come; a loaded machine needs some of them."""
+PATIENCE = 200.0  # seconds to wait for a state; a loaded machine needs many of them
 
 _FLAGS = (
     "--headless=new",
@@ -64,7 +63,7 @@ addEventListener("click", () => { window.clickedByTest = Boolean(pressed?.isConn
 
 
 class Page:
-    """A tab. ``script`` is JavaScript; ``find`` is a selector of CSS."""
+    """A browser tab. ``script`` is JavaScript; ``find`` is a CSS selector."""
 
     def __init__(
         self,
@@ -91,7 +90,7 @@ class Page:
         )
         self._numbers = itertools.count(1)
         self.errors: list[str] = []
-        """What the page logged as errors: exceptions, and what its Content-Security-Policy refused."""
+        """Errors that the page logged: exceptions, and violations of its Content-Security-Policy."""
         try:
             self._stack = contextlib.ExitStack()
             self._socket = self._stack.enter_context(self._connect())
@@ -114,18 +113,18 @@ class Page:
             raise
 
     def open(self, url: str) -> None:
-        """Load an address."""
+        """Navigate to a URL."""
         self.call("Page.navigate", url=url)
         self.wait("return document.readyState === 'complete'")
 
     def reload(self) -> None:
-        """Load the page again; return when the new one is there."""
+        """Reload the page; return when the new page is loaded."""
         self.evaluate("window.isLeftByTest = true")
         self.call("Page.reload")
         self.wait("return !window.isLeftByTest && document.readyState === 'complete'")
 
     def call(self, method: str, **params: Any) -> Any:
-        """Call a method of the protocol; return its result."""
+        """Call a protocol method; return its result."""
         answer = self._answer(method, params)
         assert "error" not in answer, answer
         return answer["result"]
@@ -148,20 +147,20 @@ class Page:
             self.errors.append(params["entry"]["text"])
 
     def evaluate(self, script: str) -> Any:
-        """Return the value of an expression; a promise is waited for."""
+        """Return the value of an expression; await a promise."""
         result = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
     def wait(self, script: str) -> Any:
-        """Return what a function's body returns, once that is true, in this page or in the one that is loaded meanwhile."""
+        """Return the value of a function body once it is true, in this page or in a page that is loaded meanwhile."""
         params = {
             "expression": _WAIT % (PATIENCE * 1000, script),
             "awaitPromise": True,
             "returnByValue": True,
         }
         end = time.monotonic() + PATIENCE
-        # A page that is left takes the promise with it.
+        # Navigation discards the promise together with the page.
         while "error" in (answer := self._answer("Runtime.evaluate", params)):
             assert time.monotonic() < end, answer
             time.sleep(0.05)
@@ -173,22 +172,22 @@ class Page:
         return str(self.wait(f"const e = {_finding(find, text)}; return e && e.textContent"))
 
     def click(self, find: str, text: str = "") -> None:
-        """Click the first element that is visible, has this text, once it is there; as a mouse does.
+        """Click the first visible element that has this text, once it exists, with mouse events.
 
-        What moves away between the look and the press is not hit: the press is repeated, as a person does.
+        Repeat the click if the element moves away before the press, as a user would.
         """
         end = time.monotonic() + PATIENCE
         while True:
             self._arm(find, text)
             for kind in ("mousePressed", "mouseReleased"):
                 self._mouse(kind, find, text)
-            # A page that was just loaded knows nothing of the click that loaded it.
+            # A page that was just loaded has no record of the click that loaded it.
             if self.evaluate("window.clickedByTest !== false"):
                 return
             assert time.monotonic() < end, f"the clicks do not reach {find} {text!r}"
 
     def press(self, find: str, text: str = "") -> None:
-        """Press the mouse over an element, and hold it; what has moved away is pressed again."""
+        """Press the mouse button over an element and hold it; press again if the element has moved away."""
         end = time.monotonic() + PATIENCE
         while True:
             self._arm(find, text)
@@ -199,7 +198,7 @@ class Page:
             self._mouse("mouseReleased", find, text)
 
     def release(self, find: str, text: str = "") -> None:
-        """Release the mouse over an element."""
+        """Release the mouse button over an element."""
         self._mouse("mouseReleased", find, text)
 
     def _arm(self, find: str, text: str) -> None:
@@ -213,12 +212,12 @@ class Page:
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def type(self, find: str, text: str) -> None:
-        """Replace the text of an input, as by keys."""
+        """Replace the text of an input with key events."""
         self.wait(f"const e = {_finding(find)}; if (!e) return false; e.focus(); e.select(); return true")
         self.call("Input.insertText", text=text)
 
     def choose(self, find: str, value: str) -> None:
-        """Choose an entry of a <select>, once it is there."""
+        """Choose an option of a <select>, once it exists."""
         choice = json.dumps(value)
         self.wait(
             f"const e = {_finding(find)}; if (!e || ![...e.options].some(o => o.value === {choice})) return false;"
@@ -226,15 +225,15 @@ class Page:
         )
 
     def screenshot(self, path: Path) -> None:
-        """Save what is seen as PNG."""
+        """Save a screenshot as PNG."""
         data = self.call("Page.captureScreenshot", format="png")["data"]
         path.write_bytes(base64.b64decode(data))
 
     def close(self) -> None:
-        """End the browser and all of its processes."""
+        """Close the browser and all of its processes."""
         socket = getattr(self, "_socket", None)
         if socket:
-            with contextlib.suppress(ConnectionClosed):  # it may be faster than its answer
+            with contextlib.suppress(ConnectionClosed):  # the browser may exit before it answers
                 self.call("Browser.close")
             self._stack.close()
         else:
@@ -247,19 +246,19 @@ class Page:
         self._folder.cleanup()
 
     def start(self, script: str, method: str = "Runtime.evaluate") -> None:
-        """Start a script, as one that hangs, or a method without parameters, and wait for no answer."""
+        """Start a script (for example one that hangs) or a method without parameters; do not wait for the answer."""
         params = {"expression": script} if script else {}
         self._socket.send(json.dumps({"id": next(self._numbers), "method": method, "params": params}))
 
     def processes(self) -> list[psutil.Process]:
-        """Return the browser and its children; none where it has ended."""
+        """Return the browser and its child processes; an empty list if it has exited."""
         with contextlib.suppress(psutil.NoSuchProcess):
             process = psutil.Process(self._process.pid)
             return [process, *process.children(recursive=True)]
         return []
 
     def kill(self) -> None:
-        """Kill all processes of the browser, as a crash does."""
+        """Kill all processes of the browser, to simulate a crash."""
         for each in self.processes():
             with contextlib.suppress(psutil.NoSuchProcess):
                 each.kill()
@@ -296,7 +295,7 @@ class Page:
 
 
 def _finding(find: str, text: str = "") -> str:
-    """Return the expression of the first element that is visible and has this text in it."""
+    """Return an expression for the first visible element that contains this text."""
     return (
         f"[...document.querySelectorAll({json.dumps(find)})].find("
         f"e => e.getClientRects().length && e.textContent.includes({json.dumps(text)}))"

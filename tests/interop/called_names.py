@@ -1,8 +1,8 @@
-"""Call every callable name of the compatibility pages with nothing, None, wrong types and the normal case.
+"""Call every callable name of the compatibility pages with no argument, None, wrong types and normal values.
 
-Runs under real ROS and under ours; test_interop_called_names.py compares the two. Standard input is JSON: ``names``, a list of
-[module, name or Class.member, parameters without default of real ROS], ``left_out``, the calls that wait for something, and
-``seconds``, after which a call counts as one that waits. Prints a line a call: its text, a tab, its outcome as JSON.
+Runs under real ROS and under minirospy; test_interop_called_names.py compares the two. Stdin is JSON: ``names``, a list of
+[module, name or Class.member, parameters without default in real ROS]; ``left_out``, the calls that block; and
+``seconds``, after which a call counts as blocking. Prints one line per call: the call, a tab, its outcome as JSON.
 """
 
 import functools
@@ -41,26 +41,26 @@ PATHS = {
     )
     for path in (folder, Path(folder).resolve())
 }
-"""Folders whose paths differ from machine to machine: this checkout, its Python, the system's, the test's."""
+"""Folders whose paths differ between machines: this checkout, its Python, the system's Python, the test's folder."""
 
 CHANGING = re.compile(
     r"\b[0-9a-f]{8}(-[0-9a-f]{4,12}){4}| at 0x[0-9a-f]+|0x[0-9a-f]{6,}|\d{8,}|_\d+_\d+|\d+\.\d{9,}|:\d{4,5}\b|\b\d{2,7}, \d{9}\b"
     r"|-\d+\.log\b|\d\d:\d\d:\d\d|[\d.]+ms\b"
     + rf"|(?<![\w.-])({'|'.join(map(re.escape, sorted(PATHS, key=len, reverse=True)))})\b[^ ,:;)\]'\"]*"
 )
+# Which of the two a wrong type raises depends on the operation that fails first.
 MIX_UP = (AttributeError, TypeError)
-"""Which of the two a wrong type raises depends on what is tried first with it."""
 
 AT_RANDOM = re.compile(
     r"^random_|\bgetPid$|^Rate.remaining$|date_time_string$|^RosStreamHandler.emit$|^TransformRegistration.print_me$"
     r"|^rosmsg_cmd_packages$"
 )
-"""Names whose values no two calls share, or no two machines: those that list what is installed."""
+"""Names whose values differ between calls or machines, such as lists of installed packages."""
 
+# Standard library modules whose methods the classes inherit.
 NOT_OF_ROS = ("http.server", "logging", "socketserver", "xmlrpc.server")
-"""Modules of Python whose methods the classes inherit."""
 
-# What a parameter of this name is given in the normal case: an expression; "/x" where none is named.
+# Parameter name -> expression of its normal value. A parameter that is not listed gets "/x".
 NORMAL = {
     "a": "1.0", "addr": "'127.0.0.1'", "ai": "0.1", "aj": "0.2", "ak": "0.3", "angle": "0.5",
     "angles": "(0.1, 0.2, 0.3)", "arg": "'a:=b'", "args": "()", "argv": "['prog', 'a:=b', '__name:=n']",
@@ -144,7 +144,7 @@ NORMAL = {
     "visible": "True", "whitelist": "['/rosout']", "window_size": "5", "wrench": "PyKDL.Wrench()", "x": "0.3", "Z": "2.0",
 }  # fmt: skip
 
-# The same for one module's parameters.
+# The same for the parameters of one module.
 NORMAL_OF = {
     "message_filters.f": "message_filters.SimpleFilter()", "message_filters.fs": "[message_filters.SimpleFilter()]",
     "tf.transformations.direction": "[1.0, 0.0, 0.0]", "tf.transformations.point": "[0.0, 0.0, 0.0]",
@@ -155,7 +155,7 @@ NORMAL_OF = {
     "rosmsg.type_": "'std_msgs/String'",
 }  # fmt: skip
 
-# How an object of a class is made whose constructor's normal case is something else, or does not fit.
+# Class -> expression that makes an object, if the constructor's normal case does not fit.
 OBJECTS = {
     "rosbag.bag.Bag": "bag()", "rosbag.Bag": "bag()",
     "tf2_ros.buffer.Buffer": "tf2_ros.Buffer(debug=False)",
@@ -173,7 +173,7 @@ OBJECTS = {
 
 
 def bag():
-    """Return a bag of two messages that is open for reading."""
+    """Return an open bag with two messages."""
     import rosbag
     import rospy
     from std_msgs.msg import String
@@ -185,7 +185,7 @@ def bag():
 
 
 def rate():
-    """Return a rate of a program whose clock runs."""
+    """Return a Rate while the clock runs."""
     import rospy
 
     rospy.rostime.set_rostime_initialized(True)
@@ -202,7 +202,7 @@ def node():
 
 @functools.lru_cache(None)
 def markers():
-    """Return a server of interactive markers."""
+    """Return an interactive marker server."""
     from interactive_markers.interactive_marker_server import InteractiveMarkerServer
 
     node()
@@ -211,7 +211,7 @@ def markers():
 
 @functools.lru_cache(None)
 def reconfigure_server():
-    """Return a server of a configuration with one number, as the generator describes it."""
+    """Return a dynamic_reconfigure server with one number, configured as by the generator."""
     from dynamic_reconfigure.server import Server
 
     node()
@@ -251,19 +251,19 @@ def reconfigure_server():
 
 @functools.lru_cache(None)
 def reconfigure_client():
-    """Return a client of it."""
+    """Return a client of the dynamic_reconfigure server."""
     from dynamic_reconfigure.client import Client
 
     reconfigure_server()
     client = Client("/called", timeout=60)
-    # What comes by topics is then there.
+    # The values that arrive by topic are available after this call.
     client.get_configuration(60)
     client.get_group_descriptions(60)
     return client
 
 
 def generator():
-    """Return a generator of a configuration, as catkin_make runs its program."""
+    """Return a configuration's generator, as catkin_make runs it."""
     from dynamic_reconfigure.parameter_generator_catkin import ParameterGenerator
 
     sys.argv = ["a.cfg", "share", "include", "docs", "lib"]
@@ -308,7 +308,7 @@ def image():
 
 
 def namespace():
-    """Return what the expressions may name."""
+    """Return the names that the expressions may use."""
     names = {
         "io": io,
         "logging": logging,
@@ -339,7 +339,7 @@ def namespace():
 
 
 def shown(value, depth=0):
-    """Return a value as text: without addresses, times and the modules of classes."""
+    """Return a value as a string without addresses, times and module names of classes."""
     if inspect.isgenerator(value):
         value = [each for each, _ in zip(value, range(5), strict=False)]
     if inspect.isclass(value):
@@ -367,7 +367,7 @@ def shown(value, depth=0):
     if kind in ("Timer", "Thread", "UpdateContext", "EntryContext"):
         return f"an object {kind}"
     text = CHANGING.sub("#", repr(value))
-    if kind.startswith("float"):  # numpy's, which its versions write in their own ways
+    if kind.startswith("float"):  # numpy's values, whose format differs between versions
         return CHANGING.sub("#", repr(float(value)))
     if kind in ("str", "bytes", "int", "float", "bool", "NoneType"):
         return text[:300]
@@ -375,7 +375,7 @@ def shown(value, depth=0):
 
 
 def outcome(function, arguments):
-    """Return what a call returns or raises, and what it prints."""
+    """Return the value or exception of a call, and its output."""
     out, err = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = printed, _ = io.StringIO(), io.StringIO()
     try:
@@ -406,14 +406,14 @@ def cases(module, required, has_optional):
 
 
 def normal(module, parameter):
-    """Return the expression of a parameter in the normal case."""
+    """Return the expression of a parameter's normal value."""
     return NORMAL_OF.get(f"{module}.{parameter}") or NORMAL.get(parameter, "'/x'")
 
 
 def run(module, name, required, has_optional, todo, names, pipe):
-    """Make the calls of a name that are to do, and write a line each."""
+    """Make the calls of a name that are in ``todo``, and write one line for each."""
     if not module.startswith("rospy"):
-        # As after init_node: objects of most modules need the time.
+        # Most modules' objects need the time, which init_node initializes.
         names["rospy"].rostime.set_rostime_initialized(True)
     home = importlib.import_module(module)
     owner, _, member = name.partition(".")
@@ -435,7 +435,7 @@ def run(module, name, required, has_optional, todo, names, pipe):
 
 
 def made(module, owner, target, names):
-    """Return an object of a class for the calls of its members."""
+    """Return an object of a class, on which its members are called."""
     if not inspect.isclass(target):
         return target
     if f"{module}.{owner}" in OBJECTS:
@@ -487,7 +487,7 @@ def main():
 
 
 def forget(master, before, state):
-    """Take what killed children have registered out of the master."""
+    """Unregister from the master all that killed children registered."""
     methods = (("unregisterPublisher", True), ("unregisterSubscriber", True), ("unregisterService", False))
     for (method, is_topic), old, new in zip(methods, before, state, strict=True):
         known = dict(old)
@@ -502,7 +502,7 @@ def forget(master, before, state):
 
 
 def in_child(module, name, required, has_optional, todo, names, seconds):
-    """Make calls in a child process: what came back of them, and whether it has ended by itself."""
+    """Make calls in a child process; return their results, and whether the child exited by itself."""
     read, write = os.pipe()
     child = os.fork()
     if not child:

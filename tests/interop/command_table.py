@@ -1,10 +1,10 @@
-"""Every command and option of rostopic, rosnode, rosservice, rosparam, rosmsg and rossrv, typed in real ROS and in ours.
+"""Every command and option of rostopic, rosnode, rosservice, rosparam, rosmsg and rossrv, run with real ROS and minirospy.
 
-`WRITE=1 pytest tests/interop/test_interop_tools.py -k table` writes what both print to docs/compatibility/commands.md.
-Compared are standard output and the exit status. Errors on stderr start with ROS's text where ROS has one, then ours
-follows: OTHER_WORDS are the lines where they do not.
+`WRITE=1 pytest tests/interop/test_interop_tools.py -k table` writes the output of both to docs/compatibility/commands.md.
+Stdout and the exit status are compared. An error on stderr starts with ROS's text, if ROS has one, followed by
+minirospy's; OTHER_WORDS lists the lines for which it does not.
 
-A line below is what is typed, then perhaps ` <<< text` for standard input and ` ## why` ours differs on purpose.
+Each line below is a command line, then optionally ` <<< text` for stdin and ` ## reason` if minirospy differs on purpose.
 """
 
 from __future__ import annotations
@@ -285,7 +285,7 @@ rosrun -h
 rosunit -h
 rosversion -h
 """
-"""Ours prints ROS's help, then what it has besides."""
+"""minirospy prints ROS's help, then its own additions."""
 
 WRONG = f"""
 rostopic bw --nonsense
@@ -472,7 +472,7 @@ STREAMING = """
 3 rostopic pub -v -r 5 -s /out geometry_msgs/PointStamped '{header: auto}'
 4 rosnode ping scene
 """
-"""Each with the number of lines after which Ctrl-C ends it; numbers in them are not compared."""
+"""Each line has the number of output lines after which Ctrl-C is sent; numbers in the output are not compared."""
 
 CHANGING = """
 rosparam set -v /q 5
@@ -561,7 +561,7 @@ rosparam load values.yaml
 """
 
 OTHER_WORDS = {"rostopic pub -1 -v /out geometry_msgs/Point 1 -2.5 -3"}
-"""Lines where ROS prints an error that ours does not print first: what is an error in ROS is none here."""
+"""Lines for which ROS prints an error that minirospy does not print first, because minirospy accepts them."""
 
 _ENDLESS = {
     """rostopic echo -n1 --filter "topic=='/poly'" /poly""",
@@ -569,14 +569,14 @@ _ENDLESS = {
     "rostopic echo -n1 /poly/polygon/points/x",
     "rostopic echo -n1 --filter 'm.(' /button_state",
 }
-"""Lines that never end in real ROS: they are interrupted."""
+"""Lines that never finish in real ROS: they are interrupted."""
 _ENDLESS_SECONDS = 25.0
+# Attempts for a line whose output depends on the moment: a stalled node or machine makes the two outputs differ.
 _TRIES = 5
-"""How often a line is typed whose output is that of the moment: where a node or the machine stalls, the two sides differ."""
 
 _STREAM_NUMBERS = re.compile(r"-?\d[\d.]*(?:e[+-]?\d+)?")
 _CHANGING = [
-    # Numbers of messages, times, processes and ports: they differ from run to run.
+    # Message counts, times, process ids and ports differ between runs.
     (re.compile(r"(?<=seq:)\s+\d+"), " 0"),
     (re.compile(r"(?<=time=)[\d.]+(?=ms)|(?<=ping average: )[\d.]+(?=ms)"), "0.0"),
     (re.compile(r"^\d{18,},|^(?:0|1000000002),\d+,", re.MULTILINE), "0,"),
@@ -584,20 +584,20 @@ _CHANGING = [
     (re.compile(r"(?<=://localhost:)\d+|(?<=://127.0.0.1:)\d+"), "40000"),
     (re.compile(r"\(\d+ - (\S+?):\d+\) \[\d+\]"), r"(40000 - \1:50000) [9]"),
     (re.compile(r"(?<=Pid: )\d+"), "4711"),
-    # Where packages are installed.
+    # Paths of installed packages.
     (re.compile(r"\[\['\S*/(?=\w+/(?:msg|srv)'\]\])"), "[['SHARE/"),
     (re.compile(r"(?<=named nope below )\S*/"), "SHARE/"),
     (re.compile(r"(?<=package \[std_msgs\] in )\S*/"), "SHARE/"),
     (re.compile(r"(?<=on search path \[)\{.*?\}(?=\]$)", re.MULTILINE), "SHARE"),
     (re.compile(r"^(ROS path \[\d+\]=)\S+$", re.MULTILINE), r"\1SHARE"),
-    # roslaunch colours its errors also if they go to a file, and writes tracebacks that ours has none of.
+    # roslaunch colours its errors also if they go to a file, and writes tracebacks that minirospy does not write.
     (re.compile(r"\033\[31m(.*?)\033\[0m", re.DOTALL), r"\1"),
     (re.compile(r"^The traceback for the exception was written to the log file\n", re.MULTILINE), ""),
 ]
 
 
 class Ended(NamedTuple):
-    """How a command ended and what it printed."""
+    """The exit status of a command, and its output."""
 
     status: int | str
     out: str
@@ -605,7 +605,7 @@ class Ended(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A line of the table."""
+    """A row of the table."""
 
     typed: str
     real: Ended
@@ -614,19 +614,19 @@ class Row(NamedTuple):
 
     @property
     def equal(self) -> bool:
-        """Whether standard output and exit status are the same; of help, whether ours begins with ROS's."""
+        """Return whether stdout and exit status are equal; for help, whether minirospy's starts with ROS's."""
         if self.typed.endswith(" -h") and self.real.out != self.ours.out:
             return self.real.status == self.ours.status and self.ours.out.startswith(self.real.out)
         return self.real[:2] == self.ours[:2]
 
     @property
     def has_ros_words(self) -> bool:
-        """Whether ROS prints an error in words of its own: a traceback is none, nor a warning."""
+        """Return whether ROS prints its own error message; tracebacks and warnings do not count."""
         return bool(self.real.err.strip()) and not re.search("^(Traceback|WARNING)", self.real.err, re.M)
 
     @property
     def same_words(self) -> bool:
-        """Whether ours prints ROS's error, and only then its own."""
+        """Return whether minirospy prints ROS's error before its own."""
         return self.ours.err.startswith(self.real.err)
 
 
@@ -638,9 +638,9 @@ def compare(
     streaming: bool = False,
     prepare: Callable[[], object] | None = None,
 ) -> list[Row]:
-    """Both tools on each line of ``text``, side by side; with ``prepare`` all lines in one, then in the other.
+    """Run each line of ``text`` with both tools in parallel; with ``prepare``, run all lines with one tool, then with the other.
 
-    ``prepare()`` is called before each of them.
+    ``prepare()`` is called before each of the two runs.
     """
     lines = [line for line in text.strip().splitlines() if line]
     if prepare:
@@ -674,7 +674,7 @@ def compare(
 
 
 def unexpected(rows: Iterable[Row]) -> str:
-    """Return the rows that differ without a reason, or have a reason and do not differ."""
+    """Return the rows that differ without a reason, or that have a reason and do not differ."""
     return "\n".join(
         f"$ {row.typed}   ({row.why or 'no reason known'})\n--- real {row.real}\n--- ours {row.ours}"
         for row in rows
@@ -683,7 +683,7 @@ def unexpected(rows: Iterable[Row]) -> str:
 
 
 def other_words(rows: Iterable[Row]) -> set[str]:
-    """Return what was typed where ROS has words for an error that ours does not print first."""
+    """Return the command lines for which ROS has an error message that minirospy does not print first."""
     return {row.typed for row in rows if row.has_ros_words and not row.same_words}
 
 
@@ -717,7 +717,7 @@ def page(sections: dict[str, list[Row]]) -> str:
 
 
 def verdicts(text: str) -> set[tuple[str, bool]]:
-    """Return what a page has for each command line: whether it is equal."""
+    """Return the command lines of a page, each with whether the outputs are equal."""
     rows = re.findall(r"^\| `(.*)` \| .*? \| (equal|\*\*)", text, re.MULTILINE)
     return {(typed, verdict == "equal") for typed, verdict in rows}
 
@@ -782,7 +782,7 @@ def _run(line: str, tools: Path, uri: str, folder: Path, streaming: bool) -> End
         status = "never"
 
     if typed.startswith(("rosnode cleanup", "rosnode ping -a")):
-        # Nodes come in the order of a set there, which no two runs share.
+        # Real ROS lists nodes in the order of a set, which differs between runs.
         out = "".join(sorted(out.splitlines(keepends=True)))
         if "Usage: " not in err:
             err = "".join(sorted(err.splitlines(keepends=True)))
@@ -795,14 +795,14 @@ def _interrupted(program: subprocess.Popen[str], count: int) -> Ended:
     lines = "".join(_until_filled(program.stdout, count))
     program.send_signal(signal.SIGINT)
     _, err = program.communicate(timeout=PATIENCE)
-    # The numbers, their units, and the width of columns that hold them, are those of the moment.
+    # Numbers, their units and the column widths depend on the moment.
     text = re.sub(r"(?<=0)[KM]B", "B", _STREAM_NUMBERS.sub("0", lines))
     text = re.sub(r" {2,}", "  ", re.sub(r"={3,}", "===", text))
     return Ended(program.returncode, text, err)
 
 
 def _until_filled(stream: Iterable[str], count: int) -> Iterator[str]:
-    """Yield ``count`` lines, without those that report no messages yet."""
+    """Yield ``count`` lines; skip lines that report that there are no messages yet."""
     for line in stream:
         if line != "no new messages\n":
             yield line

@@ -1,6 +1,6 @@
-"""Real ROS 1 next to ours: masters, peers and tools of both, on separate ports.
+"""Masters, peers and tools of real ROS 1 and of minirospy, on separate ports.
 
-`make interop` installs Debian's ROS 1 and runs this folder; where it is not installed, all of it is skipped.
+`make interop` installs Debian's ROS 1 and runs this folder; all of it is skipped if ROS 1 is not installed.
 """
 
 from __future__ import annotations
@@ -27,12 +27,11 @@ REAL_BIN = Path("/usr/bin")
 OUR_BIN = Path(sys.executable).parent
 
 STACKS = ("ours", "rospy", "roscpp")
-PATIENCE = 200.0
-"""Seconds after which a program is taken to hang: on a busy machine the start of one alone may take a minute."""
+PATIENCE = 200.0  # seconds after which a program is considered hung: on a busy machine, starting one may take a minute
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    # The test that takes minutes starts first: the others run in parallel.
+    # Start the test that takes minutes first: the others run in parallel.
     items.sort(key=lambda item: item.name.partition("[")[0] != "test_the_table")
     for item in items:
         if HERE not in item.path.parents:
@@ -40,7 +39,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if not (REAL_BIN / "rosmaster").exists():
             item.add_marker(pytest.mark.skip(reason="real ROS 1 is not installed: make interop"))
         elif not item.get_closest_marker("timeout"):
-            # More than PATIENCE, whose error says what was waited for. A compiler may run in it first, beside other tests.
+            # Longer than PATIENCE, whose error names the condition. The test may first run a compiler, in parallel
+            # with other tests.
             item.add_marker(pytest.mark.timeout(3 * PATIENCE))
 
 
@@ -51,13 +51,13 @@ def environment(uri: str, stack: str) -> dict[str, str]:
 
 
 def start(command: list[str], uri: str, stack: str, **kwargs: object) -> subprocess.Popen[str]:
-    """Start a program of ``stack``, its streams as text pipes."""
+    """Start a program of ``stack`` with its streams as text pipes."""
     streams = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **kwargs}
     return subprocess.Popen(command, env=environment(uri, stack), text=True, **streams)  # type: ignore[call-overload,no-any-return]
 
 
 def stop(program: subprocess.Popen[str]) -> None:
-    """End a program, however it takes it: the peers end with their input."""
+    """Stop a program: close stdin, at which the peers exit, then send signals."""
     if program.stdin:
         program.stdin.close()
         with suppress(subprocess.TimeoutExpired):
@@ -76,7 +76,7 @@ def stop(program: subprocess.Popen[str]) -> None:
 
 
 def is_ready(master: subprocess.Popen[str], uri: str, stack: str) -> bool:
-    """Return whether this master answers, none of another test, and the node of a roscore is registered."""
+    """Return whether this master answers, and not another test's, and a roscore's rosout node is registered."""
     try:
         with ServerProxy(uri) as proxy:
             pid: Any = proxy.getPid("/test")
@@ -87,7 +87,7 @@ def is_ready(master: subprocess.Popen[str], uri: str, stack: str) -> bool:
 
 
 def started_master(stack: str) -> tuple[subprocess.Popen[str], str]:
-    """Return a master that runs, and its URI; or one that has ended, as where another process was first at its port."""
+    """Return a running master and its URI; or one that has exited because another process took its port."""
     port = free_port()
     uri = f"http://localhost:{port}"
     commands = {
@@ -114,7 +114,7 @@ def end_master(program: subprocess.Popen[str]) -> None:
 
 @contextmanager
 def running_master(stack: str) -> Iterator[str]:
-    """Return the URI of a fresh master of ``stack``."""
+    """Yield the URI of a fresh master of ``stack``."""
     program, uri = started_master(stack)
     for _ in range(2):
         if program.poll() is None:
@@ -131,7 +131,7 @@ def running_master(stack: str) -> Iterator[str]:
 
 @pytest.fixture(autouse=True)
 def _patient_publishers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a bridge of this process wait until those are connected to whom a client publishes once; it waits a second."""
+    """Raise a bridge's limit of one second for subscribers to connect before a client's single publish."""
     from minirospy.aio import topics
 
     monkeypatch.setattr(topics, "_JOIN_SECONDS", 30.0)
@@ -139,22 +139,22 @@ def _patient_publishers(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(params=["ours", "rospy"], ids=["our master", "real master"])
 def any_master(request: pytest.FixtureRequest) -> Iterator[str]:
-    """Return the URI of a fresh master, ours and the real one in turn."""
+    """Yield the URI of a fresh master, minirospy's and the real one in turn."""
     with running_master(request.param) as uri:
         yield uri
 
 
 @pytest.fixture
 def real_master() -> Iterator[str]:
-    """Return the URI of a fresh rosmaster."""
+    """Yield the URI of a fresh rosmaster."""
     with running_master("rospy") as uri:
         yield uri
 
 
 def compiled(source: str, factory: pytest.TempPathFactory, *libraries: str) -> Path:
-    """Compile a C++ file of this folder with ``libraries`` (names of pkg-config); return the program.
+    """Compile a C++ file of this folder with ``libraries`` (pkg-config names); return the program.
 
-    A compiler may take minutes on a busy machine: the first of pytest's workers compiles for all.
+    A compiler may take minutes on a busy machine: the first pytest worker compiles for all.
     """
     import fcntl
 
@@ -177,7 +177,7 @@ def compiled(source: str, factory: pytest.TempPathFactory, *libraries: str) -> P
 
 @pytest.fixture(scope="session")
 def cpp_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """peer.cpp, compiled."""
+    """Return the compiled peer.cpp."""
     return compiled("peer.cpp", tmp_path_factory, "roscpp")
 
 

@@ -1,4 +1,4 @@
-"""Environments below build/ with other software from PyPI, for the tests against it."""
+"""Virtual environments in build/ with third-party software from PyPI, for interop tests."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ ROOT = Path(__file__).parents[2]
 
 @dataclass(frozen=True)
 class PeerEnvironment:
-    """A venv with packages. ``stamp`` exists once it is complete, and has their versions."""
+    """A venv with packages. ``stamp`` is written when it is complete, and contains their versions."""
 
     name: str
     packages: tuple[str, ...]
 
     @property
     def folder(self) -> Path:
-        """The folder of the venv, for this version of Python."""
+        """Return the venv's folder, which depends on the Python version."""
         return ROOT / "build" / f"{self.name}-{sys.version_info[0]}.{sys.version_info[1]}"
 
     @property
     def python(self) -> Path:
-        """The interpreter of the venv."""
+        """Return the venv's interpreter."""
         return self.folder / "bin" / "python"
 
     @property
     def stamp(self) -> Path:
-        """The file that exists once the environment is complete."""
+        """Return the file that exists once the environment is complete."""
         return self.folder / "installed"
 
     @property
     def is_complete(self) -> bool:
-        """Return whether it has these packages."""
+        """Return whether the environment has these packages."""
         return self.stamp.exists() and self.stamp.read_text() == "\n".join(self.packages)
 
     def create(self) -> bool:
-        """Create the venv and install the packages; return whether pip could."""
+        """Create the venv and install the packages; return whether pip succeeded."""
         print("Installing", self.packages[0].partition("==")[0], "and more from PyPI into", self.folder)
         subprocess.run([sys.executable, "-m", "venv", "--clear", str(self.folder)], check=True)
         options = ["-q", "--disable-pip-version-check", "--prefer-binary"]

@@ -1,4 +1,7 @@
-"""A robot or a control room in a network namespace: a master, nodes, a gateway. Prints what it sees, a JSON object a line."""
+"""A robot or a control room in a network namespace, with a master, nodes and a gateway.
+
+Prints its observations, one JSON object per line.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ IMAGE = bytes(300_000)
 
 
 async def robot(node: Node) -> None:
-    """Publish more images than the link takes, and five velocities a second."""
+    """Publish more images than the link can carry, and five velocities per second."""
     images = await node.advertise("/image", Image, queue_size=1)
     velocities = await node.advertise("/velocity", TwistStamped)
     while True:
@@ -29,7 +32,7 @@ async def robot(node: Node) -> None:
 
 
 async def room(node: Node, counts: dict[str, int]) -> None:
-    """Count what arrives."""
+    """Count the messages that arrive."""
 
     async def read(topic: str, cls: type) -> None:
         async for _ in node.subscribe(topic, cls, queue_size=1000):

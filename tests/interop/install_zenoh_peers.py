@@ -1,6 +1,6 @@
-"""`make ros2`: two independent implementations of what rmw_zenoh speaks, in build/zenoh-peers, from PyPI.
+"""`make ros2`: install two independent implementations of rmw_zenoh's protocol from PyPI in build/zenoh-peers.
 
-They are not rmw_zenoh itself, which PyPI does not have. Where they cannot be had one line says so, and the tests are skipped.
+They are not rmw_zenoh itself, which is not on PyPI. If they are not available, print one line; the tests are then skipped.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ CACHE = PEER.folder / "cydr"
 
 
 def main() -> int:
-    """Install; return 0 in any case, since the tests are skipped without."""
+    """Install; return 0 in any case, since the tests are skipped if the installation fails."""
     if PEER.is_complete:
         return 0
     if not PEER.create():
@@ -32,7 +32,7 @@ def main() -> int:
             "pyzeros and zenoh-ros2-sdk cannot be installed here: the bridge over Zenoh is not tested against them"
         )
         return 0
-    # pyzeros compiles what writes its attachments when it is first used, which takes minutes on a busy machine.
+    # pyzeros compiles its attachments' serializer at first use, which takes minutes on a busy machine.
     code = "from pyzeros.builtin_msgs import Attachment; Attachment().serialize()"
     environment = {**os.environ, "CYDR_CACHE_DIR": str(CACHE)}
     if subprocess.run(

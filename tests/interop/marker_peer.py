@@ -1,6 +1,6 @@
-"""A server of interactive markers, by Debian's interactive_markers or ours: whichever the interpreter imports.
+"""An interactive marker server, by Debian's interactive_markers or minirospy's, as the interpreter imports it.
 
-Prints each event of a viewer as JSON; its input has commands: move NAME X Y, erase NAME, lose (an update), big, hostile.
+Prints each viewer event as JSON; commands on stdin: move NAME X Y, erase NAME, lose (an update), big, hostile.
 """
 
 import json
@@ -39,7 +39,7 @@ def control(mode, name="", axis="x", shapes=(), **fields):
     made = InteractiveMarkerControl(interaction_mode=mode, name=name, markers=list(shapes), **fields)
     made.orientation.w = 1.0
     if axis != "x":
-        # The x axis is turned to z or y.
+        # Turn the x axis to z or y.
         setattr(made.orientation, {"z": "y", "y": "z"}[axis], 1.0)
     return made
 
@@ -78,7 +78,7 @@ def chosen(feedback):
         menu.setCheckState(checked, MenuHandler.CHECKED)
     menu.reApply(server)
     server.applyChanges()
-    # What follows the event is there when it is printed.
+    # Print the event after its consequences are complete.
     said(feedback)
 
 
@@ -149,7 +149,7 @@ for line in sys.stdin:
     elif command == "erase":
         server.erase(words[0])
     elif command == "lose":
-        # As when an update is lost on its way.
+        # Simulate an update that is lost on the network.
         server.seq_num += 1
         insert("found", (3, 0, 0), [control(modes.BUTTON, shapes=[box(1, 1, 1)])])
     elif command == "many":

@@ -1,9 +1,9 @@
-"""A node on one of two machines, on any rospy, real or ours: what it does is the first argument.
+"""A node on one of two machines, on rospy or minirospy; the first argument selects its role.
 
 robot    publish /beat ("subscribed" reports each connection), repeat /order on /heard, serve /flag and the action
-         /count, until the input ends
-laptop   use all of the robot, print what came, and end
-listen   print "beat" when /beat comes again after a second's silence, until the input ends
+         /count, until stdin is closed
+laptop   use everything that the robot offers, print the results, and exit
+listen   print "beat" when /beat arrives after a second of silence, until stdin is closed
 """
 
 import os
@@ -20,7 +20,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 SECONDS = 150
 
 if os.environ.get("TEST_KEEPALIVE"):
-    # A cable that was pulled is noticed after seconds, not after a minute.
+    # Detect a pulled cable after seconds in place of a minute.
     from minirospy.runtime.transport import sockets
 
     sockets._KEEPALIVE.update(dict.fromkeys(sockets._KEEPALIVE, 1))

@@ -1,4 +1,4 @@
-"""The page's pure modules under node: run a script with them, return what it gives as JSON."""
+"""Run a script with the page's pure modules under node, and return its result from JSON."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ needs_node = pytest.mark.skipif(
 
 
 def run_script(names: str, module: str, body: str) -> Any:
-    """Return what a function's body returns that uses these names of a module of the page, as ``js/layout.js``."""
+    """Return the result of a function body that uses these names of a page module, such as ``js/layout.js``."""
     source = (FOLDER / module).as_uri()
     script = (
         f"import {{ {names} }} from {json.dumps(source)};\n"

@@ -1,9 +1,9 @@
-"""A node that runs on any rospy, real or ours: what it does is the first argument.
+"""A node that runs on rospy or minirospy; the first argument selects its role.
 
-talk     publish one message of each kind, latched, until the input ends
-listen   print "kind digest" of one message of each kind, and end
-serve    offer /set_flag (std_srvs/SetBool) until the input ends
-call     call /set_flag with True and False, print the responses, and end
+talk     publish one message of each kind, latched, until stdin is closed
+listen   print "kind digest" of one message of each kind, and exit
+serve    offer /set_flag (std_srvs/SetBool) until stdin is closed
+call     call /set_flag with True and False, print the responses, and exit
 """
 
 import sys
@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 
 def messages():
-    """One message of each kind, with every field filled."""
+    """Return one message of each kind, with every field filled."""
     scan = LaserScan(angle_min=-2.4, angle_max=2.4, angle_increment=0.003, range_min=0.1, range_max=40.0)
     scan.header.stamp = rospy.Time(1234567890, 987654321)
     scan.header.frame_id = "scan"
@@ -33,7 +33,7 @@ KINDS = {"bool": Bool, "string": String, "scan": LaserScan, "image": Image}
 
 
 def digest(message):
-    """Length and CRC-32 of the message's bytes; the sequence number is the publisher's own affair."""
+    """Return the length and CRC-32 of the message's bytes, without the sequence number, which the publisher sets."""
     if hasattr(message, "header"):
         message.header.seq = 0
     buffer = BytesIO()
@@ -42,7 +42,7 @@ def digest(message):
 
 
 def say(*words):
-    """One write a line: callbacks of several topics run concurrently."""
+    """Print a line with a single write: callbacks of several topics run concurrently."""
     sys.stdout.write(" ".join(map(str, words)) + "\n")
     sys.stdout.flush()
 

@@ -1,7 +1,7 @@
-"""dynamic_reconfigure on any rospy, real or ours: a server, or a client. ``sys.argv[2]`` is the folder of lamp.cfg.LampConfig.
+"""A dynamic_reconfigure server or client on rospy or minirospy. ``sys.argv[2]`` is the folder of lamp.cfg.LampConfig.
 
-serve    offer the configuration as /lamp/; print each call of the callback, until the input ends
-change   change it in many ways, print what comes back, and end
+serve    offer the configuration as /lamp/; print each callback call, until stdin is closed
+change   change the configuration in many ways, print the responses, and exit
 """
 
 import sys
@@ -22,7 +22,7 @@ def say(*words):
 
 
 def shown(config):
-    """Return the values in the order of their names, and the states of the groups."""
+    """Return the values sorted by name, and the states of the groups."""
     if config is None:
         return None
     values = {name: value for name, value in sorted(config.items()) if name != "groups"}

@@ -29,8 +29,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 STAMP = Time(100, 0)
-HALF = 4.0
-"""Half the width of the room, in metres."""
+HALF = 4.0  # metres, half the width of the room
 
 _LINKS = {
     "base_link": ("0 0 0.15", "0 0 0", '<box size="0.6 0.4 0.16"/>', "0.2 0.4 0.9 1"),
@@ -50,7 +49,7 @@ _JOINTS = {
 
 
 def description(extra: str = "") -> str:
-    """Return the robot's URDF; ``extra`` is in the link base_link."""
+    """Return the robot's URDF; ``extra`` is inserted into the link base_link."""
     parts = []
     for name, (xyz, rpy, shape, color) in _LINKS.items():
         material = f'<material name="of_{name}"><color rgba="{color}"/></material>'
@@ -101,7 +100,7 @@ def frames() -> TFMessage:
 
 
 def scan() -> LaserScan:
-    """Return what a scanner at the frame laser sees of the room."""
+    """Return the scan of the room by a scanner at the frame laser."""
     x, y, yaw = _laser()
     count = 540
     step = math.radians(0.5)
@@ -129,7 +128,7 @@ def _laser() -> tuple[float, float, float]:
 
 
 def cloud(points: Sequence[tuple[float, float, float]] | None = None, frame: str = "map") -> PointCloud2:
-    """Return a cloud with x, y, z, intensity and rgb: of a column in the room's corner, if no points are given."""
+    """Return a point cloud with x, y, z, intensity and rgb; without ``points``, a column in the corner of the room."""
     if points is None:
         points = [
             (-2.6 + 0.5 * math.cos(angle / 20), 2.4 + 0.5 * math.sin(angle / 20), height / 40)
@@ -207,7 +206,7 @@ def marker(kind: int, x: float, y: float, **fields: Any) -> Marker:
 
 
 def markers() -> MarkerArray:
-    """Return a marker of each type but meshes."""
+    """Return one marker of each type except meshes."""
     zigzag = [Point(0.2 * step, 0.25 * (step % 2), 0) for step in range(6)]
     few = [Point(0.25 * (step % 3), 0.25 * (step // 3), 0) for step in range(6)]
     corners = [
@@ -234,7 +233,7 @@ def markers() -> MarkerArray:
 
 
 def others() -> dict[str, Any]:
-    """Return messages of the remaining types, by their topics."""
+    """Return topic -> message for the remaining types."""
     odometry = stamped(Odometry, "odom")
     odometry.pose.pose = pose(0.3, -0.5, 0.6)
     odometry.pose.covariance[0] = odometry.pose.covariance[7] = 0.04
@@ -264,7 +263,7 @@ def _wrench() -> Any:
 
 
 def everything() -> dict[str, Any]:
-    """Return all messages, by their topics."""
+    """Return topic -> message for all messages."""
     return {
         "/tf_static": frames(),
         "/scan": scan(),

@@ -1,19 +1,19 @@
-"""A node of real ROS 2, run by a Python that has rclpy: does what lines of JSON on its input say, prints what came.
+"""A node of real ROS 2, run by a Python that has rclpy: executes JSON lines from stdin, and prints the results.
 
-An argument names it.
+The argument is the node's name.
 
 {"op": "subscribe", "topic": ..., "type": "std_msgs/String", "reliable": true, "latched": false}
-{"op": "publish", "topic": ..., "type": ..., "data": hex of the CDR, "count": 1, "latched": false}: once a subscriber is there
-{"op": "serve", "topic": ..., "type": ..., "fields": {...}}: a service that answers so; {} in a text is the request's first
-field; with "silent" it never answers
-{"op": "call", "topic": ..., "type": ..., "fields": [{...}, ...]}: once the service is there; says each answer, in any order
+{"op": "publish", "topic": ..., "type": ..., "data": hex of the CDR, "count": 1, "latched": false}: once a subscriber exists
+{"op": "serve", "topic": ..., "type": ..., "fields": {...}}: a service that answers with these fields; {} in a string is
+replaced by the request's first field; with "silent" it never answers
+{"op": "call", "topic": ..., "type": ..., "fields": [{...}, ...]}: once the service exists; prints the answers in any order
 {"op": "call_raw", "topic": ..., "type": ..., "data": hex of the CDR}: the same, with all fields
 {"op": "declare", "topic": name of a parameter, "value": ...}
-{"op": "act", "topic": ..., "type": ..., "waits": false}: a server of a Fibonacci action: refuses a negative order, aborts 13;
-with "waits" each goal ends when it is cancelled
-{"op": "goal", "topic": ..., "type": ..., "fields": {...}}: once the server is there; says its feedback and end
-{"op": "cancel", "topic": ...}: the last goal
-{"op": "close", "topic": ...}: its publisher, subscription, service, action and clients
+{"op": "act", "topic": ..., "type": ..., "waits": false}: a Fibonacci action server: rejects a negative order, aborts 13;
+with "waits" each goal runs until it is cancelled
+{"op": "goal", "topic": ..., "type": ..., "fields": {...}}: once the server exists; prints its feedback and result
+{"op": "cancel", "topic": ...}: cancels the last goal
+{"op": "close", "topic": ...}: closes its publisher, subscription, service, action and clients
 """
 
 import concurrent.futures
@@ -69,13 +69,13 @@ def fields_of(message):
 
 
 def say(**fields):
-    # In one piece: two threads say something.
+    # A single write, since two threads print.
     with SAYING:
         print(json.dumps(fields), flush=True)
 
 
 class Peer:
-    """The node; a method for each operation, which gets the command."""
+    """The node, with one method per operation, which receives the command."""
 
     def __init__(self):
         self.node = rclpy.create_node(*(sys.argv[1:] or ["peer"]), enable_rosout=False)
@@ -92,14 +92,15 @@ class Peer:
         except ExternalShutdownException:
             pass
         except Exception:  # noqa: BLE001 - whatever rclpy raises
-            # A test that waits for a message fails now, and not when its time is over.
+            # Make a test that waits for a message fail now, not at its timeout.
             traceback.print_exc()
             say(op="ended")
 
     def in_executor(self, work):
-        """Return what a function returns in the executor's thread: what it waits for may not come or go meanwhile.
+        """Run a function in the executor's thread and return its result.
 
-        In rclpy an action is shown to the executor before it is complete, and ended while the executor uses it.
+        Entities for which the executor waits are not added or removed meanwhile:
+        rclpy shows an action to the executor before it is complete, and destroys it while the executor uses it.
         """
         done = concurrent.futures.Future()
 
@@ -241,8 +242,8 @@ class Peer:
         def send():
             client.send_goal_async(goal, feedback_callback=feedback).add_done_callback(accepted)
 
-        # rclpy 9.1.2 notes a goal twice, the second time after it has sent it: a response that the executor's thread has
-        # taken before is that of a future which nobody has, and the goal is never accepted.
+        # rclpy 9.1.2 records a goal twice, the second time after it has sent the goal. A response that the executor's
+        # thread reads before that belongs to a future that nothing refers to, and the goal is never accepted.
         self.in_executor(send)
 
     def cancel(self, topic, _):

@@ -1,6 +1,6 @@
-"""A program of roslibpy: `roslibpy_peer.py PORT` does with the bridge what the test expects, and prints it as JSON.
+"""A roslibpy client: `roslibpy_peer.py PORT` performs the test's operations on the bridge, and prints the results as JSON.
 
-A second line follows when the bridge has been replaced.
+It prints a second line when the bridge has been replaced.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SECONDS = 150
 
 
 class Box:
-    """The first value that a callback gets."""
+    """Stores the first value that a callback receives."""
 
     def __init__(self) -> None:
         self._arrived = threading.Event()
@@ -50,7 +50,7 @@ def offer_action(client: Any) -> None:
 
 
 def main() -> None:
-    """Do everything, and print the results."""
+    """Run all operations, and print the results."""
     client = roslibpy.Ros(host="127.0.0.1", port=int(sys.argv[1]))
     client.run(timeout=SECONDS)
     done: dict[str, Any] = {}

@@ -1,6 +1,7 @@
-"""`PYTHONPATH=. python tests/interop/rviz_pictures.py FOLDER [SCENE...]`: pictures of Debian's RViz and of our 3D view.
+"""`PYTHONPATH=. python tests/interop/rviz_pictures.py FOLDER [SCENE...]`: pictures of Debian's RViz and minirospy's 3D view.
 
-Both open the same .rviz file on the same topics and draw from the same camera; each scene becomes one picture, RViz on the left.
+Both open the same .rviz file on the same topics and draw from the same camera; each scene becomes one picture, RViz on
+the left.
 RViz runs under Xvfb, by Mesa's software renderer: apt-get install rviz xvfb libgl1-mesa-dri.
 """
 
@@ -52,7 +53,7 @@ for _a, _b, _c in ((0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)):
 
 
 def display(cls: str, topic: str = "", **settings: object) -> Settings:
-    """Return a display; what is not given has the default of each program."""
+    """Return a display; settings that are not given keep each program's default."""
     key = {"Marker": "Marker Topic", "MarkerArray": "Marker Topic"}.get(cls, "Topic")
     found: Settings = {
         "Class": f"rviz/{cls}",
@@ -122,7 +123,7 @@ def _cells() -> GridCells:
 
 
 def depth_camera() -> dict[str, Any]:
-    """Return what a depth camera at the frame lens sees: a wavy wall, a ball in front of it, and a place without depths."""
+    """Return the messages of a depth camera at the frame lens: a wavy wall, a ball in front of it, and an area without depths."""
     width, height, focal = 80, 60, 70.0
     depths, colors = [], bytearray()
     for y in range(height):
@@ -148,16 +149,16 @@ def depth_camera() -> dict[str, Any]:
 
 
 def shapes() -> MarkerArray:
-    """Return a marker of each type, and glass."""
+    """Return one marker of each type, and a transparent one."""
     return MarkerArray(
         [*robot_scene.markers().markers, _two_point_arrow(), *_glass(), mesh(2.6, -3.2, "part.stl")]
     )
 
 
 def messages() -> dict[str, Any]:
-    """Return all messages, by their topics."""
+    """Return topic -> message for all messages."""
     found = robot_scene.everything()
-    # More than RViz hides as a small value.
+    # Larger than the values that RViz hides as too small.
     found["/wrench"].wrench.torque.y = 0.5
     lens = robot_scene.transform("map", "lens", 0, 0, 1)
     lens.transform.rotation = Quaternion(-0.5, 0.5, -0.5, 0.5)
@@ -173,7 +174,7 @@ def messages() -> dict[str, Any]:
 
 
 def description() -> str:
-    """Return the robot, with a mesh."""
+    """Return the robot's description, with a mesh."""
     part = '<visual><origin xyz="0 0 0.08"/><geometry><mesh filename="package://rviz_meshes/part.stl"/></geometry>'
     return robot_scene.description(
         part + '<material name="of_part"><color rgba="0.9 0.6 0.1 1"/></material></visual>'
@@ -244,7 +245,7 @@ SCENES: dict[str, tuple[list[Settings], Settings]] = {
 
 
 def write_file(path: Path, scene: str) -> None:
-    """Write the .rviz file of a scene; JSON is YAML."""
+    """Write the .rviz file of a scene as JSON, which is valid YAML."""
     displays, view = SCENES[scene]
     manager = {
         "Class": "",
@@ -273,7 +274,7 @@ def has_rviz() -> bool:
 
 
 class Rviz:
-    """RViz under Xvfb with a file, without menus: the window is the picture."""
+    """RViz under Xvfb, without menus, so that the 3D view fills the window."""
 
     def __init__(self, file: Path, folder: Path) -> None:
         self._frame = folder / "Xvfb_screen0"
@@ -302,7 +303,7 @@ class Rviz:
         return process
 
     def _start_display(self, folder: Path) -> int:
-        """Start Xvfb; return its number, which it chooses."""
+        """Start Xvfb; return the display number, which Xvfb chooses."""
         reading, writing = os.pipe()
         screen = f"{WIDTH}x{HEIGHT}x{_DEPTH}"
         words = [
@@ -324,7 +325,7 @@ class Rviz:
             return int(numbers.readline())
 
     def picture(self) -> Image.Image:
-        """Return what is on the screen; Xvfb keeps it as a file of xwd."""
+        """Return a screenshot, read from Xvfb's framebuffer file in xwd format."""
         data = self._frame.read_bytes()
         size, width, height, line, colors = (
             struct.unpack_from(">I", data, at)[0] for at in (0, 16, 20, 48, 76)
@@ -335,7 +336,7 @@ class Rviz:
         )
 
     def settled(self, seconds: float = 4.0) -> Image.Image:
-        """Return the picture, once it has not changed for some seconds and is more than a background."""
+        """Return the picture once it has not changed for ``seconds`` and shows more than a background."""
         end = time.monotonic() + PATIENCE
         picture, since = self.picture(), time.monotonic()
         while time.monotonic() - since < seconds or len(picture.getcolors(WIDTH * HEIGHT) or ()) < 20:
@@ -347,7 +348,7 @@ class Rviz:
         return picture
 
     def close(self) -> None:
-        """End RViz and its display."""
+        """Stop RViz and Xvfb."""
         self._stack.close()
 
 
@@ -359,7 +360,7 @@ def our_picture(page: Page) -> Image.Image:
 
 
 def enlarge(page: Page) -> None:
-    """Let the picture of the 3D view be all of the page's upper left corner, in RViz's size; wait until all displays are fine."""
+    """Enlarge the 3D view to the page's upper left corner, in RViz's size; wait until no display reports a fault."""
     page.wait(
         "const all = [...document.querySelectorAll('.displays .display')];"
         "return all.length && all.every(e => e.dataset.level === 'ok')"
@@ -375,7 +376,7 @@ def enlarge(page: Page) -> None:
 
 
 def prepare(folder: Path) -> None:
-    """Make the package whose meshes the scenes have."""
+    """Create the package that has the scenes' meshes."""
     package = folder / "rviz_meshes"
     package.mkdir()
     (package / "package.xml").write_text(
@@ -417,7 +418,7 @@ def robot() -> Iterator[Served]:
 
 
 def compare(served: Served, scene: str) -> tuple[Image.Image, Image.Image]:
-    """Return the pictures of a scene: RViz's, ours."""
+    """Return the pictures of a scene: RViz's and minirospy's."""
     assert served.dashboard
     with tempfile.TemporaryDirectory() as name, contextlib.ExitStack() as stack:
         file = Path(name, "scene.rviz")
@@ -432,7 +433,7 @@ def compare(served: Served, scene: str) -> tuple[Image.Image, Image.Image]:
 
 
 def main() -> None:
-    """Take the pictures."""
+    """Save the pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""A node with something of everything for the tools to show; runs on rospy and on ours alike."""
+"""A node with topics, services and parameters of every kind for the tools to show; runs on rospy and on minirospy."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ rospy.set_param(
         "l": [1, "a: b", [2, 3]], "d": {"q": {"r": 1e-7}, "t": "yes"}, "big": 1e20,
     },
 )  # fmt: skip
-# What the tools show of its connections: its own, and that of roscore's node where there is one.
+# The connections that the tools list: the node's own, and that of roscore's rosout node if it runs.
 wanted = {"/button_state", "/rosout"} & {topic for topic, _ in rosgraph.Master("/scene").getSystemState()[1]}
 while not wanted <= connected_topics():
     rospy.sleep(0.02)

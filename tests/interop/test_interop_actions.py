@@ -1,4 +1,4 @@
-"""Actions: servers and clients of ours, of actionlib in Python and of actionlib in C++, each with each."""
+"""Action servers and clients of minirospy, actionlib in Python and actionlib in C++, in every combination."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ in time ABORTED
 
 @pytest.fixture(scope="session")
 def cpp_action_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """action_peer.cpp, compiled."""
+    """Return the compiled action_peer.cpp."""
     return compiled("action_peer.cpp", tmp_path_factory, "actionlib", "roscpp")
 
 
@@ -77,7 +77,7 @@ def run(request: pytest.FixtureRequest) -> Iterator[Run]:
 
     yield start
     for program in programs:
-        # A server ends with its input.
+        # A server exits when stdin is closed.
         if program.poll() is None:
             try:
                 program.communicate(timeout=PATIENCE)

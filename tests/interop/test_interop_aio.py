@@ -1,4 +1,4 @@
-"""A node of the asyncio API beside nodes of real rospy, over our master and over the real one."""
+"""A node of the asyncio API with nodes of real rospy, with minirospy's master and with the real one."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ for line in sys.stdin:
 
 @pytest.fixture
 def peer(any_master: str) -> Iterator[subprocess.Popen[str]]:
-    """Start the peer under real rospy; it ends with the test."""
+    """Run the peer under real rospy until the test finishes."""
     environment = {**os.environ, "ROS_MASTER_URI": any_master}
     program = subprocess.Popen(
         ["/usr/bin/python3", "-c", PEER],
@@ -56,7 +56,7 @@ def peer(any_master: str) -> Iterator[subprocess.Popen[str]]:
     assert program.stdout
     assert program.stdout.readline() == "ready\n"
     yield program
-    # Its input ends, and with it the program.
+    # Close stdin, at which the program exits.
     program.communicate(timeout=PATIENCE)
 
 

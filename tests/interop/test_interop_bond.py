@@ -1,4 +1,4 @@
-"""Bonds between our bondpy, Debian's bondpy and bondcpp: formed, broken by one end, and by an end that is killed."""
+"""Bonds between minirospy's bondpy, Debian's bondpy and bondcpp: formed, broken by one endpoint, and by killing an endpoint."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ Start = Callable[..., subprocess.Popen[str]]
 
 @pytest.fixture(scope="session")
 def cpp_bond(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """bond_peer.cpp, compiled."""
+    """Return the compiled bond_peer.cpp."""
     return compiled("bond_peer.cpp", tmp_path_factory, "bondcpp")
 
 
 @pytest.fixture
 def end(master: str, request: pytest.FixtureRequest) -> Iterator[Start]:
-    """Start an end of a bond of a stack; it is ended after the test."""
+    """Return a function that starts a bond endpoint of a stack; stop the endpoints after the test."""
     with ExitStack() as stack:
 
         def make(
@@ -53,7 +53,7 @@ def send(program: subprocess.Popen[str], word: str) -> None:
 
 
 def lines(program: subprocess.Popen[str], count: int) -> list[str]:
-    """Return the next lines, sorted: a callback and a waiting thread are not in a certain order."""
+    """Return the next lines, sorted: a callback and a waiting thread print in any order."""
     assert program.stdout
     return sorted(program.stdout.readline().strip() for _ in range(count))
 
@@ -71,7 +71,7 @@ def test_bond_that_one_end_breaks_breaks_at_the_other(one: str, other: str, end:
 
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_bond_with_a_killed_end_breaks(one: str, other: str, end: Start) -> None:
-    # So long may an end stall that lives.
+    # A live endpoint may stall for this long.
     ends = end(one, heartbeat_timeout=10.0), end(other)
     assert [lines(each, 1) for each in ends] == [["formed"], ["formed"]]
     send(ends[0], "wait")

@@ -1,4 +1,4 @@
-"""Whole sessions of the JavaScript clients of Foxglove and rosbridge, through a restart of the bridge."""
+"""Complete sessions of the JavaScript clients of Foxglove and rosbridge, including a restart of the bridge."""
 
 from __future__ import annotations
 
@@ -26,8 +26,7 @@ __all__ = ["modules"]
 
 DATA = bytes(range(256)) * 3600
 DIGEST = hashlib.sha1(DATA).hexdigest()
-SECONDS = 500
-"""Of a scene: more than the limits of what it waits for."""
+SECONDS = 500  # limit of a scene: longer than the sum of its waits
 
 
 def transform(child: str, node: Node) -> TFMessage:
@@ -43,7 +42,7 @@ async def robot() -> AsyncIterator[Node]:
     """Run a node with latched topics, tf, services and an action."""
 
     async def execute(goal: Any) -> dict[str, Any]:
-        # Its client may not be connected to all of the topics yet.
+        # The client may not be connected to all of the topics yet.
         await server._feedback.wait_for_subscribers()
         await server._result.wait_for_subscribers()
         await goal.publish_feedback(sequence=[9])
@@ -80,7 +79,7 @@ async def robot() -> AsyncIterator[Node]:
 
 
 async def call(node: Node, name: str) -> str:
-    """Return what a service answers, when it is there: a client that offers one gets no notice of it."""
+    """Return a service's response once it is registered: a client that offers a service is not notified when it is."""
     await node.wait_for_service(name, PATIENCE)
     return str((await node.call(name, SetBool, True)).message)
 

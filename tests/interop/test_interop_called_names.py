@@ -1,7 +1,7 @@
-"""Every callable name of the compatibility pages with nothing, None, wrong types and the normal case: real ROS beside ours.
+"""Compare calls of every callable name of the compatibility pages: no argument, None, wrong types, normal values.
 
-called_names.json has what differs, by its reason: call -> [real, ours]; and the calls that wait for something in both, which are
-not made again. RECORD=1 writes it again: a new difference gets the reason "", which fails until somebody has written one.
+called_names.json has the differences by reason: call -> [real, ours]; and the calls that block in both, which are not
+repeated. RECORD=1 rewrites it: a new difference gets the reason "", which fails until a reason is written.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ sys.path.pop(0)
 
 
 def callable_names() -> list[list[object]]:
-    """Return [module, name or Class.member, its parameters without default, whether it has others] of the pages' names."""
+    """Return [module, name or Class.member, its parameters without default, whether it has others] for the pages' names."""
     real, ours = (
         compare_surface.described_by(python) for python in (compare_surface.REAL_PYTHON, sys.executable)
     )
@@ -56,7 +56,7 @@ def outcomes(python: str, task: dict[str, object], master: str, folder: Path) ->
         **dict.fromkeys(("HOME", "ROS_HOME"), str(folder)),
         "ROS_MASTER_URI": master,
         "ROS_IP": "127.0.0.1",
-        # Real roslib needs both.
+        # Real roslib needs both variables.
         "ROS_ROOT": "/nowhere",
         "ROS_PACKAGE_PATH": "/nowhere",
     }
@@ -75,7 +75,7 @@ def outcomes(python: str, task: dict[str, object], master: str, folder: Path) ->
 
 
 def wait_for_rosout(*masters: str) -> None:
-    """Wait until the node rosout of each master has registered all: it is part of what the calls see."""
+    """Wait until each master's rosout node has registered everything: the calls' results include it."""
     for uri in masters:
         with ServerProxy(uri) as master:
             wait_until(lambda master=master: master.lookupService("/t", "/rosout/set_logger_level")[0] == 1)  # type: ignore[misc]
@@ -86,7 +86,7 @@ def test_calls_have_the_recorded_outcomes(tmp_path: Path) -> None:
     record = json.loads(RECORD.read_text())
     names = callable_names()
     assert len(names) > 1100
-    # A call that is known to wait is left out; any other has all the time that a busy machine needs.
+    # Calls that are known to block are left out; the others get as much time as a busy machine needs.
     task = {"names": names, "left_out": [] if RECORDS else record["waits"], "seconds": 4 if RECORDS else 60}
     with running_master("ours") as one, running_master("ours") as other, ThreadPoolExecutor(2) as pool:
         wait_for_rosout(one, other)

@@ -1,4 +1,4 @@
-"""The display Camera of the 3D view: the scene at the places where the camera sees it, and the picture in and over it."""
+"""The display Camera of the 3D view: objects at the right pixels, and the camera's picture behind and over them."""
 
 from __future__ import annotations
 
@@ -24,8 +24,7 @@ from tests.web.dashboard.conftest import serve
 __all__ = ["browse", "serve"]
 
 WIDTH, HEIGHT = 160, 120
-FAR = 2.0
-"""Metres from the camera to the front of the cube."""
+FAR = 2.0  # metres from the camera to the front of the cube
 
 
 def camera_info(**fields: Any) -> CameraInfo:
@@ -39,7 +38,7 @@ def camera_info(**fields: Any) -> CameraInfo:
 
 
 def projected(info: CameraInfo, point: tuple[float, float, float], zoom: float = 1) -> Any:
-    """Return where the page's projection has a point of the camera's frame: pixels, or the error's text."""
+    """Return the pixel at which the page draws a point in the camera's frame, or the error's text."""
     body = f"""
         const info = {json.dumps({"width": info.width, "height": info.height, "P": [*info.P]})};
         try {{
@@ -58,7 +57,7 @@ def projected(info: CameraInfo, point: tuple[float, float, float], zoom: float =
     [
         [160, 0, 80, 0, 0, 160, 60, 0, 0, 0, 1, 0],
         [120, 0, 70, 0, 0, 200, 66, 0, 0, 0, 1, 0],
-        # The right one of two cameras.
+        # The right camera of a stereo pair.
         [160, 0, 80, -16, 0, 160, 60, 8, 0, 0, 1, 0],
     ],
 )
@@ -94,12 +93,12 @@ def test_info_is_next_to_the_image() -> None:
 
 
 def scene() -> dict[str, Any]:
-    """Return a camera that looks along x, a red cube in front of it, and its picture, which is blue."""
+    """Return a camera that looks along x, a red cube in front of it, and its image, which is blue."""
     lens = robot_scene.transform("map", "lens", 0, 0, 1)
     lens.transform.rotation = Quaternion(-0.5, 0.5, -0.5, 0.5)
     cube = Marker(type=Marker.CUBE, scale=Vector3(1, 1, 1), color=ColorRGBA(1, 0, 0, 1))
     cube.header.frame_id = "map"
-    # Its right half is where the camera's picture has its left quarter.
+    # The right half of the cube covers the left quarter of the camera's image.
     cube.pose = Pose(Point(FAR + 0.5, 0.5, 1), Quaternion(0, 0, 0, 1))
     blue = robot_scene.stamped(Image, "lens", width=WIDTH, height=HEIGHT, encoding="rgb8", step=3 * WIDTH)
     # The upper half is darker.
@@ -109,7 +108,7 @@ def scene() -> dict[str, Any]:
 
 
 def color(page: Page, x: float, y: float) -> list[int]:
-    """Return the color of the camera's view at a place: 0 to 1 from left to right, and downwards."""
+    """Return the color of the camera's view at a position: 0 to 1 from left to right, and from top to bottom."""
     found: list[int] = page.evaluate(
         "(() => { const c = document.querySelector('canvas.inset');"
         f"return [...c.getContext('2d').getImageData(c.width * {x}, c.height * {y}, 1, 1).data].slice(0, 3) }})()"
@@ -123,7 +122,7 @@ def test_scene_is_seen_through_the_camera(serve: Serve, browse: Callable[..., Pa
     send = publish(served, scene())
     page = browse(address(served, "3d"))
     status(page, "Marker /cube", "1 markers")
-    # Grid and axes would be in the way of the colors.
+    # Grid and axes would cover the colors.
     for name in ("Grid", "TF"):
         page.click(f"[data-name='{name}'] input[type=checkbox]")
     page.evaluate(
@@ -136,14 +135,14 @@ def test_scene_is_seen_through_the_camera(serve: Serve, browse: Callable[..., Pa
     status(page, "Camera", "No CameraInfo received on [/lens/camera_info]. Topic may not exist.")
     send("/lens/camera_info", camera_info())
     status(page, "Camera", "Camera Info: OK")
-    # Until all of it is drawn: the cube, and the picture beside it.
+    # Wait until the cube and the picture next to it are drawn.
     page.wait(
         "const c = document.querySelector('canvas.inset'); if (c.hidden || c.width <= 100) return false;"
         "const at = (x, y) => c.getContext('2d').getImageData(c.width * x, c.height * y, 1, 1).data;"
         "return at(0.1, 0.5)[0] > 60 && Math.abs(at(0.9, 0.25)[2] - 100) <= 3 && at(0.52, 0.6)[0] < 5"
     )
 
-    # The cube's front is from 0 to the middle, a metre wide at two metres: 80 pixels of 160.
+    # The cube's front ends at the image's middle; it is a metre wide at two metres: 80 of 160 pixels.
     side, outside = color(page, 0.1, 0.5), color(page, 0.9, 0.25)
     assert side[0] > 60, side
     assert side[2] in range(40, 110), side
@@ -152,7 +151,7 @@ def test_scene_is_seen_through_the_camera(serve: Serve, browse: Callable[..., Pa
     assert color(page, 0.48, 0.6)[0] > 60
     assert color(page, 0.52, 0.6)[0] < 5
 
-    # The whole picture over it.
+    # Draw the picture opaque over the scene.
     page.type("[data-name='Camera'] input[aria-label='Overlay Alpha']", "1")
     page.evaluate("document.activeElement.dispatchEvent(new Event('change'))")
     page.wait(
@@ -163,7 +162,7 @@ def test_scene_is_seen_through_the_camera(serve: Serve, browse: Callable[..., Pa
     small = page.evaluate("document.querySelector('canvas.inset').width")
     page.click("canvas.inset")
     page.wait(f"return document.querySelector('canvas.inset').width > {small} * 1.5")
-    # Frames have their names in it: this one is right of the middle and above it.
+    # Frames are labelled with their names: this label is right of and above the middle.
     count = (
         "(() => { const c = document.querySelector('canvas.inset'), w = c.width, h = c.height;"
         "const d = c.getContext('2d').getImageData(0.65 * w, 0.34 * h, 0.3 * w, 0.16 * h).data;"

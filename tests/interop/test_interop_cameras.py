@@ -1,4 +1,4 @@
-"""Calibrations that ours write are those that the real convert writes; random cameras give the real model's numbers."""
+"""Calibrations that minirospy writes equal those of the real convert; random cameras give the real model's numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One tree of packages, built by real catkin_make and by ours: the same modules, the same types, the same variables."""
+"""One tree of packages, built by real catkin_make and by minirospy's: equal modules, types and variables."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from distutils.core import setup
 from catkin_pkg.python_setup import generate_distutils_setup
 setup(**generate_distutils_setup(packages=['wild', 'wild.deep'], package_dir={'': 'python'}, scripts=['bin/wild_tool']))
 """
-# The ways in which CMakeLists.txt of packages in the wild say things.
+# Notations of CMakeLists.txt found in third-party packages.
 WILD = """catkin_python_setup()
 FILE(GLOB found RELATIVE "${${PROJECT_NAME}_SOURCE_DIR}/msg" msg/*.msg) # all of them
 list(REMOVE_ITEM found Left.msg)
@@ -87,7 +87,8 @@ endif()
 """
 TALK = "#!/usr/bin/env python3\nimport sys\nprint('talk', sys.argv[1:], __name__)\n"
 
-# As in ros_tutorials, common_tutorials and the workshop: messages, services, actions, Python, and all of them together.
+# As in ros_tutorials, common_tutorials and the workshop: messages, services, actions, Python, and all of them
+# together.
 PACKAGES = {
     "beginner_tutorials": (
         ["std_msgs", "geometry_msgs"],
@@ -157,8 +158,8 @@ PACKAGES = {
     ),
 }  # fmt: skip
 
+# Real catkin finds these for the md5sum of a message that contains them, but generates no class; minirospy does.
 UNLISTED = ("wild.msg.Left", "half_listed.msg.Unlisted")
-"""What real catkin finds for the md5sum of a message that has it, and makes no class of; ours does."""
 
 LOOK = """
 import importlib, json, sys
@@ -207,7 +208,7 @@ def run(command: list[str], folder: Path, path: str) -> str:
         "PATH": path,
         "HOME": str(folder),
         "LANG": "C.UTF-8",
-        # Python is what is compared; genmsg calls this where catkin makes messages.
+        # Only Python is compared; genmsg runs these generators when catkin makes messages.
         "ROS_LANG_DISABLE": "gencpp:genlisp",
         "ROS_VERSION": "1",
     }
@@ -220,7 +221,7 @@ def run(command: list[str], folder: Path, path: str) -> str:
 
 @pytest.fixture(scope="module")
 def trees(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Return the tree as real catkin_make built it, and as ours did."""
+    """Return the tree as built by real catkin_make, and as built by minirospy's."""
     if not Path("/usr/bin/catkin_make").exists():
         pytest.fail("real catkin_make is not installed: tests/interop/install_ros.sh")
     real, ours = (tmp_path_factory.mktemp(name) for name in ("real", "ours"))
@@ -246,7 +247,7 @@ def test_generated_modules_and_types_are_equal(trees: tuple[Path, Path]) -> None
     assert len(ours) > 30
 
 
-# What compilers and CMake read, and what pip would.
+# Files for compilers, CMake and pip.
 NOT_COMPARED = (
     "/cmake/",
     "pkgconfig",
@@ -259,13 +260,13 @@ NOT_COMPARED = (
 
 
 def files(folder: Path) -> dict[str, bool]:
-    """Return the files below a folder that programs of Python need, and whether they are executable."""
+    """Return the files in a folder that Python programs need, and whether they are executable."""
     return {
         path.relative_to(folder).as_posix(): os.access(path, os.X_OK)
         for path in sorted(folder.rglob("*"))
         if path.is_file()
         and not any(each in str(path) for each in NOT_COMPARED)
-        # Of an action, real catkin keeps the messages as text too.
+        # Real catkin also keeps an action's messages as text.
         and not re.search(r"(Action|Goal|Result|Feedback)\.msg$", path.name)
     }
 
@@ -277,7 +278,7 @@ def test_devel_files_are_equal(trees: tuple[Path, Path]) -> None:
             {name: bit for name, bit in files(root / place).items() if "/" in name} for root in trees
         )
         stubs = {name for name in ours if name.endswith("/__init__.pyi")}
-        # What ours adds for editors; a test of messages covers it.
+        # minirospy adds stubs for editors; a test of messages covers them.
         assert stubs
         modules = {"lib/python3/dist-packages/{}/{}/_{}.py".format(*name.split(".")) for name in UNLISTED}
         assert modules <= ours.keys()
@@ -287,7 +288,7 @@ def test_devel_files_are_equal(trees: tuple[Path, Path]) -> None:
 
 @pytest.mark.timeout(1200)
 def test_programs_are_on_path_in_devel_and_install(trees: tuple[Path, Path]) -> None:
-    """What setup.py and catkin_install_python name is on PATH, in devel and installed."""
+    """Compare the programs that setup.py and catkin_install_python put on PATH, in devel and installed."""
     for root, path in zip(trees, ("", f"{BIN}:"), strict=True):
         for place in ("devel", "install"):
             script = f". '{root}/{place}/setup.sh'; wild_tool a; talk.py b"
@@ -297,7 +298,7 @@ def test_programs_are_on_path_in_devel_and_install(trees: tuple[Path, Path]) -> 
 
 @pytest.mark.timeout(1200)
 def test_real_python_imports_our_generated_modules(trees: tuple[Path, Path]) -> None:
-    """Modules of ours need genpy alone: real ROS imports them too, and writes the same bytes."""
+    """minirospy's modules need only genpy: real ROS imports them too, and serializes the same bytes."""
     code = (
         "from io import BytesIO; from beginner_tutorials.msg import Person, Num; b = BytesIO()\n"
         "Person(name='x', nums=[Num(1)]).serialize(b); print(b.getvalue().hex(), Person().deserialize(b.getvalue()).nums)"
@@ -311,7 +312,7 @@ def test_real_python_imports_our_generated_modules(trees: tuple[Path, Path]) -> 
 
 @pytest.mark.timeout(1200)
 def test_setup_variables_are_equal(trees: tuple[Path, Path]) -> None:
-    """Of ours, the folders of minirospy's own packages come last, where real ROS has /opt/ros or /usr."""
+    """minirospy's own packages come last, in the place of /opt/ros or /usr in real ROS."""
     script = ". '{}/devel/setup.bash'; echo $CMAKE_PREFIX_PATH; echo $PYTHONPATH; echo $ROS_PACKAGE_PATH"
     said = []
     for root, path in zip(trees, ("", f"{BIN}:"), strict=True):
@@ -323,7 +324,7 @@ def test_setup_variables_are_equal(trees: tuple[Path, Path]) -> None:
 
 
 def test_create_pkg_writes_the_files_of_the_real_one(tmp_path: Path) -> None:
-    """catkin_create_pkg: the same lines on the screen, the same files, a package.xml that says the same."""
+    """Compare catkin_create_pkg's output, its files, and the contents of package.xml."""
     trees = []
 
     for name, command in (("real", "/usr/bin/catkin_create_pkg"), ("ours", str(BIN / "catkin_create_pkg"))):
@@ -355,7 +356,7 @@ def test_create_pkg_writes_the_files_of_the_real_one(tmp_path: Path) -> None:
 
 @pytest.mark.timeout(1200)
 def test_real_catkin_make_builds_our_package(tmp_path: Path) -> None:
-    """The files of a new package are right for CMake also."""
+    """A new package's files are also valid for CMake."""
     (tmp_path / "src").mkdir()
     run([str(BIN / "catkin_create_pkg"), "led", "rospy", "std_msgs"], tmp_path / "src", os.environ["PATH"])
     shutil.copytree(tmp_path / "src" / "led", tmp_path / "kept")
@@ -442,7 +443,7 @@ IS_DIRECTORY ${CMAKE_CURRENT_LIST_DIR}|EXISTS /nothing/there|IS_ABSOLUTE /a|IS_A
 
 
 def test_cmake_conditions_are_equal(tmp_path: Path) -> None:
-    """`cmake -P` is the referee of what a CMakeLists.txt comes to."""
+    """Compare with the results of `cmake -P`."""
     for name in ("msg/b.msg", "msg/a.msg", "msg/in/c.msg", "b.txt", "c.txt"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()

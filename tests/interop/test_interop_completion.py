@@ -1,4 +1,4 @@
-"""TAB beside rosbash's: the same graph, the same packages; what rosbash offers, ours offers too."""
+"""TAB completion compared with rosbash's: on the same graph and packages, minirospy offers everything that rosbash offers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _LINES = (
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Return a package with a program and two launch files; the current folder has two files."""
+    """Create a package with a program and two launch files; the current folder has two files."""
     package = tmp_path / "src" / "my_robot"
     texts = {
         "scripts/talker.py": "#!/usr/bin/env python3\n",
@@ -62,7 +62,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def uri(workspace: None) -> Iterator[str]:
-    """Return the URI of a master, where /robot publishes, serves and has parameters."""
+    """Yield the URI of a master at which /robot publishes, serves and has parameters."""
     with running_master("ours") as uri:
         node = start([REAL_PYTHON, "-c", _NODE], uri, "rospy")
         try:
@@ -75,7 +75,7 @@ def uri(workspace: None) -> Iterator[str]:
 
 
 def offered(functions: Path, uri: str, stack: str) -> dict[str, list[str]]:
-    """Line -> what bash is given for a TAB at its end."""
+    """Return line -> the completions that bash gets for TAB at its end."""
     script = [f". {functions}"]
 
     for line in _LINES:
@@ -102,7 +102,10 @@ def offered(functions: Path, uri: str, stack: str) -> dict[str, list[str]]:
 
 
 def covers(ours: str, real: str) -> bool:
-    """Return whether a candidate of ours is the real one, or a prefix of it: ours quotes, adds :=, types take two steps."""
+    """Return whether minirospy's candidate equals the real one or is its prefix.
+
+    minirospy quotes, adds :=, completes types in two steps.
+    """
     ours = ours.replace("\\ ", " ")
     return ours == real or (ours.endswith("/") and real.startswith(ours)) or ours == f"{real}:="
 
@@ -113,7 +116,7 @@ def test_completion_offers_the_words_of_rosbash(uri: str) -> None:
     ours: dict[str, list[str]] = {line: [] for line in _LINES}
     missing: dict[str, list[str]] = {}
     for _ in range(5):
-        # TAB gives a graph up that does not answer within a second; a person presses it again.
+        # TAB gives up if the graph does not answer within a second; a user presses it again.
         ours = {line: ours[line] + found for line, found in offered(_OURS, uri, "ours").items()}
         missing = {
             line: lost

@@ -1,4 +1,4 @@
-"""The dashboard in Debian's chromium, used as a person uses it; and the page's codec under node."""
+"""The dashboard in Debian's chromium, operated as by a user; and the page's codec under node."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_codec_of_the_page_reads_and_writes_every_type() -> None:
     lines = []
     for name in TYPES:
         cls = get_message_class(name)
-        if cls is None:  # of a package that is not installed
+        if cls is None:  # its package is not installed
             continue
         for _ in range(3):
             buffer = BytesIO()
@@ -147,7 +147,7 @@ def test_codec_of_the_page_gives_the_values_and_refuses_what_does_not_fit() -> N
 
 @pytest.fixture
 def browse() -> Iterator[Callable[..., Page]]:
-    """Return a function that opens a page; at the end none may have logged an error."""
+    """Return a function that opens a page; assert at teardown that no page logged an error."""
     opened: list[Page] = []
 
     def browsing(url: str, **options: Any) -> Page:
@@ -157,14 +157,14 @@ def browse() -> Iterator[Callable[..., Page]]:
     yield browsing
     errors = []
     for page in opened:
-        page.evaluate("1")  # what it logged before has arrived then
+        page.evaluate("1")  # errors that it logged before have arrived by then
         errors += [each for each in page.errors if "WebSocket connection" not in each]
         page.close()
     assert errors == []
 
 
 def address(served: Served, view: str = "") -> str:
-    """Return the link of a view, with the owner's token unless it has another one."""
+    """Return the URL of a view, with the owner's token unless it already has one."""
     words = "" if "token=" in view else f"{'&' if '?' in view else '?'}token={TOKEN}"
     return f"http://localhost:{served.port}/#/{view}{words}"
 
@@ -256,7 +256,7 @@ def test_lost_connection_is_shown_and_comes_back(
 
 
 def logger(served: Served) -> Callable[..., None]:
-    """Return a function that publishes lines to /rosout_agg, as the node of roscore does."""
+    """Return a function that publishes lines to /rosout_agg, as roscore's rosout node does."""
     from rosgraph_msgs.msg import Log
 
     publishing = publisher(served, "/rosout_agg", Log, latch=True, queue_size=None)
@@ -315,7 +315,7 @@ def test_console_holds_many_lines_with_few_elements(
     page.wait_text(".bar", "1 of 1 lines")
     for first in range(0, 20_000, 2000):
         log(*((2, "/many", f"line {number}") for number in range(first, first + 2000)))
-        # One part after the other: a browser that is slower than this test would lose lines, as it should.
+        # Publish in parts: a browser that is slower than this test would drop lines, as intended.
         page.wait_text(".bar", f"{first + 2001} of {first + 2001} lines")
     page.wait_text(".line .text", "line 19999")
     assert page.evaluate("document.querySelectorAll('.line').length") < 100
@@ -364,13 +364,13 @@ def test_console_keeps_long_texts_in_their_rows(
     log = publisher(served, "/rosout_agg", Log, latch=True)
     served.run(log.publish(Log(level=8, name="/n" + "n" * 2000, msg=text)))
     page.wait_text(".line .text", "Traceback: ↵   line 1 ↵   line 2 ↵ xxx")
-    # All of it comes with a click.
+    # A click shows the whole line.
     page.click(".line")
     page.wait(f"return document.querySelector('.details pre').textContent === {json.dumps(text)}")
     widths = "['.bar select', '.bar'].map(find => document.querySelector(find).getBoundingClientRect().width)"
     select, bar = page.evaluate(widths)
     assert select < bar / 2
-    # The newest line is followed also if the list becomes lower before the event of its own scrolling comes.
+    # The view follows the newest line even if the list shrinks before its scroll event arrives.
     for number in range(60):
         served.run(log.publish(Log(level=2, name="/n", msg=f"line {number}")))
     page.wait_text(".line .text", "line 59")
@@ -543,7 +543,7 @@ def test_graph_shows_nodes_and_topics_and_their_details(
     page.wait_text(".node text", "/listener")
     page.wait("return document.querySelectorAll('.edge').length === 2")
     page.click(".graph .topic", "/chatter")
-    # The view subscribes to a chosen topic: its list changes once.
+    # The view subscribes to a selected topic: its list changes once.
     page.wait_text(".side", "std_msgs/String")
     page.wait_text(".side button", "/dashboard")
     page.evaluate("[...document.querySelectorAll('.side button')].forEach(button => button.isOld = true)")
@@ -587,7 +587,7 @@ def test_board_lights_and_is_pressed(serve: Callable[..., Served], browse: Calla
         page.wait_text(".panel", "0.60 m ahead")
         board.move_person((0.3, 0.0))
         page.wait_text(".panel", "in the protective field")
-        # The names of the fields are readable before the person, who can be dragged by them.
+        # The field names are readable in front of the person, who can still be dragged.
         for name in ("warning field", "protective field"):
             label = f"[...document.querySelectorAll('.room text')].find(e => e.textContent === '{name}')"
             assert page.evaluate(
@@ -709,7 +709,7 @@ def test_topic_that_nobody_publishes_is_published(
 
     turning = served.run(listen("/turtle1/cmd_vel", Twist))
     page = browse(address(served, "publish"))
-    # Its subscriber names the type.
+    # The topic's subscriber provides the type.
     page.choose("select[aria-label=Topic]", "/turtle1/cmd_vel")
     page.wait_text(".form", "angular")
     page.type("input[name=x]", "2")
@@ -718,7 +718,7 @@ def test_topic_that_nobody_publishes_is_published(
     page.wait_text("p[role=status]", "1 published")
     assert page.evaluate("document.querySelector('input[name=x]').value") == "2"
 
-    # A name and a type that nobody has said yet.
+    # A new name and type.
     page.choose("select[aria-label=Topic]", "new")
     page.type("input[aria-label='Name of the new topic']", "greeting")
     page.type("input[aria-label='Its type']", "std_msgs/Strin")
@@ -773,7 +773,7 @@ def test_parameters_are_shown_set_and_deleted(
 
 @contextlib.contextmanager
 def repeated(served: Served, publishing: Any, message: Any) -> Iterator[None]:
-    """Publish a message again and again."""
+    """Publish a message repeatedly."""
 
     async def publish() -> None:
         while True:
@@ -811,7 +811,7 @@ def test_turtles_are_drawn_with_their_trails_and_come_and_go(
     page.wait_text("[data-name='/leo']", "x 2 y 2")
     page.click("button", "Spawn")
     page.wait_text(".error", "leo")
-    # A circle: it comes back to where it started.
+    # A circle, which ends where it started.
     twist = Twist()
     twist.linear.x, twist.angular.z = 1.0, 2.0
     with repeated(served, publisher(served, "/turtle1/cmd_vel", Twist), twist):
@@ -827,7 +827,7 @@ def test_turtles_are_drawn_with_their_trails_and_come_and_go(
 
 
 def listener(served: Served, topic: str, name: str = "robot") -> Callable[[Callable[[Twist], bool]], None]:
-    """Return a function that waits until a message of a topic is right."""
+    """Return a function that waits for a message of a topic that fulfils a condition."""
     robot = served.node(name)
 
     async def listen() -> Any:
@@ -847,7 +847,7 @@ def is_zero(twist: Twist) -> bool:
 
 
 def drag(page: Page, kind: str, right: float, up: float) -> None:
-    """Press, move or release the mouse beside the stick's middle."""
+    """Press, move or release the mouse at an offset from the stick's middle."""
     x, y = page.wait(
         "const r = document.querySelector('svg.stick').getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]"
     )
@@ -875,7 +875,7 @@ def test_stick_drives_a_topic_that_nobody_publishes_and_stops_when_released(
     drag(page, "mouseReleased", -400, 0)
     until(is_zero)
     page.wait_text("p[role=status]", "stopped")
-    # Another topic, and another speed.
+    # Change the topic and the speed.
     page.type("input[aria-label=Topic]", "/other/cmd_vel")
     page.type("input[aria-label='Metres a second']", "2")
     page.wait("document.activeElement.blur(); return location.hash.includes('linear=2')")
@@ -967,7 +967,7 @@ def test_diagnostics_are_a_tree_with_levels_and_values(
     page.wait_text(".empty", "Nothing has come on /diagnostics.")
     row = "[data-path='/Robot{}']"
     with repeated(served, publisher(served, "/diagnostics_agg", type(message)), message):
-        # What nobody reports has the worst level below it.
+        # A group whose items are not reported takes the worst level of its children.
         page.wait_text(row.format("/Drive") + " .badge", "Error")
         page.wait_text(row.format("/Scan") + " .badge", "OK")
         page.click(row.format("/Drive/left") + " .report")
@@ -1039,7 +1039,7 @@ def test_hostile_names_of_nodes_and_frames_are_text(
     served.run(publisher(served, "/diagnostics", type(message), latch=True).publish(message))
     served.run(served.node("setter").set_param("/hostile", HOSTILE))
     page = browse(address(served, view))
-    if view == "topics":  # images are subscribed when they are opened
+    if view == "topics":  # images are subscribed to when they are opened
         page.click("button.topic", "/hostile/image")
         page.wait_text(".row[data-topic='/hostile/image'] .fields", HOSTILE)
     elif view == "parameters":
@@ -1059,7 +1059,7 @@ def test_hostile_names_in_the_graph_are_text(
     from xmlrpc.client import ServerProxy
 
     served = serve()
-    # A master takes the names that nodes register with.
+    # The master accepts any name that a node registers.
     with ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
         answer = master.registerPublisher(
             "/" + HOSTILE, "/hostile", "std_msgs/String", os.environ["ROS_MASTER_URI"]
@@ -1078,7 +1078,7 @@ def saved(page: Page, folder: Path, name: str, button: str) -> bytes:
     page.click("button", button)
     end = time.monotonic() + PATIENCE
     file = folder / name
-    # The browser makes it under another name, and may reserve this one.
+    # The browser writes to a temporary name first, and may create this one empty.
     while not file.exists() or not file.stat().st_size or any(folder.glob("*.crdownload")):
         assert time.monotonic() < end, f"{name} is not saved"
         page.evaluate("new Promise(resolve => setTimeout(resolve, 30))")
@@ -1101,7 +1101,7 @@ def test_csv_and_png_of_a_plot_are_saved(
     assert head.replace('"', "").split(",") == ["time", "/odometry/x", "/odometry/y"]
     assert first.split(",")[1:] == ["1.5", "0"]
     page.wait("return document.querySelector('.chart canvas').width > 300")
-    # What is computed of a series is named in the picture, too.
+    # The picture also names a computed series.
     page.choose(".series[data-label='/odometry/x'] select", "derivative")
     page.evaluate(
         """{ window.drawn = []; const draw = CanvasRenderingContext2D.prototype.fillText;
@@ -1143,7 +1143,7 @@ def test_csv_of_the_console_is_saved(
             "mono8",
             [(0, 0, 0), (10, 10, 10), (200, 200, 200), (255, 255, 255)],
         ),
-        # One red, two green, one blue: each pixel has the colors of its neighbors.
+        # One red, two green, one blue: missing colors of a pixel come from its neighbors.
         ("bayer_rggb8", bytes((200, 100, 50, 30)), "bayer_rggb8", [(200, 75, 30)] + 3 * [None]),
         ("bayer_bggr8", bytes((200, 100, 50, 30)), "bayer_bggr8", [(30, 75, 200)] + 3 * [None]),
         (
@@ -1214,7 +1214,7 @@ def test_image_is_zoomed_and_its_depths_are_scaled(
     page.wait_text(".status", "(3, 0): 1000")
     page.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-800)
     page.wait(f"return document.querySelector('canvas').getBoundingClientRect().width > {wide} * 2")
-    # What was under the mouse is there again.
+    # The object under the mouse is shown again.
     page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x + 1, y=y)
     page.wait_text(".status", "(3, 0): 1000")
     assert page.evaluate("document.querySelector('.frame').scrollLeft") > 0
@@ -1262,7 +1262,7 @@ def test_markers_are_drawn_over_the_image(serve: Callable[..., Served], browse: 
     }.items():  # fmt: skip
         page.wait(f"return {color(x, y)} === '{shown}'")
 
-    # One is removed, one replaced by one that ends by itself.
+    # One marker is removed, one is replaced by a marker with a lifetime.
     draw(1, ImageMarker.CIRCLE, action=ImageMarker.REMOVE)
     draw(
         4,

@@ -1,4 +1,4 @@
-"""The 3D view of the dashboard in Debian's chromium, whose WebGL is drawn in software, used as a person uses it."""
+"""The 3D view of the dashboard in Debian's chromium, operated as by a user; WebGL is rendered in software."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.web.dashboard.conftest import Served, serve
 
 __all__ = ["browse", "serve"]
 
-# Pictures in software take seconds on a machine that others use.
+# Software rendering takes seconds on a busy machine.
 pytestmark = needs_chromium
 
 Browse = Callable[..., Page]
@@ -31,7 +31,7 @@ Serve = Callable[..., Served]
 
 
 def publish(served: Served, messages: dict[str, Any]) -> Callable[[str, Any], None]:
-    """Publish latched messages by their topics; return a function that publishes more."""
+    """Publish latched messages, topic -> message; return a function that publishes more."""
     node = served.node("robot")
     publishers: dict[str, Any] = {}
 
@@ -69,12 +69,12 @@ class Listener:
 
 
 def drawn(page: Page) -> int:
-    """Wait for a picture; return the number of pictures."""
+    """Wait until a picture is drawn; return the number of pictures."""
     return int(page.wait("return Number(document.querySelector('canvas.stage')?.dataset.drawn) || 0"))
 
 
 def status(page: Page, name: str, text: str) -> None:
-    """Fold out a display, and wait until its status has this text."""
+    """Expand a display, and wait until its status has this text."""
     page.wait(
         f"const d = [...document.querySelectorAll('.display')].find(e => e.dataset.name === {name!r}); if (!d) return false;"
         "const b = d.querySelector('.display-name'); if (b.getAttribute('aria-expanded') === 'false') b.click();"
@@ -83,7 +83,7 @@ def status(page: Page, name: str, text: str) -> None:
 
 
 def levels(page: Page) -> dict[str, str]:
-    """Return the levels of all displays, by their names."""
+    """Return display name -> level."""
     found = page.evaluate(
         "Object.fromEntries([...document.querySelectorAll('.displays .display')].map(e => [e.dataset.name, e.dataset.level]))"
     )
@@ -91,7 +91,7 @@ def levels(page: Page) -> dict[str, str]:
 
 
 def mouse(page: Page, kind: str, x: float, y: float, buttons: int = 0) -> None:
-    """Move (mouseMoved), press or release the mouse: pixels from the middle of the picture, y downwards."""
+    """Move (mouseMoved), press or release the mouse; the position is in pixels from the picture's middle, y downwards."""
     left, top = page.evaluate(
         "(() => { const r = document.querySelector('canvas.stage').getBoundingClientRect();"
         "return [r.x + r.width / 2, r.y + r.height / 2] })()"
@@ -116,7 +116,7 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
 
 
 def colors(page: Page) -> set[tuple[int, int, int]]:
-    """Return the colors of the picture."""
+    """Return the picture's colors."""
     import base64
 
     from PIL import Image
@@ -131,7 +131,7 @@ def is_near(found: set[tuple[int, int, int]], wanted: tuple[int, int, int], most
 
 
 def wait_color(page: Page, wanted: tuple[int, int, int], most: int = 12) -> None:
-    """Wait until the picture has a color: what is received is drawn when it is drawn."""
+    """Wait until the picture contains a color: a received message is drawn with a delay."""
     end = time.monotonic() + PATIENCE
     while not is_near(colors(page), wanted, most):
         assert time.monotonic() < end, wanted
@@ -139,13 +139,13 @@ def wait_color(page: Page, wanted: tuple[int, int, int], most: int = 12) -> None
 
 
 def look_down(page: Page) -> float:
-    """Look from above; return how many pixels a metre has."""
+    """Set the camera to look down; return the number of pixels per metre."""
     following = page.wait(
         "const e = document.querySelector('select[aria-label=View]'); if (!e) return false;"
         "e.value = 'top'; e.dispatchEvent(new Event('change', {bubbles: true}));"
         "return (Number(document.querySelector('canvas.stage').dataset.drawn) || 0) + 1"
     )
-    # The camera is aimed with the next picture, which the one before may delay.
+    # The camera is aimed in the next picture, which the previous one may delay.
     page.wait(f"return Number(document.querySelector('canvas.stage').dataset.drawn) >= {following}")
     return float(page.evaluate("document.querySelector('.scene').clientHeight")) / (10 * 0.83)
 
@@ -166,7 +166,7 @@ def test_robot_in_its_room_is_shown_without_a_click(serve: Serve, browse: Browse
     )
     assert {"map", "odom", "base_link", "laser", "dock"} <= set(labels)
     assert "map: OK" in page.wait_text(".scene-side", "OK")
-    # The background, the map's free cells below its grid, the cloud, the path.
+    # The background, the map's free cells below the grid, the cloud, the path.
     for wanted in ((48, 48, 48), (197, 197, 197), (25, 255, 0)):
         wait_color(page, wanted, 16)
 
@@ -264,7 +264,7 @@ def test_measure_and_focus_find_what_is_under_the_mouse(serve: Serve, browse: Br
     assert float(page.wait_text(".label.measure", "m").split()[0]) == pytest.approx(2, abs=0.03)
     page.click(".tools button", "Focus")
     drag(page, (0, 0), (0, 0))
-    # The top of the cube: half a metre above its middle.
+    # The top face of the cube is half a metre above its middle.
     page.wait_text("[role=status]", "0.70)")
 
 
@@ -360,7 +360,7 @@ def test_robot_has_its_meshes_and_follows_its_joints_without_transforms(
 
 
 def wait_hue(page: Page, wanted: tuple[bool, bool, bool]) -> None:
-    """Wait until the picture has a color of these parts of red, green and blue, in whatever light."""
+    """Wait until the picture has a color with these red, green and blue components, for any lighting."""
     end = time.monotonic() + PATIENCE
     while not any(
         all(part > 150 if is_lit else part < 60 for part, is_lit in zip(color, wanted, strict=True))
@@ -407,7 +407,7 @@ def test_collada_meshes_have_their_colors_and_unit(
     status(page, "Marker /shape", "1 markers")
     metre = look_down(page)
     wait_hue(page, (False, True, True))
-    # Two metres wide, and half a metre above the marker.
+    # The click points two metres to the side, and half a metre above the marker.
     page.click(".tools button", "Focus")
     drag(page, (-0.7 * metre, 0), (-0.7 * metre, 0))
     page.wait_text("[role=status]", "(-0.70, 0.00, 0.70)")
@@ -446,7 +446,7 @@ def test_file_of_rviz_is_opened_changed_and_saved(serve: Serve, browse: Browse, 
     status(page, "Front", "Transform: Transform OK")
     page.wait_text(".scene-side", "odom: OK")
     names = "[...document.querySelectorAll('.displays .display')].map(e => e.dataset.name)"
-    # Nothing is added to what the file has.
+    # Only the file's displays are shown.
     assert page.evaluate(names) == ["Floor", "Sensors", "Front", "Planning"]
     wait_color(page, (10, 20, 30), 2)
     assert page.evaluate("document.querySelector('select[aria-label=View]').value") == "top"

@@ -1,4 +1,4 @@
-"""Bags in the dashboard, in Debian's chromium, used as a person uses them."""
+"""Bags in the dashboard, in Debian's chromium, operated as by a user."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_bag_is_played_moved_through_and_published(
     page.wait("return document.querySelector(\".card[data-topic='/camera'] canvas\").width === 40")
     page.wait_text(".now", "0:00.000 / 0:19.900")
 
-    # A click on the timeline, steps by button and by key, back.
+    # Click on the timeline, step by button and by key, and back.
     page.click("canvas.bag-rows")
     number = int(
         page.wait(
@@ -110,21 +110,21 @@ def test_bag_is_played_moved_through_and_published(
     ):
         page.call("Input.dispatchKeyEvent", type="keyDown", key=key)
         page.wait_text(".card[data-topic='/chatter']", f"{HOSTILE}{text}")
-    # They go on after a click on a button.
+    # Keys still step after a click on a button.
     page.click("button[aria-label^='To the next message']")
     page.wait_text(".card[data-topic='/chatter']", f"{HOSTILE}message 1")
     page.evaluate("document.querySelector('button[aria-label^=\"To the next message\"]').focus()")
     page.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight")
     page.wait_text(".card[data-topic='/chatter']", f"{HOSTILE}message 2")
 
-    # Played without being published, then with it.
+    # Play without publishing, then with it.
     page.evaluate(
         "const s = document.querySelector('input[aria-label=Speed]'); s.value = '1'; s.dispatchEvent(new Event('change'))"
     )
     page.wait_text(".speed", "10")
     page.click("button.play")
     page.wait_text(".now", "0:19.900 / 0:19.900")
-    # It starts again at its end, by itself, where loop is ticked.
+    # With loop checked, playback restarts at the end.
     page.evaluate(
         "[...document.querySelectorAll('label')].find(each => each.textContent === 'loop').querySelector('input').click()"
     )
@@ -168,7 +168,7 @@ def test_topics_are_recorded_and_the_recording_is_opened(
     with Bags([str(folder / "walk.bag")]) as bags:
         assert {each.topic for each in bags.readers[0].connections.values()} == {"/robot/words"}
     assert os.listdir(folder) == ["walk.bag"]
-    # The bag has the place of the form, whose name is in use now.
+    # The bag replaces the form, whose name is now in use.
     page.wait("return !document.querySelector('.recorder').checkVisibility()")
     page.click("button", "Record …")
     page.type("input[aria-label='Name of the recording']", "walk")

@@ -1,4 +1,4 @@
-"""The pure parts of the 3D view under node: frames compared with tf2, robots with our URDF room, clouds, .rviz files."""
+"""The pure parts of the 3D view under node: frames compared with tf2, robots with core/urdf, clouds, .rviz files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STILL = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
 
 
 def run(*calls: dict[str, Any]) -> list[Any]:
-    """Return the answers of the page's modules: values, or the texts of their errors."""
+    """Return the results of the page's modules: values, or error texts."""
     done = subprocess.run(
         ["node", str(FOREIGN / "scene.mjs")],
         input="".join(json.dumps(call) + "\n" for call in calls),
@@ -68,7 +68,7 @@ def random_values(chance: random.Random) -> list[float]:
 
 
 def same(found: list[float], wanted: list[float]) -> bool:
-    """Return whether two poses are the same; a quaternion and its negative are one rotation."""
+    """Return whether two poses are equal; a quaternion and its negative are the same rotation."""
     sign = 1 if sum(a * b for a, b in zip(found[3:], wanted[3:], strict=True)) >= 0 else -1
     turned = [sign * part for part in found[3:]]
     return all(math.isclose(a, b, abs_tol=1e-6) for a, b in zip(found[:3] + turned, wanted, strict=True))
@@ -99,7 +99,7 @@ def test_lookups_agree_with_tf2() -> None:
         try:
             wanted = buffer.lookup(target, source, round(time * SECOND))
         except ExtrapolationException:
-            # tf2 names the first fault that it meets on its way up, of several.
+            # If there are several faults, tf2 reports the first on the path towards the root.
             assert found["kind"] in ("future", "past", "unconnected")
             seen.add(found["kind"])
         except ConnectivityException:
@@ -194,7 +194,7 @@ def test_poses_of_links_agree_with_our_urdf() -> None:
 
     frames = TransformBuffer()
     for joint in robot.joints.values():
-        # Joints that follow another one are at its position.
+        # Mimic joints have the position of the joint that they follow.
         pose = Segment(joint).pose(positions[joint.name])
         frames.insert(joint.parent, joint.child, 0, pose.translation, pose.rotation, "test", is_static=True)
     for link in robot.links:
@@ -295,7 +295,7 @@ def test_colors_of_points_are_those_of_rviz() -> None:
         {"call": "cloud", "message": {**message, "fields": message["fields"][1:]}},
     )
     assert rgb["colors"] == [0x10, 0x20, 0x30, 0xFF, 0, 0]
-    # Low is red and high is purple.
+    # The lowest intensity is red and the highest is purple.
     assert intensity["colors"] == [255, 0, 0, 255, 0, 255]
     assert axis["colors"] == [255, 0, 255, 255, 0, 0]
     assert ends["colors"] == [100, 50, 0, 200, 100, 0]

@@ -1,4 +1,4 @@
-"""Launch files, joints and state machines in the dashboard, in Debian's chromium, used as a person uses them."""
+"""Launch files, joints and state machines in the dashboard, in Debian's chromium, operated as by a user."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_launch_file_is_started_watched_and_stopped(
     page.wait_text(".launch-arg", "what is printed")
     page.type(".launch-arg input[name='word']", "good day")
     page.type(".launch-arg input[name='needed']", "yes")
-    # Typed by a program: the form is notified as by a person's keys.
+    # The script dispatches the event that a user's keys would cause.
     page.evaluate("document.querySelector('.launch-form').dispatchEvent(new Event('input'))")
     page.wait_text(".launch-form code", "roslaunch lamp lamp.launch word:='good day' needed:=yes")
     page.click(".launch-form button", "Start")
@@ -185,7 +185,7 @@ def test_states_are_drawn_with_the_active_ones_and_their_userdata(
         page.wait(
             f"return [...document.querySelectorAll('.smach-title')].some(e => e.textContent === {path})"
         )
-    # A transition of a state to itself starts and ends at its right side.
+    # A transition from a state to itself starts and ends at its right side.
     at = page.evaluate(
         """{
         const edge = [...document.querySelectorAll('.edge')].find(e => e.lastChild.textContent === 'again');
@@ -209,7 +209,7 @@ def test_states_are_drawn_with_the_active_ones_and_their_userdata(
     served.run(telling.publish(status))
     page.wait("return document.querySelector(\"[data-state='/ROOT/DOCK']\").classList.contains('active')")
     page.wait_text(".smach-events", "DOCK")
-    # The last status of a container that is left stays at its last state, or at the word None.
+    # After a container exits, its last status shows its last state, or the word None.
     inside = SmachContainerStatus(path="/ROOT/DOCK", initial_states=["ALIGN"], active_states=["PUSH"])
     served.run(telling.publish(inside))
     page.wait_text(".smach-now", "now: /ROOT/DOCK/PUSH")

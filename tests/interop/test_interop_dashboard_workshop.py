@@ -1,4 +1,4 @@
-"""The workshop's chapter on visualization, typed as docs/dashboard.md has it, and what opens in the browser."""
+"""The workshop's chapter on visualization: run the commands of docs/dashboard.md, and check the pages that open."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ with open({links!r}, "a") as file:
 
 
 def commands() -> list[str]:
-    """Return what the chapter types."""
+    """Return the commands of the chapter."""
     chapter = DOCS.read_text(encoding="utf-8").partition("## The workshop's chapter on visualization\n")[2]
     return re.findall(r"^    \$ (.+)$", chapter.partition("\n## ")[0], re.MULTILINE)
 
 
 @pytest.fixture
 def type_command() -> Iterator[Callable[[str], subprocess.Popen[str]]]:
-    """Return a function that types a command in a terminal of its own."""
+    """Return a function that runs a command in a separate terminal."""
     running: list[subprocess.Popen[str]] = []
 
     def run(line: str) -> subprocess.Popen[str]:
@@ -63,7 +63,7 @@ def type_command() -> Iterator[Callable[[str], subprocess.Popen[str]]]:
 
 
 class Student:
-    """Types commands, and opens what they open in the browser."""
+    """Runs commands, and opens their pages in the browser."""
 
     def __init__(
         self, type_command: Callable[[str], subprocess.Popen[str]], browse: Callable[..., Page], links: Path
@@ -74,7 +74,7 @@ class Student:
         self._opened = 0
 
     def browser_of(self, line: str) -> Page:
-        """Type a command; return the page that it opens."""
+        """Run a command; return the page that it opens."""
         self.type(line)
         limit = time.monotonic() + PATIENCE
         while len(found := self._read()) == self._opened:
@@ -120,7 +120,7 @@ def test_chapter_on_visualization_shows_the_pressed_button(student: Student) -> 
     curve = student.browser_of(plot)
     nodes = student.browser_of(graph)
     board = student.browser_of("minirospy dashboard board")
-    # The link has a code, which the page has exchanged.
+    # The link contains a code, which the page has exchanged for a token.
     board.wait("return sessionStorage.getItem('token')?.length === 22 && !location.hash.includes('code')")
 
     nodes.wait_text(".graph .topic text", "/button_state")
@@ -133,12 +133,12 @@ def test_chapter_on_visualization_shows_the_pressed_button(student: Student) -> 
     board.wait("return document.querySelector('.lit')")
     board.release(BUTTON)
     curve.wait_text(".series[data-label='/button_state/data'] .num", "0")
-    # The curve has both edges: something was drawn between 0 and 1.
+    # The curve has both edges: there are points between 0 and 1.
     curve.wait("return document.querySelector('.chart canvas').width > 300")
 
     is_shown = "document.querySelector('main').textContent.includes('The chapter ends')"
     while not lines.evaluate(is_shown):
-        # It publishes for three seconds, in which roscore may not have been connected.
+        # It publishes for three seconds, within which roscore may not be connected.
         student.type(
             "rostopic pub -1 /rosout rosgraph_msgs/Log '{level: 4, name: /student, msg: The chapter ends}'"
         ).wait()

@@ -1,4 +1,4 @@
-"""The display DepthCloud of the 3D view: a depth image as points where image_geometry has its pixels, with their colors."""
+"""The display DepthCloud of the 3D view: a depth image as colored points at the positions that image_geometry computes."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def image_of(
 
 
 def points_of(image: Image, info: CameraInfo, stride: int = 1, colors: bytes | None = None) -> Any:
-    """Return the points as the page has them, with a color each, or the error's text."""
+    """Return the points that the page computes, with their colors, or the error's text."""
     roi = {name: getattr(info.roi, name) for name in ("x_offset", "y_offset", "width", "height")}
     names = ("width", "height", "K", "binning_x", "binning_y")
     fields = {name: getattr(info, name) for name in names} | {"K": [*info.K], "roi": roi}
@@ -162,7 +162,7 @@ def test_depth_image_is_seen_as_points(serve: Serve, browse: Callable[..., Page]
     status(page, "DepthCloud", "No image received on [/color/image]")
     send("/color/image", red)
     status(page, "DepthCloud", f"Showing {count} points from 4800")
-    # A picture of another size, of the next moment; each of the two may come first.
+    # A picture of another size, with the next stamp; either message may arrive first.
     red.height //= 2
     for topic, message in (("/color/image", red), ("/depth/image", scene["/depth/image"])):
         message.header.stamp = Time(101, 0)

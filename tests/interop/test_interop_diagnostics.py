@@ -1,4 +1,4 @@
-"""diagnostic_aggregator: Debian's programs publish what is recorded in tests/ros/packages/aggregator; bonds with both."""
+"""diagnostic_aggregator: Debian's programs publish the recordings of tests/ros/packages/aggregator; bonds between both stacks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Driving in Debian's chromium: the robot stops when the browser is killed, its tab crashes or hangs; the gamepad as /joy."""
+"""Driving in Debian's chromium: the robot stops if the browser is killed or its tab crashes or hangs; the gamepad as /joy."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ def test_gamepad_has_the_order_and_signs_of_joy_node() -> None:
 
 
 def hold_forward(served: Served, browse: Callable[..., Page]) -> tuple[Page, Callable[..., Any]]:
-    """Return a page that drives forward, and what waits for messages."""
+    """Return a page that drives forward, and a function that waits for messages."""
     until = listen(served)
     page = browse(address(served, "teleop"))
     page.wait_text("#state", "connected")
     page.wait_text("p[role=status]", "stopped")
-    # A key that is held down repeats; the view keeps what is held by itself.
+    # The browser repeats a key that is held; the view tracks held keys itself.
     press(page, "rawKeyDown", "ArrowUp")
     until(lambda twist: twist.linear.x == 0.5)
     return page, until
@@ -108,6 +108,6 @@ def test_gamepad_is_published_as_joy(serve: Callable[..., Served], browse: Calla
     until(lambda joy: list(joy.axes) == [0, 1, 1, -0.5, 0, 1, 0, 0])
     page.evaluate("pad.buttons[0].pressed = true")
     until(lambda joy: joy.buttons[0] == 1)
-    # Its rest is published when the view is left.
+    # The remaining values are published when the view is closed.
     page.evaluate("location.hash = '#/topics'")
     until(lambda joy: not any(joy.axes) and not any(joy.buttons))

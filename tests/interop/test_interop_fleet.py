@@ -1,4 +1,4 @@
-"""A fleet of real ROS 1: its masters, nodes and commands on both sides; and a link between namespaces that is slow, and cut."""
+"""A fleet with real ROS 1: its masters, nodes and commands on both sides; and a slow link between namespaces, which is cut."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PORT = 7447
 
 @pytest.fixture
 def running() -> Iterator[ExitStack]:
-    """Return what ends all that was started."""
+    """Return a stack that stops everything that was started."""
     with ExitStack() as stack:
         yield stack
 
@@ -65,7 +65,7 @@ def test_real_nodes_and_commands_on_both_sides(running: ExitStack) -> None:
     while "rosout" not in (answer := call()):
         assert time.monotonic() < end, answer
 
-    # The other way: a command of the control room for a node of the robot.
+    # The reverse direction: a command in the control room for a node of the robot.
     listener = (
         "import rospy; from std_msgs.msg import Int32; rospy.init_node('listener'); "
         "print(rospy.wait_for_message('/order', Int32))"
@@ -80,14 +80,14 @@ def test_real_nodes_and_commands_on_both_sides(running: ExitStack) -> None:
 
 
 class Link:
-    """Two namespaces, of a control room and of a robot, and the link between them."""
+    """Two network namespaces, a control room and a robot, and the link between them."""
 
     def __init__(self) -> None:
         self.names = [f"minirospy-{side}-{os.getpid()}" for side in ("room", "robot")]
         self.running = ExitStack()
 
     def build(self) -> None:
-        """Make them. Raise OSError, CalledProcessError if this is not permitted."""
+        """Create the namespaces and the link. Raise OSError or CalledProcessError if this is not permitted."""
         for name in self.names:
             self.sh(f"ip netns add {name}")
         self.sh(f"ip link add veth0 netns {self.names[0]} type veth peer name veth0 netns {self.names[1]}")
@@ -113,13 +113,13 @@ class Link:
 
 
 class Peer:
-    """A program that prints what it sees."""
+    """A program that prints its observations."""
 
     def __init__(self, words: list[str]) -> None:
         self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
     def until(self, condition: Callable[[Any], Any]) -> Any:
-        """Return what it sees when a condition holds."""
+        """Return the first observation that fulfils a condition."""
         assert self._process.stdout
         end = time.monotonic() + PATIENCE
         while True:
@@ -147,7 +147,7 @@ def link() -> Iterator[Link]:
 
 
 def sent(seen: Any, topic: str) -> Any:
-    """Return what a robot has sent of a topic."""
+    """Return the number of messages that a robot has sent on a topic."""
     return next(
         (each for each in seen["status"]["sent"] if each["topic"] == topic), {"messages": 0, "dropped": 0}
     )

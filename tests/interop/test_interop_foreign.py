@@ -1,4 +1,4 @@
-"""ROS 1 clients of others, from npm: rosnodejs and @foxglove/ros1, with our master and our nodes, both ways.
+"""Third-party ROS 1 clients from npm, rosnodejs and @foxglove/ros1, with minirospy's master and nodes, in both directions.
 
 They are installed once, into the user's cache folder.
 """
@@ -53,14 +53,14 @@ def modules() -> Path:
         subprocess.run(words, cwd=folder, check=True, capture_output=True, timeout=300)
         try:
             folder.rename(place)
-        except OSError:  # another worker was first
+        except OSError:  # another worker installed it first
             shutil.rmtree(folder)
 
     return place / "node_modules"
 
 
 class Peer:
-    """A program of node's, and what it says."""
+    """A program that runs under node, and the lines that it prints."""
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self._process = process
@@ -69,7 +69,7 @@ class Peer:
     @classmethod
     async def start(cls, modules: Path, script: str, **variables: str) -> Peer:
         """Start ``script`` of the folder foreign."""
-        # A module is looked for beside the real place of its script, then in NODE_PATH.
+        # Node looks for a module next to its script's real path, then in NODE_PATH.
         environ = {**os.environ, "NODE_PATH": str(modules), "ROS_PACKAGE_PATH": str(MSGS), **variables}
         environ.setdefault("CMAKE_PREFIX_PATH", str(MSGS))  # rosnodejs needs the variable, with any value
         process = await asyncio.create_subprocess_exec(
@@ -88,7 +88,7 @@ class Peer:
         return (await asyncio.wait_for(self._process.stdout.readline(), PATIENCE)).decode().rstrip()
 
     async def says(self, what: str) -> Any:
-        """Return what it prints, now or before, about ``what``."""
+        """Return the value that it prints, now or earlier, for the key ``what``."""
         while not self.said.get(what):
             line = await self.line()
             assert line, f"it ended without {what}: {self.said}"
@@ -99,7 +99,7 @@ class Peer:
         return self.said[what].pop(0)
 
     async def end(self) -> None:
-        """End it."""
+        """Stop the program."""
         assert self._process.stdin
         self._process.stdin.close()
         try:
@@ -121,20 +121,20 @@ def scan() -> LaserScan:
 
 
 async def offer(node: Node) -> None:
-    """Check what a foreign node finds of ours."""
+    """Check that a third-party node can use minirospy's topics, services and parameters."""
     await (await node.advertise("/ours/scan", LaserScan, latch=True)).publish(scan())
     await node.set_param("/ours/param", {"list": [1, "two", 3.5], "flag": True})
 
 
 async def check_scan(node: Node) -> None:
-    """Check that the foreign node's scan has arrived as it was sent."""
+    """Check that the third-party node's scan arrives unchanged."""
     got = await node.wait_for_message("/foreign/scan", LaserScan, timeout=PATIENCE)
     assert (got.header.frame_id, list(got.ranges), got.range_max) == tuple(SCAN.values())
     assert got.header.stamp == Time(1234567890, 987654321)
 
 
 async def check_beats(node: Node, peer: Peer) -> None:
-    """Check that a stream of ours arrives whole and in order."""
+    """Check that minirospy's messages arrive complete and in order."""
     beats = await node.advertise("/ours/beat", Int32, queue_size=0)
     await beats.wait_for_subscribers(timeout=PATIENCE)
     for number in range(100):
@@ -233,7 +233,7 @@ def test_our_nodes_use_the_master_of_foxglove(modules: Path) -> None:
                 await node.serve("/ours/flag", SetBool, set_flag)
                 assert (await others.call("/ours/flag", SetBool, data=True)).success
                 assert await others.get_param("/ours/param/list") == [1, "two", 3.5]
-                # It knows no getPid, by which rospy's init_node waits for a master.
+                # The client has no getPid, with which rospy's init_node checks the master.
                 words = [
                     sys.executable,
                     "-c",

@@ -1,4 +1,4 @@
-"""The bridge and the programs of Foxglove: the client library of the apps under node, the server of foxglove-sdk."""
+"""The bridge with Foxglove's software: the apps' client library under node, and foxglove-sdk's server."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_client_of_the_apps_talks_to_the_bridge(bridge: Running, modules: Path, 
 
 @pytest.fixture
 def sdk() -> Iterator[Callable[..., Any]]:
-    """Return a function that starts foxglove-sdk's server; skip where it is not installed."""
+    """Return a function that starts foxglove-sdk's server; skip the test if it is not installed."""
     foxglove = pytest.importorskip("foxglove")
     started = []
 
@@ -80,7 +80,7 @@ def sdk() -> Iterator[Callable[..., Any]]:
 
 
 def test_frames_have_the_form_of_those_of_the_sdk(bridge: Running, sdk: Callable[..., Any]) -> None:
-    """The same topic from both servers: fields of the same names and kinds, binary messages with the same head."""
+    """For the same topic, both servers send fields of the same names and types, and binary messages with the same header."""
     import foxglove
 
     context = foxglove.Context()
@@ -103,7 +103,7 @@ def test_frames_have_the_form_of_those_of_the_sdk(bridge: Running, sdk: Callable
     bridge.run(publisher.publish("hi"))
     frames = [ours.next_binary(1)]
     while len(frames) < 2:
-        # The subscription arrives there when it arrives.
+        # Repeat until the subscription has arrived at the server.
         channel.log(body, log_time=7)
         try:
             theirs.socket.socket.settimeout(1.0)

@@ -85,7 +85,7 @@ def test_frames_are_a_tree_with_rates_and_faults(
         assert "frame=base_link" in page.evaluate("location.hash")
         page.type("input[type=search]", "LASER")
         page.wait("return document.querySelectorAll('.frame-box.near').length === 1")
-        # A second node says that it knows better.
+        # A second node publishes a different parent.
         with repeated(served, again(served), transforms(("map", "base_link"))):
             page.wait_text(".side .error", "It has 2 parents, map and odom")
         page.wait("return !document.querySelector('.side .error')")
@@ -121,7 +121,7 @@ def test_frames_of_any_name_leave_the_tree_readable(
     page.wait_text("[role=status]", "6 frames, root map")
     names = "[...document.querySelectorAll('.frame-box')].map(e => e.dataset.frame)"
     assert set(page.evaluate(names)) == {"map", "child", *strange}
-    # A name that is too long is shown with its ends, and does not shrink the others to nothing.
+    # The middle of a long name is elided; other names are not shrunk.
     assert page.wait_text(BOX.format(long) + "text", "…").endswith("_end")
     assert (
         page.evaluate("document.querySelector('[data-frame=map] rect').getBoundingClientRect().height") > 15

@@ -1,4 +1,4 @@
-"""The view Graph in Debian's chromium: traffic, dead nodes, types that differ, folded actions; pure parts under node."""
+"""The view Graph in Debian's chromium: traffic, dead nodes, mismatched types, folded actions; pure parts under node."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PARTS = ("goal", "cancel", "status", "feedback", "result")
 
 
 def table(**rows: list[str]) -> dict[str, object]:
-    """Return a Map of names below / with the nodes of each."""
+    """Return a Map: name below / -> its nodes."""
     return {"map": [["/" + name.replace("__", "/"), nodes] for name, nodes in rows.items()]}
 
 
@@ -142,7 +142,7 @@ def test_parts_that_are_not_connected_fill_a_narrow_view_in_rows(
         ".map(({x, y}) => [x, y])"
     )
     assert [len({each[axis] for each in places}) for axis in (0, 1)] == [2, 2]
-    # What is connected by its namespace alone is one part, too.
+    # Nodes that share only their namespace form one component, too.
     page.click("label", "namespaces")
     page.wait("return document.querySelectorAll('.graph .namespace').length === 4")
     for key in ("n/part3/node2", "t/part0/topic1"):
@@ -188,7 +188,7 @@ def test_traffic_and_faults_are_shown_without_subscribing(
         page.wait("return [...document.querySelectorAll('.traffic')].every(e => !e.textContent)")
         assert "groups=1" in page.evaluate("location.hash")
         assert "rates=0" in page.evaluate("location.hash")
-        # The address is the same in every language.
+        # The URL is the same in every language.
         page.click("#language")
         page.wait_text(".bar label", "Raten")
         assert page.evaluate("[...document.querySelectorAll('.bar label')].map(e => e.firstChild.checked)") == [
@@ -218,14 +218,14 @@ def test_click_is_not_lost_while_the_graph_changes(
     page = browse(address(served, "graph"))
     page.click(key_of("/first"))
     page.wait_text(".side h2", "/first")
-    # The first topic loses the focus to what is pressed, and the graph changes before the release.
+    # The pressed topic takes the focus from the first one, and the graph changes before the release.
     page.press(key_of("/second"))
     register_dead("/late", "/second")
     page.wait_text("[role=status].error", "2 dead nodes")
     page.release(key_of("/second"))
     page.wait_text(".side h2", "/second")
     page.wait("return document.querySelector(\"[data-key='n/late']\")")
-    # The drawing is new: the keyboard stays where it was.
+    # After the redraw, the keyboard focus is unchanged.
     assert page.evaluate("document.activeElement.dataset.key") == "t/second"
     # The page moves below the mouse.
     page.press(key_of("/third"))
@@ -254,7 +254,7 @@ def test_drag_of_a_node_moves_the_drawing_and_a_trembling_click_does_not(
     assert page.evaluate(where) == before
     drag(page, key_of("/words"), 2)
     page.wait_text(".side h2", "/words")
-    # It is still fitted: the details take a part of the room.
+    # The graph is still fitted: the details occupy part of the area.
     page.wait(f"return {where} !== {before!r}")
 
 
@@ -272,7 +272,7 @@ def mouse(page: Page, kind: str, x: float, y: float) -> None:
 
 
 def drag(page: Page, find: str, by: float) -> None:
-    """Drag an element to the right, as a mouse does."""
+    """Drag an element to the right with the mouse."""
     x, y = middle(page, find)
     mouse(page, "mousePressed", x, y)
     for part in (0.5, 1):

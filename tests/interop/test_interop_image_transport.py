@@ -1,4 +1,4 @@
-"""republish: images through ours and Debian's programs in a chain, and what both say to no words."""
+"""republish: images through a chain of minirospy's and Debian's programs, and the usage messages of both."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Interactive markers in the 3D view, of servers of ours and of Debian's interactive_markers: dragged, clicked, chosen."""
+"""Interactive markers in the 3D view, from servers of minirospy and of Debian's interactive_markers: dragged, clicked, chosen."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Server:
         self.program.stdin.flush()
 
     def until(self, event: str) -> list[dict[str, Any]]:
-        """Return the events up to this one; those that keep a marker alive are left out."""
+        """Return the events up to this one, without those that keep a marker alive."""
         found: list[dict[str, Any]] = []
         while not found or found[-1]["event"] != event:
             said = self.said.get(timeout=PATIENCE)
@@ -64,7 +64,7 @@ class Server:
 
 @pytest.fixture(params=["ours", "rospy"])
 def served(request: pytest.FixtureRequest, serve: Serve) -> Iterator[tuple[Served, Server]]:
-    """Serve a page, and the markers of either stack."""
+    """Serve a page, and run the marker server of either stack."""
     page = serve(access=Access(read_token="read-token-00", write_token="write-token-0", requires_token=True))
     interpreter = {"ours": sys.executable, "rospy": REAL_PYTHON}[request.param]
     program = start([interpreter, str(SERVER)], os.environ["ROS_MASTER_URI"], request.param)
@@ -73,7 +73,7 @@ def served(request: pytest.FixtureRequest, serve: Serve) -> Iterator[tuple[Serve
 
 
 def opened(served: Served, browse: Browse, token: str = "write-token-0") -> tuple[Page, float]:
-    """Open the view from above with all markers; return the page and the pixels of a metre."""
+    """Open the view from above with all markers; return the page and the number of pixels per metre."""
     page = browse(address(served, f"3d?token={token}"))
     status(page, DISPLAY, "Markers: 5 interactive markers")
     status(page, DISPLAY, "/marker_server: OK")
@@ -93,10 +93,10 @@ def test_arrow_is_dragged_and_the_marker_follows(served: tuple[Served, Server], 
     assert len({each["client"] for each in events}) == 1
     assert events[0]["place"] == pytest.approx([0, 0, 0.2])
     assert events[0]["point"] == pytest.approx([0.78, 0, 0.2], abs=0.1)
-    # Along the axis only.
+    # The marker moves only along the axis.
     assert events[-1]["place"] == pytest.approx([1, 0, 0.2], abs=0.03)
 
-    # The server has moved it: a page that comes later shows it where it was dropped, and it can be dragged back.
+    # The server has moved it: a new page shows it where it was dropped, and it can be dragged back.
     page, metre = opened(served[0], browse)
     drag(page, (1.78 * metre, 0.02 * metre), (0.78 * metre, 0))
     assert served[1].until("up")[-1]["place"] == pytest.approx([0, 0, 0.2], abs=0.03)
@@ -119,7 +119,7 @@ def test_ring_turns_and_plane_slides(served: tuple[Served, Server], browse: Brow
     assert (event["marker"], event["control"]) == ("flat", "slide")
     assert event["place"] == pytest.approx([1, 3, 0], abs=0.03)
 
-    # What turns with the view: from above, its plane is the ground.
+    # A control that turns with the view: seen from above, its plane is the ground.
     drag(page, (2 * metre, 2 * metre), (3 * metre, 2 * metre))
     event = served[1].until("up")[-1]
     assert (event["marker"], event["control"]) == ("facing", "slide_view")
@@ -145,7 +145,7 @@ def test_button_is_clicked_and_menu_entry_chosen(served: tuple[Served, Server], 
     assert (event["marker"], event["control"], event["entry"]) == ("listed", "", 3)
     assert event["point"] == pytest.approx([-2, 2, 0.2], abs=0.1)
 
-    # The server has set its check box: it is ticked in a page that comes later.
+    # The server has set the check box: it is checked in a new page.
     page, metre = opened(served[0], browse)
     drag(page, (-2 * metre, -2 * metre), (-2 * metre, -2 * metre))
     page.click(".marker-menu button", "More")
@@ -161,7 +161,7 @@ def test_markers_follow_their_server(served: tuple[Served, Server], browse: Brow
     status(page, DISPLAY, "Markers: 4 interactive markers")
     served[1].tell("move flat 0.5 3")
     served[1].tell("lose")
-    # Of the lost update's marker, too.
+    # Includes the marker of the lost update.
     status(page, DISPLAY, "Markers: 5 interactive markers")
     status(page, DISPLAY, "/marker_server: OK")
     drag(page, (0.5 * metre, -3 * metre), (1.5 * metre, -3 * metre))
@@ -212,7 +212,7 @@ def test_markers_of_a_read_only_page_cannot_be_dragged(served: tuple[Served, Ser
     drag(page, (0.78 * metre, 0.02 * metre), (1.78 * metre, 0))
     page.wait_text("[role=status]", "This token is read-only.")
     drag(page, (-2 * metre, 2 * metre), (-2 * metre, 2 * metre))
-    # Another page's event is the first that the server gets.
+    # The server accepts the first event, which is another page's.
     writer, metre = opened(served[0], browse)
     drag(writer, (-2 * metre, 2 * metre), (-2 * metre, 2 * metre))
     assert [each["event"] for each in served[1].until("up")] == ["pose", "down", "click", "pose", "up"]

@@ -1,5 +1,5 @@
 # ruff: noqa: E501
-"""What a real roslaunch says of broken launch files, and what ours says: the words that a script may look for are in both."""
+"""The error messages of real roslaunch and minirospy for broken launch files: both contain the words that a script may match."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Layouts of the dashboard: their text under node; panes in chromium, used as a person does."""
+"""Layouts of the dashboard: their text form under node; panes in chromium, operated as by a user."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ LAYOUT = "js/layout.js"
         ("row(plot?path=%2Fa%2Fb,board)", "row(plot?path=%2Fa%2Fb,board)"),
         ("row(2:board,2:plot)", "row(board,plot)"),
         ("row(3:board,1:column(plot,console))", "row(75:board,25:column(plot,console))"),
-        # A row of one is its part, a row in a row is the row.
+        # A row of one element is that element; a row within a row is flattened.
         ("row(column(plot))", "plot"),
         ("row(1:board,1:row(plot,console))", "row(50:board,25:plot,25:console)"),
     ],
@@ -174,7 +174,7 @@ def opened(
 
 
 def tree_of(page: Page) -> str:
-    """Return the text of the layout that the address has."""
+    """Return the layout in the URL, as text."""
     return str(page.evaluate("new URLSearchParams(location.hash.split('?')[1]).get('tree')"))
 
 
@@ -183,7 +183,7 @@ def wait_tree(page: Page, tree: str) -> None:
 
 
 def pane(view: str) -> str:
-    """Return the selector of the pane of a view."""
+    """Return the selector of a view's pane."""
     return f".pane:has([data-view='{view}'])"
 
 
@@ -196,7 +196,7 @@ def middle(page: Page, find: str, right: float = 0.5, down: float = 0.5) -> tupl
 
 
 def drag(page: Page, start: tuple[float, float], *through: tuple[float, float]) -> None:
-    """Press the mouse at a point, move it through others, release it at the last one."""
+    """Press the mouse at a point, move it through others, and release it at the last one."""
     points = [
         ("mousePressed", start),
         *(("mouseMoved", point) for point in through),
@@ -227,12 +227,12 @@ def test_workshop_shows_the_pressed_button_in_its_plot(
         page.release(".push[data-pin='11']")
         assert next(edges).level == 0
     assert page.evaluate("document.querySelectorAll('.pane').length") == 4
-    # What is between panes is the divider alone.
+    # Only the divider is between panes.
     upper, lower = page.evaluate(
         "[...document.querySelectorAll('.box.column > .pane')].slice(0, 2).map(e => e.getBoundingClientRect().toJSON())"
     )
     assert lower["top"] - upper["bottom"] < 12
-    # The address names the preset until something is changed.
+    # The URL names the preset until the layout is changed.
     assert page.evaluate("location.hash") == "#/layout?preset=workshop"
 
 
@@ -274,17 +274,17 @@ def test_pane_is_docked_by_dragging_its_head(
     page.evaluate(f'document.querySelector("{pane("parameters")}").isOld = true')
     drag(page, head, (head[0] - 20, head[1]), target)
     wait_tree(page, "row(column(topics,parameters),console)")
-    # The pane has moved, it was not made again.
+    # The pane was moved, not rebuilt.
     assert page.evaluate(f'document.querySelector("{pane("parameters")}").isOld')
     head = middle(page, f"{pane('console')} .pane-about")
     drag(page, head, (head[0] - 20, head[1]), middle(page, pane("topics")))
     wait_tree(page, "row(column(console,parameters),topics)")
-    # To the edge of the whole layout.
+    # Drag to the edge of the whole layout.
     head = middle(page, f"{pane('topics')} .pane-about")
     left, top = middle(page, ".dock", 0.3, 0.0)
     drag(page, head, (head[0] - 20, head[1]), (left, top + 4))
     wait_tree(page, "column(50:topics,25:console,25:parameters)")
-    # By keys: it changes places with the next one.
+    # The key swaps the pane with the next one.
     page.evaluate(f'document.querySelector("{pane("topics")} .pane-grip").focus()')
     press(page, "rawKeyDown", "ArrowDown")
     wait_tree(page, "column(50:console,25:topics,25:parameters)")
@@ -335,13 +335,13 @@ def test_views_work_twice_on_one_page(serve: Callable[..., Served], browse: Call
     log((8, "/second", "again"))
     page.wait_text(".pane[data-pane='3'] .bar", "3 of 3 lines")
     page.wait_text(".pane[data-pane='4'] .bar", "2 of 3 lines")
-    # What one clears is cleared in both.
+    # Clearing one view clears both.
     page.click(".pane[data-pane='4'] button", "Clear")
     page.wait_text(".pane[data-pane='3'] .bar", "0 of 0 lines")
     ids = page.evaluate("[...document.querySelectorAll('[id]')].map(e => e.id)")
     assert len(ids) == len(set(ids))
     page.wait("return document.querySelectorAll(\".pane[data-pane='6'] .edge\").length >= 1")
-    # Closing one leaves the other as it is.
+    # Closing one leaves the other unchanged.
     page.click(".pane[data-pane='1'] button[title='Close this pane']")
     served.run(moving.publish(1.0, 7.0, 3.0))
     page.wait_text(".pane[data-pane='2'] .series .num", "7")
@@ -356,7 +356,7 @@ def test_link_in_a_pane_is_followed_inside_of_the_layout(
     page = browse(address(served, "layout?tree=topics?open=%252Fodometry"), width=1400)
     page.click("a.plot[title='Plot /odometry/x']")
     page.wait_text(f"{pane('plot')} .series .num", "1.5")
-    # A plot that is there takes over the next one.
+    # An existing plot receives the next series.
     plotted = f"{pane('plot')} .series[data-label='/odometry/y'] .num"
     page.click("a.plot[title='Plot /odometry/y']")
     page.wait_text(plotted, "2.5")
@@ -382,7 +382,7 @@ def test_keys_drive_the_active_pane_alone(serve: Callable[..., Served], browse: 
     page.click(".pane[data-pane='1'] .pane-about")
     press(page, "rawKeyDown", "ArrowUp")
     left(lambda twist: twist.linear.x == 0.5)
-    # A pane that is closed stops what it drives.
+    # Closing a pane stops the robot that it drives.
     page.click(".pane[data-pane='1'] button[title='Close this pane']")
     left(is_zero)
 
@@ -402,7 +402,7 @@ def test_layout_is_saved_by_name_exported_imported_and_shared(
         "layout": "row(topics,parameters?filter=robot)",
     }
     link = page.evaluate("location.href")
-    # Another day: from the list of layouts.
+    # Later: open the layout from the list.
     page.evaluate("location.hash = '#/layout'")
     page.wait_text("button.start", "my robot")
     page.choose("select[aria-label=Layout]", "saved my robot")
@@ -410,7 +410,7 @@ def test_layout_is_saved_by_name_exported_imported_and_shared(
     wait_tree(page, "row(topics,parameters?filter=robot)")
     page.click(".layout-bar button", "Delete")
     page.wait_text(".layout-bar", "my robot is deleted.")
-    # A file; one that is broken is named.
+    # Load a file; the error names a broken one.
     broken = tmp_path / "broken.json"
     broken.write_text('{"minirospy layout": 1, "layout": "row("}', encoding="utf-8")
     for name in (broken, tmp_path / "my robot.json"):
@@ -422,7 +422,7 @@ def test_layout_is_saved_by_name_exported_imported_and_shared(
             page.evaluate("location.hash = '#/layout'")
             page.wait_text("button.start", "Workshop")
     page.wait_text("select.pane-view", "Parameters")
-    # The link opens the same elsewhere.
+    # The link opens the same layout in another browser.
     other = browse(link)
     other.wait("return document.querySelectorAll('.pane').length === 2")
     assert (
@@ -441,7 +441,7 @@ def test_classroom_shows_the_boards_side_by_side(
         page = browse(address(served, "layout?preset=classroom"), width=1400, height=900)
         page.wait_text("select.pane-view", "Teleop")
         page.wait_text(".pane-about", "/red/cmd_vel")
-        # A board fits its pane.
+        # The board fits into its pane.
         page.wait(
             "return [...document.querySelectorAll('.pane-body svg.board')].every(e =>"
             " e.getBoundingClientRect().bottom <= e.closest('.pane').getBoundingClientRect().bottom)"

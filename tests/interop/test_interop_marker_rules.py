@@ -1,4 +1,4 @@
-"""The pure parts of interactive markers under node: updates by their numbers, handles, menus, what a drag does."""
+"""The pure parts of interactive markers under node: update sequence numbers, handles, menus, drags."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ pytestmark = needs_node
 
 
 def updates(*steps: tuple[str, int]) -> list[Any]:
-    """Return what the steps change, and the server's status: full, update and alive with a number."""
+    """Return the changes of these steps, and the server's status; a step is full, update or alive, with a sequence number."""
     body = f"""
         const updates = new MarkerUpdates();
         const found = [];
@@ -38,10 +38,10 @@ WAITING = "Waiting for all markers."
         ([("full", 3)], [], None),
         ([("full", 3), ("alive", 3)], [["all", 3]], "OK"),
         ([("alive", 3), ("full", 3), ("update", 4)], [["all", 3], ["one", 4]], "OK"),
-        # The updates that came before all markers did are part of them, or follow.
+        # Updates that arrived before the full state are part of it, or follow it.
         ([("update", 3), ("update", 4), ("full", 3)], [["all", 3], ["one", 4]], "OK"),
         ([("update", 3), ("update", 4), ("full", 4)], [["all", 4]], "OK"),
-        # All markers of before a gap, or of after what is known, do not join.
+        # A full state from before a gap, or newer than the updates, does not connect to them.
         ([("update", 5), ("full", 3)], [], WAITING),
         ([("update", 3), ("full", 5)], [], WAITING),
         ([("update", 3), ("full", 5), ("update", 4), ("update", 5)], [["all", 5]], "OK"),
@@ -86,7 +86,7 @@ def test_servers_of_a_namespace_are_limited() -> None:
 
 
 def completed(message: str) -> Any:
-    """Return a marker with handles and menus; ``message`` is the JavaScript of fields."""
+    """Return a marker with handles and menus; ``message`` is JavaScript for its fields."""
     body = f"""
         const pose = {{position: {{x: 0, y: 0, z: 0}}, orientation: {{x: 0, y: 0, z: 0, w: 0}}}};
         const control = (mode, more = {{}}) => ({{
@@ -174,7 +174,7 @@ _START = "pose: {p: [0, 0, 0], q: [0, 0, 0, 1]}"
 
 
 def dragged(mode: int, axis: str, grabbed: str, *to: tuple[float, float], by: str = "{}") -> Any:
-    """Return the pose after a drag that is seen from above, to points of the ground."""
+    """Return the pose after a drag seen from above, to points on the ground."""
     body = f"""
         const down = (x, y) => ({{origin: [x, y, 10], direction: [0, 0, -1]}});
         const grabbed = {grabbed};
@@ -192,13 +192,13 @@ HALF = math.sqrt(0.5)
 @pytest.mark.parametrize(
     ("mode", "axis", "grabbed", "to", "by", "wanted"),
     [
-        # Along an axis; from its end it cannot be seen how far.
+        # Along an axis; the distance cannot be determined if the view is along it.
         (3, "[1, 0, 0]", "[0.7, 0.05, 0.1]", [(1.7, 3)], "{}", [1, 0, 0, 0, 0, 0, 1, 0]),
         (3, "[0, 0, 1]", "[0, 0, 0.7]", [(1, 1)], "{}", None),
         (4, "[0, 0, 1]", "[0.1, 0, 0.2]", [(2.1, 3)], "{}", [2, 3, 0, 0, 0, 0, 1, 0]),
         (4, "[1, 0, 0]", "[0.1, 0, 0.2]", [(2.1, 3)], "{}", None),
         (5, "[0, 0, 1]", "[0.5, 0, 0]", [(0, 9)], "{}", [0, 0, 0, 0, 0, HALF, HALF, math.pi / 2]),
-        # Seen from its side, a ring turns with what is next to the eye.
+        # Seen from its side, a ring turns by its part that is nearest to the eye.
         (
             5,
             "[1, 0, 0]",
@@ -207,7 +207,7 @@ HALF = math.sqrt(0.5)
             "{}",
             [0, 0, 0, math.sin(0.25), 0, 0, math.cos(0.25), 0.5],
         ),
-        # Pulled straight away, what is moved and turned is only moved; sidewards it turns as well.
+        # A drag straight away from the middle only moves the marker; a drag sideways turns it as well.
         (6, "[0, 0, 1]", "[0.5, 0, 0]", [(1.5, 0)], "{}", [1, 0, 0, 0, 0, 0, 1, 0]),
         (6, "[0, 0, 1]", "[0.5, 0, 0]", [(0, 0.5)], "{}", [0, 0, 0, 0, 0, HALF, HALF, math.pi / 2]),
         (6, "[0, 0, 1]", "[0.5, 0, 0]", [(0, 0.5), (0, 2.5)], "{}", [0, 2, 0, 0, 0, HALF, HALF, math.pi / 2]),
@@ -258,7 +258,7 @@ def test_axes_of_controls_follow_the_marker_or_the_view_or_stay() -> None:
 
 
 def test_display_of_a_file_keeps_what_rviz_has_set() -> None:
-    # As RViz of Debian saves it.
+    # As saved by Debian's RViz.
     saved = {
         "Class": "rviz/InteractiveMarkers",
         "Enable Transparency": True,

@@ -1,4 +1,4 @@
-"""The same calls to real rosmaster and to ours get the same answers."""
+"""Real rosmaster and minirospy's master answer the same calls equally."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GOLDEN = Path(test_master.__file__).with_name("master_answers.json")
 
 
 def test_golden_answers_are_those_of_rosmaster(real_master: str) -> None:
-    """With RECORD=1 in the environment they are recorded again."""
+    """RECORD=1 in the environment records the answers again."""
     recording = "RECORD" in os.environ
     golden = {} if recording else json.loads(GOLDEN.read_text())
     found = {

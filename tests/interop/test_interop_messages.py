@@ -1,6 +1,6 @@
-"""Our message compiler beside real genpy: definitions, bytes, texts, refusals and values from YAML are the same.
+"""minirospy's message compiler compared with real genpy: equal definitions, bytes, texts, errors and values from YAML.
 
-genpy_peer.py runs real genpy; a message's value travels as a plain dictionary of its fields.
+genpy_peer.py runs real genpy; a message's value is passed as a plain dictionary of its fields.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ Plain = dict[str, Any]
 
 
 class RealError(Exception):
-    """What real genpy raised: the exception's name, and its text."""
+    """An exception of real genpy: its class name and its text."""
 
     def __init__(self, kind: str, text: str) -> None:
         super().__init__(kind, text)
@@ -57,14 +57,14 @@ class RealError(Exception):
 
 
 class Peer:
-    """Real genpy, with the definitions below ``roots`` compiled by it, or those that Debian compiled."""
+    """Real genpy, with definitions below ``roots`` that it compiles, or those that Debian compiled."""
 
     def __init__(self, folder: Path, *roots: Path) -> None:
         command = [REAL_PYTHON, str(HERE / "genpy_peer.py"), str(folder), *map(str, roots)]
         self._program = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def ask(self, command: str, argument: Any) -> Any:
-        """Return the answer of one of genpy_peer's commands. Raise RealError."""
+        """Return the answer to one of genpy_peer's commands. Raise RealError."""
         assert self._program.stdin
         assert self._program.stdout
         request = pickle.dumps((command, argument))
@@ -88,7 +88,7 @@ class Peer:
 
 @pytest.fixture(scope="session")
 def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Peer]]:
-    """Root -> real genpy with the definitions below it."""
+    """Return a function: root -> real genpy with the definitions below it."""
     peers: dict[str, Peer] = {}
     with ExitStack() as running:
 
@@ -106,14 +106,14 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], P
 
 
 class Ours:
-    """Our classes of one set of specs."""
+    """minirospy's classes for one set of specs."""
 
     def __init__(self, lookup: Lookup) -> None:
         self.lookup = lookup
         self._classes: dict[str, Any] = {}
 
     def load(self, name: str) -> Any:
-        """Return the class of ``pkg/Name``, made of its spec."""
+        """Return the class of ``pkg/Name``, generated from its spec."""
         if name not in self._classes:
             self._classes[name] = class_from_text(name, full_text(self.lookup(name), self.lookup))
         return self._classes[name]
@@ -141,7 +141,7 @@ class Ours:
 
 
 def specs_of(root: str, package: str) -> dict[str, MessageSpec]:
-    """All messages of a package: its own, those of its actions, and the two of each service."""
+    """Return all messages of a package: its own, those of its actions, and the two of each service."""
     catalogue = CATALOGUES[root]
     specs = catalogue.messages(package)
     for service in catalogue.services(package):
@@ -150,7 +150,7 @@ def specs_of(root: str, package: str) -> dict[str, MessageSpec]:
 
 
 def ours_of(root: str, package: str) -> Ours:
-    """Our classes of a package and of all that it needs."""
+    """Return minirospy's classes of a package and of its dependencies."""
     specs = specs_of(root, package)
     return Ours(lambda name: specs.get(name) or CATALOGUES[root].message(name))
 
@@ -162,7 +162,7 @@ def packed(message: Any) -> bytes:
 
 
 def described(data_class: Any) -> dict[str, Any]:
-    """Return what must be equal of two classes of one type; as in genpy_peer.py."""
+    """Return the properties that must be equal in two classes of one type; as in genpy_peer.py."""
     return {
         "type": data_class._type,
         "md5sum": data_class._md5sum,
@@ -179,7 +179,7 @@ def described(data_class: Any) -> dict[str, Any]:
 
 
 def assert_same(ours: dict[str, Plain], theirs: dict[str, Plain]) -> None:
-    """Two answers of ``described`` a type, equal; else the first difference of each type."""
+    """Assert that two results of ``described`` are equal; report the first difference of each type."""
     assert set(ours) == set(theirs)
     differences = {
         name: next(
@@ -198,7 +198,7 @@ def assert_same(ours: dict[str, Plain], theirs: dict[str, Plain]) -> None:
 
 @pytest.mark.parametrize(("root", "package"), PACKAGES)
 def test_definitions(real: Callable[[str], Peer], root: str, package: str) -> None:
-    """md5sum, full text, fields and constants of every message, and the md5sum of every service."""
+    """Compare md5sum, full text, fields and constants of every message, and the md5sum of every service."""
     ours = ours_of(root, package)
     specs = specs_of(root, package)
     theirs = real(root).ask("describe", (list(specs), ("msg", "srv")))
@@ -213,7 +213,7 @@ def test_definitions(real: Callable[[str], Peer], root: str, package: str) -> No
 
 @pytest.mark.parametrize("package", sorted(CATALOGUES["ours"].packages))
 def test_the_modules_that_users_import(real: Callable[[str], Peer], package: str) -> None:
-    """The generated modules of the overlay are those of msgs/."""
+    """The generated modules of the overlay match msgs/."""
     names = [spec.full_name for spec in CATALOGUES["ours"].messages(package)]
     theirs = real("ours").ask("describe", (names, ("msg",)))
     assert_same({name: described(message_class(name)) for name in names}, theirs)
@@ -256,7 +256,7 @@ def repeated(values: list[Any], length: int) -> list[Any]:
 
 
 def field_values(type_: FieldType, lookup: Lookup) -> st.SearchStrategy[Any]:
-    """Values of a field."""
+    """Return a strategy for a field's values."""
     one = PRIMITIVES[type_.base] if type_.is_primitive else message_values(lookup(type_.base), lookup)
     if not type_.is_array:
         return one
@@ -276,14 +276,14 @@ def field_values(type_: FieldType, lookup: Lookup) -> st.SearchStrategy[Any]:
 
 
 def message_values(spec: MessageSpec, lookup: Lookup) -> st.SearchStrategy[Plain]:
-    """Plain values of a message."""
+    """Return a strategy for a message's values."""
     return st.fixed_dictionaries(
         {python_name(field.name): field_values(field.type, lookup) for field in spec.fields}
     )
 
 
 def check_exchange(peer: Peer, ours: Ours, name: str, value: Plain) -> None:
-    """Both write the same bytes, read them back to the same bytes, and print the same text."""
+    """Assert that both serialize to the same bytes, deserialize them, and print the same text."""
     data = packed(ours.build(name, value))
     written, again, text = peer.ask("exchange", (name, value, data))
     assert data == written == again
@@ -294,7 +294,7 @@ def check_exchange(peer: Peer, ours: Ours, name: str, value: Plain) -> None:
 
 
 def check_drawn(peer: Peer, ours: Ours, name: str) -> None:
-    """check_exchange with values drawn for a type, the same ones in every run."""
+    """Run check_exchange with values drawn for a type, the same ones in every run."""
     spec = ours.lookup(name)
 
     @settings(
@@ -320,17 +320,17 @@ def check_drawn(peer: Peer, ours: Ours, name: str) -> None:
         if root == "ours" or package not in CATALOGUES["ours"].packages
     ],
 )
-# Hypothesis warns of values that are long to print, as those of MoveIt's types are.
+# Hypothesis warns of values with a long repr, as those of MoveIt's types are.
 @pytest.mark.filterwarnings("ignore:Generating overly large repr")
 def test_values(real: Callable[[str], Peer], root: str, package: str) -> None:
-    """Drawn values of every type of a package."""
+    """Exchange drawn values of every type of a package."""
     ours = ours_of(root, package)
     for name in specs_of(root, package):
         check_drawn(real(root), ours, name)
 
 
 def test_strings_as_text(real: Callable[[str], Peer]) -> None:
-    """Each string that YAML quotes or folds in a special way: alone, and first, middle and last of a list."""
+    """Print each string that YAML quotes or folds specially: alone, and first, middle and last in a list."""
     ours = ours_of("ours", "sensor_msgs")
     for one in ODD_STRINGS:
         for names in ([one], [one, "plain"], ["plain", one, "x"], ["a", one]):
@@ -352,7 +352,7 @@ def test_strings_as_text(real: Callable[[str], Peer]) -> None:
     ids=str,
 )
 def test_options_of_the_text(real: Callable[[str], Peer], options: dict[str, Any]) -> None:
-    """The options of strify_message, as rostopic echo -p, -w and --offset use them."""
+    """Compare the options of strify_message that rostopic echo -p, -w and --offset use."""
     name = "sensor_msgs/JointState"
     value = {
         "header": {"seq": 7, "stamp": (1234, 56), "frame_id": "base"},
@@ -376,7 +376,7 @@ def test_options_of_the_text(real: Callable[[str], Peer], options: dict[str, Any
 
 
 def text_of(main: str, **others: str) -> str:
-    """Return a full text of odd_msgs/Odd, with other messages of odd_msgs."""
+    """Return the full text of odd_msgs/Odd, with other messages of odd_msgs."""
     parts = [main, *(f"MSG: {name.replace('__', '/')}\n{text}" for name, text in others.items())]
     return f"\n{SEPARATOR}\n".join(parts)
 
@@ -434,11 +434,11 @@ ODD = {
 
 @pytest.mark.parametrize("text", ODD.values(), ids=ODD.keys())
 def test_odd_definitions(real: Callable[[str], Peer], text: str) -> None:
-    """md5sum, full text, bytes and texts of definitions that are written in odd ways."""
+    """Compare md5sum, full text, bytes and text of definitions in unusual notations."""
     name = "odd_msgs/Odd"
     theirs = real("debian").ask("dynamic", (name, text))
     if "\r" in text:
-        # Real genpy's own source file loses them.
+        # Real genpy's generated source file loses the carriage returns.
         theirs["full_text"] = theirs["full_text"].replace("\n", "\r\n")
     assert_same({name: described(class_from_text(name, text))}, {name: theirs})
     specs = specs_of_text(name, text)
@@ -480,14 +480,14 @@ REFUSED = {
 
 @pytest.mark.parametrize("text", REFUSED.values(), ids=REFUSED.keys())
 def test_refused_definitions(real: Callable[[str], Peer], text: str) -> None:
-    """What real genpy refuses, we refuse by name and line."""
+    """minirospy refuses definitions that real genpy refuses, and reports the name and line."""
     with pytest.raises(RealError):
         real("debian").ask("dynamic", ("odd_msgs/Odd", text))
     with pytest.raises(DefinitionError):
         class_from_text("odd_msgs/Odd", text)
 
 
-# What real genpy refuses, or makes a broken class of, and ours takes: definition -> the constants of ours.
+# Definitions that real genpy refuses or compiles to a broken class, and minirospy accepts -> minirospy's constants.
 OURS_ONLY = {
     "hexadecimal": ("int32 X=0x1F\n", {"X": "31"}),
     "tabs": ("int32\tX=1\n", {"X": "1"}),
@@ -502,7 +502,7 @@ OURS_ONLY = {
 def test_definitions_that_only_ours_takes(
     real: Callable[[str], Peer], text: str, constants: dict[str, str]
 ) -> None:
-    """Where genpy itself fails, ours does what was meant; where a definition travels, avoid these."""
+    """genpy itself fails on these and minirospy does what was meant; avoid them in definitions for both."""
     with pytest.raises(RealError):
         real("debian").ask("dynamic", ("odd_msgs/Odd", text))
     data_class = class_from_text("odd_msgs/Odd", text)
@@ -510,7 +510,7 @@ def test_definitions_that_only_ours_takes(
     assert data_class().deserialize(packed(data_class())) == data_class()
 
 
-# What real genpy takes and ours refuses: it would mean one thing here and another there.
+# Definitions that real genpy accepts and minirospy refuses: the two would interpret them differently.
 REAL_ONLY = {
     "a constant twice": "int32 X=1\nint32 X=2\n",
     "a name beyond ASCII": "int32 zażółć\n",
@@ -526,7 +526,7 @@ def test_definitions_that_only_real_genpy_takes(real: Callable[[str], Peer], tex
 
 
 def test_arrays_of_empty_messages(real: Callable[[str], Peer]) -> None:
-    """Their elements take no bytes: only the count is there."""
+    """Elements of an empty message occupy no bytes: only the count is serialized."""
     name, text = "odd_msgs/Odd", text_of("Empty[] a\n", odd_msgs__Empty="")
     real("debian").ask("dynamic", (name, text))
     check_exchange(real("debian"), Ours(specs_of_text(name, text).__getitem__), name, {"a": [{}, {}, {}]})
@@ -535,7 +535,10 @@ def test_arrays_of_empty_messages(real: Callable[[str], Peer]) -> None:
 def test_a_message_and_a_service_of_one_name(
     real: Callable[[str], Peer], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As modules on disk: each is found among its own kind. A service may have more than three minus signs."""
+    """Compiled to modules on disk, each is found among its own kind.
+
+    A separator in a service may have more than three minus signs.
+    """
     folder = tmp_path / "source" / "odd_twins_msgs"
     for kind, text in (("msg", "int32 x\n"), ("srv", "string y\n----- answer\nTwin z\nTwin[] more")):
         (folder / kind).mkdir(parents=True)
@@ -564,7 +567,7 @@ def test_a_message_and_a_service_of_one_name(
 
 
 def test_backslashes_stay_as_they_are(real: Callable[[str], Peer]) -> None:
-    """Real genpy takes them for escapes in its own source; the md5sum is of what was written."""
+    """Real genpy interprets them as escapes in its generated source; the md5sum is of the original text."""
     text = "# C:\\new\nstring X=a\\tb\n"
     theirs = real("debian").ask("dynamic", ("odd_msgs/Odd", text))
     ours = described(class_from_text("odd_msgs/Odd", text))
@@ -577,7 +580,7 @@ def test_backslashes_stay_as_they_are(real: Callable[[str], Peer]) -> None:
 
 # --- wrong values
 
-# Type, value: real genpy names the field, and ours does with the same text.
+# Type, value: real genpy's error names the field, and minirospy's has the same text.
 WRONG: list[tuple[str, Plain]] = [
     ("std_msgs/Int8", {"data": 128}),
     ("std_msgs/Int8", {"data": -129}),
@@ -628,7 +631,7 @@ WRONG: list[tuple[str, Plain]] = [
     ("sensor_msgs/JointState", {"name": [5]}),
     ("sensor_msgs/JointState", {"name": [None]}),
 ]
-# Type, value, what real genpy raises (its text does not help, or it is not a SerializationError), our text.
+# Type, value, real genpy's exception (unhelpful text, or not a SerializationError), minirospy's text.
 WRONG_OTHERWISE: list[tuple[str, Plain, str, str]] = [
     ("std_msgs/String", {"data": "\ud800"}, "UnicodeEncodeError", "surrogates not allowed"),
     ("std_msgs/UInt8MultiArray", {"data": "abc"}, "SerializationError", "field data must be a list or tuple"),
@@ -676,7 +679,7 @@ WRONG_OTHERWISE: list[tuple[str, Plain, str, str]] = [
 
 @pytest.mark.parametrize(("name", "value"), WRONG, ids=lambda item: str(item)[:60])
 def test_wrong_values(real: Callable[[str], Peer], name: str, value: Plain) -> None:
-    """SerializationError, with genpy's text."""
+    """Both raise SerializationError with genpy's text."""
     with pytest.raises(RealError) as theirs:
         real("ours").ask("serialize", (name, value))
     with pytest.raises(SerializationError) as ours:
@@ -688,7 +691,7 @@ def test_wrong_values(real: Callable[[str], Peer], name: str, value: Plain) -> N
 def test_wrong_values_that_only_ours_names(
     real: Callable[[str], Peer], name: str, value: Plain, kind: str, text: str
 ) -> None:
-    """Ours is a SerializationError that names the fault; real genpy raises various errors."""
+    """minirospy raises a SerializationError that names the fault; real genpy raises various errors."""
     with pytest.raises(RealError) as theirs:
         real("ours").ask("serialize", (name, value))
     assert theirs.value.kind == kind
@@ -701,7 +704,7 @@ def test_wrong_values_that_only_ours_names(
 
 
 def plain_value(spec: MessageSpec, lookup: Lookup) -> Plain:
-    """Return a value with something in every field."""
+    """Return a value with a non-default value in every field."""
     one = {"string": "ab", "time": (1, 2), "duration": (1, 2), "bool": True, "float32": 1.5, "float64": 1.5}
     value: Plain = {}
     for name, type_ in spec.fields:
@@ -714,7 +717,7 @@ def plain_value(spec: MessageSpec, lookup: Lookup) -> Plain:
 
 @pytest.mark.parametrize("package", sorted(CATALOGUES["ours"].packages))
 def test_cut_and_corrupted_bytes(package: str) -> None:
-    """Every prefix is refused; a huge length at any place is refused or harmless, and costs nothing."""
+    """Every truncation is refused; a huge length at any position is refused or harmless, and allocates no memory."""
     ours = ours_of("ours", package)
     for name, spec in specs_of("ours", package).items():
         data_class = ours.load(name)
@@ -730,7 +733,7 @@ def test_cut_and_corrupted_bytes(package: str) -> None:
 
 
 def test_a_huge_count_of_empty_messages() -> None:
-    """Elements without bytes leave no trace in the message's size: the count alone must not fill the memory."""
+    """Elements without bytes do not add to the message's size: the count alone must not exhaust the memory."""
     data_class = class_from_text("odd_msgs/Odd", text_of("Empty[] a\n", odd_msgs__Empty=""))
     with pytest.raises(DeserializationError):
         data_class().deserialize(b"\xff\xff\xff\xff")
@@ -803,7 +806,7 @@ FILLED = [
 
 @pytest.mark.parametrize(("name", "source"), FILLED)
 def test_values_from_yaml(real: Callable[[str], Peer], name: str, source: str) -> None:
-    """fill_message_args as rostopic pub uses it: the same bytes, or both refuse."""
+    """Call fill_message_args as rostopic pub does: both give the same bytes, or both refuse."""
     words = {"now": (12, 34)}
     try:
         theirs = real("ours").ask("fill", (name, source, words))
@@ -821,7 +824,7 @@ def test_values_from_yaml(real: Callable[[str], Peer], name: str, source: str) -
 
 
 def test_a_dictionary_without_a_list_around_it(real: Callable[[str], Peer]) -> None:
-    """Real genpy trips over one with a single field (KeyError: 0); ours takes it as what it is."""
+    """Real genpy fails for one with a single field (KeyError: 0); minirospy accepts it."""
     with pytest.raises(RealError, match="KeyError"):
         real("ours").ask("fill", ("std_msgs/String", "{data: hello}", {}))
     message = message_class("std_msgs/String")()

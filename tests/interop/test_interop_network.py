@@ -4,8 +4,8 @@
 
     alpha 10.99.1.2 (fd99:1::2)  --va--  router  --vb--  10.99.2.2 (fd99:2::2) beta
 
-Each machine has its host name and its hosts file. The router drops in silence, as firewalls do, and a cable is pulled at
-its ends.
+Each machine has its own host name and hosts file. The router drops packets silently, as firewalls do; a cable is pulled by
+setting its interface down.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ HOSTS = f"127.0.0.1 localhost\n::1 localhost\n{ALPHA} alpha\n{BETA} beta\n{ALPHA
 
 
 def sh(command: str) -> None:
-    """Run a command of `ip`. Raise CalledProcessError."""
+    """Run an `ip` command. Raise CalledProcessError if it fails."""
     subprocess.run(command.split(), check=True, capture_output=True, text=True)
 
 
@@ -48,11 +48,11 @@ class Network:
         self.running = ExitStack()
 
     def ip(self, machine: str, command: str) -> None:
-        """`ip` inside a machine or the router."""
+        """Run `ip` in a machine or the router."""
         sh(f"ip -n {self.names[machine]} {command}")
 
     def build(self) -> None:
-        """Make the machines. Raise CalledProcessError if this is not permitted."""
+        """Create the namespaces. Raise CalledProcessError if this is not permitted."""
         for name in self.names.values():
             sh(f"ip netns add {name}")
 
@@ -72,7 +72,7 @@ class Network:
             folder = Path("/etc/netns") / self.names[machine]
             folder.mkdir(parents=True)
             (folder / "hosts").write_text(HOSTS)
-            # A name server that refuses immediately: an outside one would time out.
+            # A name server that refuses immediately: an external one would time out.
             (folder / "resolv.conf").write_text("nameserver 127.0.0.1\n")
 
         for switch in ("ipv4/ip_forward", "ipv6/conf/all/forwarding"):
@@ -88,7 +88,7 @@ class Network:
             shutil.rmtree(Path("/etc/netns") / name, ignore_errors=True)
 
     def command(self, machine: str, words: list[str]) -> list[str]:
-        """``words`` inside a machine, by its own host name; one process, which gets the signals."""
+        """Return a command that runs ``words`` in a machine, with its host name, as one process, which receives the signals."""
         script = f'hostname {machine} && exec "$@"'
         return [
             "ip",
@@ -105,33 +105,33 @@ class Network:
         ]
 
     def start(self, machine: str, words: list[str], **variables: str) -> Program:
-        """Start a program there."""
+        """Start a program on a machine."""
         environ = {"ROS_MASTER_URI": URI, **variables}
-        # Tests run with ROS_HOSTNAME=localhost, which is not what machines of a network say.
+        # Tests run with ROS_HOSTNAME=localhost, which machines of a network do not set.
         kept = {name: value for name, value in os.environ.items() if name != "ROS_HOSTNAME"}
         program = Program(self.command(machine, words), {**kept, **environ})
         self.running.callback(program.end)
         return program
 
     def peer(self, machine: str, role: str, stack: str = "ours", **variables: str) -> Program:
-        """Start network_peer.py there, on our rospy or the real one, as the node /ROLE_MACHINE."""
+        """Start network_peer.py on a machine, with minirospy or real rospy, as the node /ROLE_MACHINE."""
         python = sys.executable if stack == "ours" else REAL_PYTHON
         words = [python, str(HERE / "network_peer.py"), role, f"__name:={role}_{machine}"]
         return self.start(machine, words, **variables)
 
     def doctor(self, machine: str, *others: str, **variables: str) -> list[str]:
-        """Return what `minirospy doctor` prints there."""
+        """Return the output of `minirospy doctor` on a machine."""
         words = [str(OUR_BIN / "minirospy"), "doctor", *others]
         return self.start(machine, words, **variables).lines_until_end()
 
     def publish(self, machine: str, **variables: str) -> None:
-        """One publisher more of /beat there."""
+        """Start another publisher of /beat on a machine."""
         words = [str(OUR_BIN / "rostopic"), "pub", "/beat", "std_msgs/Int32", "1"]
         self.start(machine, words, **variables)
 
     @contextmanager
     def firewall(self, rule: str) -> Iterator[None]:
-        """Have the router drop what a rule of `ip rule` names: `to ADDRESS ipproto tcp dport 1-5`."""
+        """Make the router drop packets that match an `ip rule`: `to ADDRESS ipproto tcp dport 1-5`."""
         self.ip("router", f"rule add {rule} blackhole")
         try:
             yield
@@ -140,7 +140,7 @@ class Network:
 
 
 class Program:
-    """A program whose lines, of both streams, are waited for."""
+    """A program, with methods that wait for lines on stdout or stderr."""
 
     def __init__(self, command: list[str], environ: dict[str, str]) -> None:
         self._process = subprocess.Popen(
@@ -169,13 +169,13 @@ class Program:
                 return line
 
     def lines_until_end(self) -> list[str]:
-        """All its lines."""
+        """Return all lines up to the program's exit."""
         self._reader.join(PATIENCE)
         assert not self._reader.is_alive(), f"goes on after {PATIENCE} s: {self.seen}"
         return self.seen
 
     def end(self, *, kill: bool = False) -> None:
-        """End it: by the end of its input, then by signals. Idempotent."""
+        """Stop the program: close stdin, then send signals. Idempotent."""
         process = self._process
         assert process.stdin
         if process.poll() is None and not kill:
@@ -203,7 +203,7 @@ class Program:
 
 @pytest.fixture(scope="module")
 def built() -> Iterator[Network]:
-    """Return the machines; where they cannot be made, the tests are skipped with the reason."""
+    """Return the machines; skip the tests with the reason if they cannot be created."""
     network = Network()
     why: object = "`ip` is missing (apt-get install iproute2)" if shutil.which("ip") is None else ""
     try:
@@ -220,14 +220,14 @@ def built() -> Iterator[Network]:
 
 @pytest.fixture
 def network(built: Network) -> Iterator[Network]:
-    """Return the machines, without programs."""
+    """Return the machines; stop their programs after the test."""
     built.running = ExitStack()
     yield built
     built.running.close()
 
 
 def start_master(network: Network, machine: str = "alpha", stack: str = "ours", **variables: str) -> Program:
-    """Start a master there, and return when it runs."""
+    """Start a master on a machine, and return when it runs."""
     if stack == "ours":
         master = network.start(
             machine, [str(OUR_BIN / "roscore"), "-p", str(PORT), "--no-journal"], **variables
@@ -261,7 +261,7 @@ ALL = [
 def test_two_machines_exchange_messages_calls_and_goals(
     network: Network, core: str, robot: str, laptop: str
 ) -> None:
-    """No variable but ROS_MASTER_URI: machines tell their names, which their hosts files hold."""
+    """ROS_MASTER_URI is the only variable: machines announce their host names, which the hosts files resolve."""
     start_master(network, stack=core)
     network.peer("alpha", "robot", robot).wait_for("ready")
     lines = network.peer("beta", "laptop", laptop).lines_until_end()
@@ -283,7 +283,7 @@ def test_two_machines_exchange_messages_by_ipv6(network: Network) -> None:
 
 
 def test_subscriber_names_the_side_with_the_wrong_address(network: Network) -> None:
-    """A name that is not known here, an address that is nobody's, and ports that a firewall lets nobody reach."""
+    """The address is an unknown host name, an unused address, or has ports that a firewall blocks."""
     start_master(network)
 
     with network.firewall(f"to {ALPHA} ipproto tcp dport 20000-20019"):
@@ -291,7 +291,7 @@ def test_subscriber_names_the_side_with_the_wrong_address(network: Network) -> N
         network.publish("alpha", ROS_HOSTNAME="alfa")
         network.publish("alpha", ROS_IP="10.99.1.77")
         network.publish("alpha", MINIROSPY_PORTS="20000-20019")
-        # The other way nothing is in the way.
+        # The reverse direction is open.
         network.peer("beta", "robot").wait_for("ready")
         network.peer("alpha", "listen", MINIROSPY_PORTS="20000-20019").wait_for("beat")
         lines = {}
@@ -334,7 +334,7 @@ def test_doctor_checks_the_return_path_from_the_master(network: Network) -> None
 
 
 def test_two_doctors_check_both_directions(network: Network) -> None:
-    """The master is on alpha; beta listens; what alpha says when it is well, unnamed, and behind a firewall."""
+    """The master is on alpha; beta listens. Check alpha's report if all is well, without a name, and behind a firewall."""
     start_master(network)
     listener = network.start("beta", [str(OUR_BIN / "minirospy"), "doctor", "--listen"])
     listener.wait_for("listening: type `minirospy doctor` on the other machine")
@@ -360,7 +360,7 @@ def test_two_doctors_check_both_directions(network: Network) -> None:
     )
 
     with network.firewall(f"from {BETA} to {ALPHA}"):
-        # What beta answers is lost: it is not reached at all.
+        # beta's answers are lost, so it counts as unreachable.
         (line,) = [each for each in network.doctor("alpha") if each.startswith("PROBLEM")]
 
     assert "nothing comes back from 'beta' -> if `ping beta` fails too" in line
@@ -399,7 +399,7 @@ def test_doctor_explains_an_unreachable_master(network: Network, uri: str, said:
 
 
 def test_connection_recovers_after_a_cable_was_pulled(network: Network) -> None:
-    """Longer than keepalive takes: the subscriber gives the connection up, and comes again when it can."""
+    """The cable is out for longer than keepalive takes: the subscriber closes the connection, and reconnects when it can."""
     start_master(network)
     robot = network.peer("alpha", "robot")
     listener = network.peer("beta", "listen", TEST_KEEPALIVE="1")
@@ -407,7 +407,7 @@ def test_connection_recovers_after_a_cable_was_pulled(network: Network) -> None:
     robot.wait_for("subscribed")
     for end in ("va", "vb"):
         network.ip("router", f"link set {end} down")
-    time.sleep(3.5)  # the silence itself is what is tested
+    time.sleep(3.5)  # the silence itself is tested
     for end in ("va", "vb"):
         network.ip("router", f"link set {end} up")
     robot.wait_for("subscribed")
@@ -415,7 +415,7 @@ def test_connection_recovers_after_a_cable_was_pulled(network: Network) -> None:
 
 
 def test_nodes_register_again_with_an_empty_master(network: Network) -> None:
-    """Its nodes register again, with the machine that it never heard of too, and what is connected stays so."""
+    """Nodes register again with the new master, also those of the other machine, and connections stay open."""
     master = start_master(network)
     robot = network.peer("beta", "robot")
     robot.wait_for("ready")
@@ -425,7 +425,7 @@ def test_nodes_register_again_with_an_empty_master(network: Network) -> None:
     start_master(network)
     listener.wait_for("has restarted: registered again")
     network.peer("alpha", "listen").wait_for("beat")
-    # What it prints may come later than the message that it sent.
+    # Its output may arrive later than the message that it sent.
     for _ in range(2):
         robot.wait_for("subscribed")
     assert sum(line == "subscribed" for line in robot.seen) == 2

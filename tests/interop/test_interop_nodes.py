@@ -1,4 +1,4 @@
-"""Nodes of ours, of rospy and of roscpp talk to each other, over our master and over the real one."""
+"""Nodes of minirospy, rospy and roscpp communicate, with minirospy's master and with the real one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PAIRS = [("ours", "rospy"), ("rospy", "ours"), ("ours", "roscpp"), ("roscpp", "o
 
 
 def lines_until_ready(program: subprocess.Popen[str]) -> list[str]:
-    """Return what a peer prints before its line "ready"."""
+    """Return the lines that a peer prints before "ready"."""
     assert program.stdout
     lines = []
     for line in program.stdout:
@@ -28,7 +28,7 @@ def lines_until_ready(program: subprocess.Popen[str]) -> list[str]:
 
 @pytest.mark.parametrize(("talker", "listener"), PAIRS)
 def test_messages_arrive_byte_for_byte(any_master: str, peer: Peer, talker: str, listener: str) -> None:
-    """Bool, String, LaserScan with 1651 beams, and an Image of 6 MB, to a subscriber that joins late."""
+    """Send Bool, String, LaserScan with 1651 beams, and an Image of 6 MB, to a subscriber that joins late."""
     said = lines_until_ready(peer(talker, "talk", any_master))
     output, errors = peer(listener, "listen", any_master).communicate(timeout=PATIENCE)
     heard = {
@@ -53,7 +53,7 @@ def test_messages_arrive_if_the_subscriber_started_first(
 
 @pytest.mark.parametrize(("server", "client"), PAIRS)
 def test_services_answer_between_all_clients(any_master: str, peer: Peer, server: str, client: str) -> None:
-    """Each client calls with a connection a call, and with a persistent one."""
+    """Each client calls with one connection per call, and with a persistent connection."""
     lines_until_ready(peer(server, "serve", any_master))
     output, errors = peer(client, "call", any_master).communicate(timeout=PATIENCE)
     answers = [line for line in output.splitlines() if "flag:" in line]

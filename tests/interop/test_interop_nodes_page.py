@@ -1,4 +1,4 @@
-"""The view Nodes in Debian's chromium, with nodes of ours, rospy and roscpp."""
+"""The view Nodes in Debian's chromium, with nodes of minirospy, rospy and roscpp."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_nodes_of_each_kind_are_shown_pinged_and_killed(
         page.click(".side button", "Kill")
         page.click(".question button", "Kill")
         page.wait_text(".note", f"{name} was requested to shut down")
-        # Its program goes on until its input ends; the node has left.
+        # The node has unregistered; its program runs until stdin is closed.
         page.wait(f'return !document.querySelector("{ROW.format(name)}")')
 
 
@@ -72,7 +72,7 @@ def test_nodes_are_sorted_by_what_they_cost(
         master.registerPublisher("/a_dead_one", "/nothing", "std_msgs/String", "http://127.0.0.1:1/")
     page = browse(address(served, "nodes?sort=memory"))
     pids = [os.getpid(), program.pid]
-    # CPU is what was used between two reports.
+    # CPU usage is measured between two reports.
     page.wait(
         "const rows = [...document.querySelectorAll('tr[data-node]')];"
         f"return {pids}.every(pid => rows.some(({{children: c}}) => c[2].textContent === String(pid)"
@@ -113,7 +113,7 @@ def test_dead_nodes_are_marked_and_cleaned_up(
     page.wait_text(".note", "Removed: /dead.")
     page.type("input[type=search]", "")
     page.wait(f'return !document.querySelector("{ROW.format("/dead")}")')
-    # The master knows no address of a name that is not legal: it stays, as for rosnode cleanup, and is text.
+    # The master has no address for an illegal name: the row stays, as for rosnode cleanup, and is plain text.
     page.wait_text("tr.dead td", HOSTILE)
     assert page.evaluate("document.querySelectorAll('main img, main script').length") == 0
     assert page.evaluate("document.title") == "Nodes · minirospy"

@@ -1,4 +1,4 @@
-"""Faults of one part of the page, which are not those of others: views that fail, connections that are lost, what comes late."""
+"""Faults that must not affect other parts of the page: views that fail, lost connections, late responses."""
 
 from __future__ import annotations
 

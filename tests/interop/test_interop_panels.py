@@ -1,4 +1,4 @@
-"""Small panels of the dashboard: their texts and messages under node; read, moved and pressed in chromium."""
+"""Small panels of the dashboard: their text form and messages under node; read, moved and pressed in chromium."""
 
 from __future__ import annotations
 
@@ -234,7 +234,7 @@ def test_panels_are_made_by_the_form_and_kept_in_the_link(
     page.type("input[aria-label='Field of a topic, or service']", "/battery/nothing")
     page.click("button[type=submit]", "Add")
     page.wait_text(f"{widget('/battery/nothing')} .note", "/battery has no such field")
-    # Changed, moved, removed.
+    # Change, move and remove a panel.
     page.click(f"{widget('/battery/nothing')} button[title='Change this panel']")
     page.type("input[aria-label='Field of a topic, or service']", "/battery")
     page.click("button[type=submit]", "Change")

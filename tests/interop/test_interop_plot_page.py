@@ -1,4 +1,4 @@
-"""Plot in Debian's chromium: derivatives, averages, one series over another; the computing under node."""
+"""Plot in Debian's chromium: derivatives, averages, one series over another; the computations under node."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ JS = (FOLDER / "js").as_uri()
 
 
 def evaluated(expression: str) -> Any:
-    """Return what an expression of derived.js and samples.js gives, under node; NaN is null."""
+    """Return the result of an expression of derived.js and samples.js under node; NaN becomes null."""
     script = (
         f"import {{ Samples }} from '{JS}/samples.js'; import {{ derivedOf, pairs, rangeOf }} from '{JS}/derived.js';"
         "const of = (times, values) => { const made = new Samples(); made.append(times, values); return made; };"
@@ -70,14 +70,15 @@ def test_derivative_is_by_the_stamps_of_headers_where_there_are_some() -> None:
         2,
         2,
     ]
-    # A bag that is played again: its stamps go back.
+    # If a bag is played again, its stamps go back.
     assert evaluated("[...derivedOf('derivative').append([0, 1, 2, 3], [0, 1, 5, 7], [8, 9, 1, 2])]") == [
         None,
         1,
         None,
         2,
     ]
-    # The first ones have none; they are kept with the points, also when the memory grows and the oldest are dropped.
+    # The first points have no value; they are kept with the points, also when the buffer grows and the oldest are
+    # dropped.
     points = evaluated(
         "(made => { made.append([1, 2], [0, 0]); made.append(new Float64Array(2000).fill(3), new Float64Array(2000),"
         " new Float64Array(2000).fill(7)); made.append([4], [0]); const all = [...made.stamps.subarray(0, made.count)];"
@@ -113,7 +114,7 @@ def test_derivative_of_messages_that_come_in_batches_has_no_spikes(
         served.run(batch(first))
         page.wait_text(".series .count", str(first + 20))
     page.wait_text(".series .num", "50")
-    # Another kind, and back: all points are computed again.
+    # Change the kind and back: all points are recomputed.
     for kind in ("", "derivative"):
         page.choose(".series select", kind)
     page.wait_text(".series .num", "50")
@@ -130,7 +131,7 @@ def test_derivative_of_messages_that_come_in_batches_has_no_spikes(
 def test_average_is_that_of_the_last_seconds() -> None:
     found = evaluated("[...derivedOf('average1').append([0, 0.5, 1, 1.5, 9], [2, 4, NaN, 8, 1])]")
     assert found == [2, 3, 3, 6, 1]
-    # Many points: what rounding leaves does not add up.
+    # With many points, rounding errors do not accumulate.
     long = evaluated(
         "(d => { const n = 50000; const t = Float64Array.from({length: n}, (_, i) => i / 100);"
         "const v = t.map((x) => 1e9 + Math.sin(x)); return d.append(t, v)[n - 1]; })(derivedOf('average1'))"
@@ -160,7 +161,7 @@ def test_series_over_another_takes_its_newest_value_of_the_moment() -> None:
 
 
 def selected(path: str) -> dict[str, float]:
-    """Return what a path leads to in a message with markers, by labels; of the error its text."""
+    """Return label -> value for a path in a message with markers, or the error's text."""
     body = f"""
       const markers = [["goal", 1, 0.5], ["goal", 2, 1.5], ["base", 2, 2.5]].map(([ns, id, x], index) => (
         {{ ns, id, on: index > 0, stamp: {{ secs: index, nsecs: 0 }}, pose: {{ x }} }}));
@@ -222,7 +223,7 @@ def test_path_that_is_wrong_is_refused_before_a_message_comes(
         page.type("form input", path)
         page.click("form button", "Plot")
         page.wait_text(".series-missing .error", f"{path}: {why}")
-    # What is right and not there waits.
+    # A valid path that does not exist yet waits.
     page.type("form input", "/late[0:5]{a==1}.b/c")
     page.click("form button", "Plot")
     page.wait_text(".series-missing .muted", "waiting for /late[0:5]{a==1}.b/c")
@@ -299,7 +300,7 @@ def test_series_is_drawn_over_another(serve: Callable[..., Served], browse: Call
     page.wait_text(".series[data-label='/path/y']", "200 points")
     page.choose("select[aria-label='The x axis']", "/path/x")
     assert "x=%2Fpath%2Fx" in page.evaluate("location.hash")
-    # The circle is to the left and to the right of its middle, above and below it.
+    # The circle extends to the left and right of its middle, and above and below it.
     drawn = (
         "(c => { const g = c.getContext('2d'), w = c.width, h = c.height; const has = (x, y, a, b) => "
         "[...g.getImageData(x * w, y * h, a * w, b * h).data].some((v, i, d) => i % 4 === 0 && d[i + 3] && "
@@ -321,12 +322,12 @@ HEIGHT_OF = """(() => { const c = document.querySelector('.chart canvas'), wante
     for (let x = Math.round(o.left - at.left) + 2; x < o.right - at.left; x++)
       if (wanted.every((v, i) => Math.abs(v - d[4 * (y * c.width + x) + i]) < 40)) rows.push((o.bottom - at.top - y) / o.height);
   return rows.length ? rows.reduce((a, b) => a + b) / rows.length : null; })()"""
-"""Where the points of a color are, on average: 0 at the lower end of the chart, 1 at the upper one."""
+"""The average height of the points of a color: 0 at the lower edge of the chart, 1 at the upper one."""
 COLORS = {"x": [0x2F, 0x7E, 0xD8], "y": [0xE4, 0x57, 0x2E], "z": [0x2A, 0x9D, 0x5C]}
 
 
 def middle(page: Page, number: int) -> tuple[float, float]:
-    """Return where the numbers of a y axis are; ``number`` counts the axes that are used, from 0."""
+    """Return the position of a y axis's labels; ``number`` counts the axes in use, from 0."""
     x, y = page.evaluate(
         "(r => [r.x + r.width / 2, r.y + r.height / 2])"
         f"(document.querySelectorAll('.u-axis.scaled')[{number}].getBoundingClientRect())"
@@ -367,7 +368,7 @@ def test_series_have_axes_of_their_own_that_are_kept_in_the_address(
     page.wait("return location.hash.includes('range=5+-10+0') && location.hash.includes('label=2+mm')")
     page.wait(f"return Math.abs({HEIGHT_OF % COLORS['z']} - 0.5) < 0.05")
 
-    # The same link elsewhere shows the same, and keeps it before a message has come.
+    # The same link in another page shows the same plot, also before a message has arrived.
     page.reload()
     assert "range=5+-10+0" in page.evaluate("location.hash")
     assert "axis=2+%2Fpath%2Fy" in page.evaluate("location.hash")
@@ -406,7 +407,7 @@ def test_axis_is_zoomed_and_panned_alone_by_the_wheel_and_by_dragging(
         page.call(
             "Input.dispatchMouseEvent", type=kind, x=x, y=y + down, button="left", buttons=1, clickCount=1
         )
-    # It follows the hand, down; the other axis stays.
+    # The axis follows the drag downwards; the other axis stays.
     page.wait(f"return {HEIGHT_OF % COLORS['y']} < 0.4")
     page.wait(f"return Math.abs({HEIGHT_OF % COLORS['x']} - 0.5) < 0.05")
     for count in (1, 2):
@@ -433,7 +434,7 @@ def test_chart_is_panned_and_zoomed_by_keys_and_fingers(
         page.wait(f"return {shown}")
         press_key(page, "Escape")
         page.wait(f"return !{shown}")
-    # Fingers: one pans, two zoom.
+    # One finger pans, two zoom.
     x, y = page.evaluate(
         "(r => [r.x + r.width / 2, r.y + 50])(document.querySelector('.u-over').getBoundingClientRect())"
     )

@@ -1,4 +1,4 @@
-"""Maps of ours and nodes of Debian's ROS: real rospy gets them, and ours saves a map that real rospy publishes."""
+"""minirospy's maps with nodes of Debian's ROS: real rospy receives them, and map_saver saves a map that real rospy publishes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""dynamic_reconfigure: generators, servers, clients and dynparam of ours and of Debian's, each with each."""
+"""dynamic_reconfigure: generators, servers, clients and dynparam of minirospy and Debian, in every combination."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ print(json.dumps([plain(getattr(c, name)) for name in names]))
 
 
 def generate(stack: str, folder: Path) -> Path:
-    """Run the .cfg file by a generator; return the folder of its Python modules."""
+    """Run a stack's generator on the .cfg file; return the folder of the Python modules."""
     share = {"ours": OUR_SHARE, "rospy": REAL_SHARE}[stack]
     modules = folder / "python"
     (modules / "lamp").mkdir(parents=True)
@@ -55,7 +55,7 @@ def generate(stack: str, folder: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def modules(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Return the folders of lamp.cfg.LampConfig as each generator makes it."""
+    """Return the folders of lamp.cfg.LampConfig from each generator."""
     return {stack: generate(stack, tmp_path_factory.mktemp(stack)) for stack in PYTHONS}
 
 
@@ -95,7 +95,7 @@ def serve(modules: dict[str, Path]) -> Iterator[Callable[[str, str], subprocess.
 
 
 def lines_until(program: subprocess.Popen[str], word: str) -> list[str]:
-    """Return what a program prints up to a line that starts with a word."""
+    """Return a program's output up to a line that starts with a word."""
     assert program.stdout
     lines: list[str] = []
     while not lines or not lines[-1].startswith(word):
@@ -108,7 +108,7 @@ def lines_until(program: subprocess.Popen[str], word: str) -> list[str]:
 def played(
     serve: Callable[[str, str], subprocess.Popen[str]], uri: str, server: str, client: str, modules: Path
 ) -> str:
-    """Return what a server and a client print."""
+    """Return the output of a server and of a client."""
     serving = serve(server, uri)
     before = lines_until(serving, "ready")
     done = subprocess.run(
@@ -145,7 +145,7 @@ def test_server_and_client_behave_as_real_ones(
 
 @pytest.fixture(scope="session")
 def cpp_peer(modules: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Compile the server in C++ with the header that ROS makes; return the program."""
+    """Compile the C++ server with the header that ROS generates; return the program."""
     compiler = shutil.which("g++")
     assert compiler
     flags = subprocess.run(
@@ -163,7 +163,7 @@ def cpp_peer(modules: dict[str, Path], tmp_path_factory: pytest.TempPathFactory)
 
 @pytest.fixture
 def cpp_server(cpp_peer: Path, real_master: str) -> Iterator[subprocess.Popen[str]]:
-    """Start a server in C++."""
+    """Start the C++ server."""
     server = start([str(cpp_peer)], real_master, "roscpp")
     yield server
     stop(server)
@@ -197,7 +197,7 @@ def test_client_and_dynparam_of_ours_drive_a_server_in_cpp(
 
 
 def dynparam(stack: str, uri: str, *words: str, share: Path = OUR_SHARE) -> tuple[str, int]:
-    """Return what dynparam prints, and its exit status."""
+    """Return dynparam's output and its exit status."""
     done = subprocess.run(
         [PYTHONS[stack], str(DYNPARAM[stack]), *words],
         env={**environment(uri, stack), "ROS_PACKAGE_PATH": str(REAL_SHARE)},
@@ -242,7 +242,7 @@ def test_dynparam_prints_what_the_real_one_prints(
     assert run("dump", "/lamp", str(file)) == ("", 0)
     assert run("set", "/lamp", "{'power': 1, 'angle': 2}") == ("", 0)
     if server == "rospy":
-        # ROS's own server refuses states of groups in groups, which its own dynparam sends, too.
+        # ROS's server refuses nested group states, which its own dynparam sends, too.
         assert run("load", "/lamp", str(file))[1] == 1
         return
     for other in ("rospy", "ours"):

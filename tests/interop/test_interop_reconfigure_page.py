@@ -1,4 +1,4 @@
-"""The view Reconfigure in Debian's chromium, with servers of ours and of Debian's; its pure parts under node."""
+"""The view Reconfigure in Debian's chromium, with servers of minirospy and Debian; its pure parts under node."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = ["browse", "modules", "serve"]
 
 
 def page_functions(*calls: tuple[str, str, list[object]]) -> list[Any]:
-    """Return what functions of the page's modules return."""
+    """Return the results of functions in the page's modules."""
     done = subprocess.run(
         ["node", str(FOREIGN / "page_functions.mjs")],
         input="".join(json.dumps(call) + "\n" for call in calls),
@@ -68,7 +68,7 @@ def test_saved_values_are_read_by_yaml_as_they_were() -> None:
         name: "double" if type(each) is float else {int: "int", bool: "bool"}.get(type(each), "str")
         for name, each in values.items()
     }
-    # JSON has no infinity: it is set as a text that JavaScript's Number reads.
+    # JSON has no infinity: it is set as a string that JavaScript's Number parses.
     parameters = {"map": [[name, {"type": type_}] for name, type_ in types.items()]}
     given = {"map": [[name, each] for name, each in values.items() if name != "inf"]}
     (text,) = page_functions(("reconfigure", "yamlOf", [parameters, given]))
@@ -135,7 +135,7 @@ def wait_value(page: Page, name: str, value: str) -> None:
 
 
 def enter(page: Page, name: str, text: str) -> None:
-    """Type a value, and leave the field."""
+    """Type a value, and move the focus away."""
     page.type(ROW.format(name) + "input[type=text]", text)
     page.wait("document.activeElement.blur(); return true")
 
@@ -147,7 +147,7 @@ def test_parameters_are_changed_and_corrected_by_the_server(
 ) -> None:
     served, uri, program = lamp(stack)
     page = browse(address(served, "reconfigure"))
-    # The only server is opened; what it is called is on the left, too. The first click there keeps it open.
+    # The only server is opened; its name is on the left, too. The first click there keeps it open.
     page.wait_text("button.server[aria-pressed=true]", "/lamp")
     page.click("button.server", "/lamp")
     page.wait("return location.hash.includes('node=')")
@@ -161,7 +161,7 @@ def test_parameters_are_changed_and_corrected_by_the_server(
         f"return !document.querySelector({json.dumps(ROW.format('brightness') + 'input[type=range]')}).disabled"
     )
 
-    # Limits, slider and field are one line.
+    # Limits, slider and field are on one line.
     control = json.dumps(ROW.format("power") + ".control")
     tops, bottoms = page.evaluate(
         "(boxes => [boxes.map(e => e.top), boxes.map(e => e.bottom)])"
@@ -185,7 +185,7 @@ def test_parameters_are_changed_and_corrected_by_the_server(
     enter(page, "label", "<b>bright</b>")
     lines_until(program, "callback 0")
 
-    # A slider, moved as by keys.
+    # Move the slider with keys.
     page.evaluate(f"document.querySelector({json.dumps(ROW.format('power') + 'input[type=range]')}).focus()")
     for kind in ("rawKeyDown", "keyUp"):
         page.call(
@@ -207,7 +207,7 @@ def test_groups_are_tabs_boxes_and_folds(lamp: Callable[[str], Any], browse: Cal
     page.wait_text("[role=tab]", "Color_Choice")
     page.choose(ROW.format("color") + "select", "1")
     lines_until(program, "callback 64")
-    # The inner group is folded: its state is that of the server.
+    # The inner group is folded: the server's state decides.
     fold = "[data-group=inner] button.fold"
     page.wait(f"return document.querySelector({json.dumps(fold)})?.ariaExpanded === 'false'")
     assert not page.evaluate(
@@ -238,12 +238,12 @@ def test_values_are_saved_and_loaded_by_the_page_and_by_dynparam(
     assert yaml.safe_load(text)["label"] == "from the parameter server"
     assert dynparam("ours", uri, "set", "/lamp", "{'power': 9, 'label': other}")[1] == 0
     wait_value(page, "power", "9")
-    # What the page saved, Debian's dynparam loads.
+    # Debian's dynparam loads the file that the page saved.
     assert dynparam("rospy", uri, "load", "/lamp", str(file)) == ("", 0)
     wait_value(page, "power", "0")
     wait_value(page, "label", "from the parameter server")
 
-    # What Debian's dynparam (and rqt_reconfigure) saves, the page loads.
+    # The page loads a file that Debian's dynparam (or rqt_reconfigure) saved.
     assert dynparam("ours", uri, "set", "/lamp", "{'power': 11, 'label': \"it's\"}")[1] == 0
     assert dynparam("rospy", uri, "dump", "/lamp", str(file))[1] == 0
     assert "python/object" in file.read_text(encoding="utf-8")
@@ -269,7 +269,7 @@ def test_values_are_saved_and_loaded_by_the_page_and_by_dynparam(
 
 
 def load(page: Page, file: Path) -> None:
-    """Choose a file, as in the dialog of the browser."""
+    """Choose a file, as in the browser's dialog."""
     document = page.call("DOM.getDocument")["root"]["nodeId"]
     found = page.call("DOM.querySelector", nodeId=document, selector="input[type=file]")["nodeId"]
     page.call("DOM.setFileInputFiles", files=[str(file)], nodeId=found)

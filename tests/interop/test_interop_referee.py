@@ -1,4 +1,4 @@
-"""The cases of tests/referee under real rospy: what is recorded there is what it prints.
+"""Run the cases of tests/referee under real rospy, and compare the output with the recorded one.
 
 `RECORD=1 pytest tests/interop/test_interop_referee.py` records them again.
 """
@@ -30,7 +30,7 @@ def test_record_is_the_output_of_real_rospy(name: str, real_master: str, tmp_pat
         recorded(name).write_text(said())
     found = ""
     for _ in range(4):
-        # Threads of real rospy's and actionlib's overtake each other on a busy machine, and rarely wait for ever.
+        # Threads of real rospy and actionlib race on a busy machine, and rarely deadlock.
         found = differences(said(), recorded(name).read_text())
         if not found:
             break

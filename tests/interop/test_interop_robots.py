@@ -1,4 +1,4 @@
-"""Debian's programs for robots and frames beside ours: the same transforms, the same words, the same exit statuses.
+"""Debian's programs for robots and frames compared with minirospy's: equal transforms, output and exit statuses.
 
 `RECORD=1 pytest tests/interop/test_interop_robots.py` records tests/core/urdf/check_urdf.json again.
 """
@@ -35,7 +35,7 @@ Numbers = list[float]
 
 
 def command(stack: str, program: str) -> list[str]:
-    """Return the words that run PACKAGE/PROGRAM of a stack."""
+    """Return the command that runs PACKAGE/PROGRAM of a stack."""
     if stack == "ours":
         return [str(OUR_BIN / "rosrun"), *program.split("/")]
     python = [REAL_PYTHON] if program.startswith(PYTHON_PROGRAMS) else []
@@ -43,14 +43,14 @@ def command(stack: str, program: str) -> list[str]:
 
 
 class Programs:
-    """Programs of either stack at one master; all end with the test."""
+    """Programs of either stack at one master; stop them after the test."""
 
     def __init__(self, uri: str, running: ExitStack) -> None:
         self.uri = uri
         self._running = running
 
     def start(self, stack: str, program: str, *words: str) -> subprocess.Popen[str]:
-        """Start PACKAGE/PROGRAM; it runs until the test ends."""
+        """Start PACKAGE/PROGRAM; it runs until the test finishes."""
         process = start([*command(stack, program), *words], self.uri, "ours" if stack == "ours" else "rospy")
         self._running.callback(end, process)
         return process
@@ -63,7 +63,7 @@ class Programs:
 
 
 def end(process: subprocess.Popen[str]) -> None:
-    """End a program that does not read its input."""
+    """Stop a program that does not read stdin."""
     process.terminate()
     stop(process)
 
@@ -101,7 +101,7 @@ STATES: list[dict[str, float]] = [
 
 
 def random_robot(seed: int) -> tuple[str, list[dict[str, float]]]:
-    """Return a description of 30 joints, and states of them."""
+    """Return a description with 30 joints, and states of them."""
     chance = random.Random(seed)
     kinds = ["revolute", "continuous", "prismatic", "fixed", "planar"]
 
@@ -125,7 +125,7 @@ def random_robot(seed: int) -> tuple[str, list[dict[str, float]]]:
 def published(
     programs: Programs, stack: str, *words: str, states: list[dict[str, float]] = STATES
 ) -> list[dict[tuple[str, str], Numbers]]:
-    """Return what a robot_state_publisher makes of STATES, the fixed frames first."""
+    """Return the transforms that a robot_state_publisher publishes for STATES, the fixed frames first."""
     process = programs.start(
         stack, "robot_state_publisher/robot_state_publisher", *words, f"__name:=rsp_{stack}"
     )
@@ -233,7 +233,7 @@ def test_real_publishers_move_our_frames_and_the_reverse(programs: Programs) -> 
 
 
 def until(process: subprocess.Popen[str], pattern: str) -> str:
-    """Return what a program prints, up to a line that matches."""
+    """Return a program's output up to a line that matches."""
     assert process.stdout
     read = ""
     for line in process.stdout:
@@ -244,7 +244,7 @@ def until(process: subprocess.Popen[str], pattern: str) -> str:
 
 
 def masked(text: str) -> str:
-    """Return a text without colours, times, and what differs from run to run."""
+    """Return the text without colours, times and other parts that differ between runs."""
     text = re.sub(r"\x1b\[[\d;]*m", "", text)
     text = re.sub(r"\[ *(INFO|WARN|ERROR|FATAL)\] \[[\d.]+\]", r"[\1]", text)
     text = re.sub(r"\d{10}\.\d+", "TIME", text)
@@ -260,7 +260,7 @@ def words_of(line: str) -> list[str]:
 
 
 def ended(programs: Programs, stack: str, line: str) -> tuple[int, str, str]:
-    """Return how a program ends, and what it says."""
+    """Return a program's exit status and output."""
     program, *words = line.split()
     process = programs.start(stack, program, *words)
     output, errors = process.communicate(timeout=PATIENCE)
@@ -269,7 +269,7 @@ def ended(programs: Programs, stack: str, line: str) -> tuple[int, str, str]:
 
 @pytest.fixture
 def frames(programs: Programs) -> Programs:
-    """Frames a -> b on /tf, b -> c and p -> q on /tf_static."""
+    """Publish the frames a -> b on /tf, b -> c and p -> q on /tf_static."""
     programs.start(
         "real", "tf/static_transform_publisher", *words_of("1 2 3 0.5 0.25 0.1 a b 100"), "__name:=moving"
     )
@@ -312,7 +312,7 @@ def test_delays_are_printed_alike(frames: Programs, line: str) -> None:
         waiting = [first.splitlines()[0].rstrip(". "), first.splitlines()[-1]]
         report: list[str] = []
         while sum(line.startswith("Frame: ") for line in report) < (2 if words else 3):
-            # Not all frames have come yet.
+            # Not all frames have arrived yet.
             until(process, "Frames:")
             report = masked(until(process, "Node: ")).splitlines()
         said.append((waiting, [line for line in report if line.startswith("Frame")]))
@@ -352,7 +352,7 @@ def test_echo_of_tf2_tools_says_the_same(frames: Programs, words: str) -> None:
     line = f"tf2_tools/echo.py {words}"
     found: list[tuple[int, str, str]] = []
     for _ in range(5):
-        # Which frames it has at its first look, which may be its last, is a matter of the moment.
+        # The frames at its first lookup, which may be its last, depend on timing.
         found = [ended(frames, stack, line) for stack in STACKS]
         if found[0] == found[1]:
             break
@@ -368,10 +368,10 @@ def test_frames_are_drawn_alike(frames: Programs, tmp_path: Path, monkeypatch: p
             monkeypatch.chdir(folder)
             graph = ""
             while not all(arrow in graph for arrow in ('"a" -> "b"', '"b" -> "c"', '"p" -> "q"')):
-                # It listens for five seconds, in which a machine that is busy may stand still.
+                # It listens for five seconds, during which a busy machine may stall.
                 frames.start(stack, program).communicate(timeout=PATIENCE)
                 graph = (folder / "frames.gv").read_text(encoding="utf-8")
-            # Frames are in the order in which they came.
+            # Frames are listed in order of arrival.
             lines = masked(graph).splitlines()
             graphs.append(sorted(re.sub(r'}->"[ap]"', '}->"ROOT"', line) for line in lines))
             if stack == "ours":

@@ -1,4 +1,4 @@
-"""`minirospy ros2-bridge` next to real ROS 2: bytes of both ways, late joiners, ends that leave, no loops."""
+"""`minirospy ros2-bridge` with real ROS 2: bytes in both directions, late joiners, endpoints that leave, no loops."""
 
 from __future__ import annotations
 
@@ -40,8 +40,7 @@ from tests.interop.install_ros2 import PYTHON, STAMP
 
 _T = TypeVar("_T")
 HERE = Path(__file__).parent
-LIMIT = 90.0
-"""Seconds after which a wait for a state fails: far more than a busy machine takes."""
+LIMIT = 90.0  # seconds after which waiting for a state fails: far more than a busy machine takes
 
 DOMAIN_PORTS = 28_000
 
@@ -72,7 +71,7 @@ RULES = """
 
 
 class Peer:
-    """ros2_peer.py, in a process of real ROS 2, or another program with the same lines."""
+    """ros2_peer.py in a process of real ROS 2, or another program with the same protocol."""
 
     def __init__(self, environment: dict[str, str], command: Sequence[str] = ()) -> None:
         self._said: queue.Queue[dict[str, Any]] = queue.Queue()
@@ -89,7 +88,7 @@ class Peer:
         self.wait(lambda each: each["op"] == "ready")
 
     def do(self, op: str, topic: str, **fields: Any) -> None:
-        """Do something and wait until it is done."""
+        """Execute an operation and wait until it is done."""
         self.start(op, topic, **fields)
         self.wait(lambda each: (each["op"], each.get("of"), each.get("topic")) == ("done", op, topic))
 
@@ -103,7 +102,7 @@ class Peer:
         return bytes.fromhex(found["data"])[4:]
 
     def answer(self, service: str) -> dict[str, str]:
-        """Return the fields of the next response that a call got."""
+        """Return the fields of the next response to a call."""
         found = self.wait(lambda each: each["op"] == "answer" and each["topic"] == service)
         return dict(found["fields"])
 
@@ -119,7 +118,7 @@ class Peer:
             self._kept.append(each)
 
     def has_said(self, topic: str, data: bytes) -> bool:
-        """Return whether a message has come, after waiting a moment for one; forget those that came."""
+        """Return whether a message arrives within a moment; discard the messages that have arrived."""
         with contextlib.suppress(queue.Empty):
             while True:
                 self._kept.append(self._said.get(timeout=0.5))
@@ -149,7 +148,7 @@ class Peer:
 
 
 class Scene:
-    """A master, the bridge, a node of ROS 1 in this process, a node of ROS 2 in another."""
+    """A master, the bridge, a ROS 1 node in this process, and a ROS 2 node in another."""
 
     def __init__(
         self,
@@ -188,7 +187,7 @@ class Scene:
         self.run(publish())
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], bytes]) -> Any:
-        """Offer a service of ROS 1; ``answer`` may raise ServiceException."""
+        """Offer a ROS 1 service; ``answer`` may raise ServiceException."""
 
         async def handler(request: bytes, _: object) -> bytes:
             return answer(request)
@@ -199,7 +198,7 @@ class Scene:
         return self.run(serve())
 
     def call(self, service: str, type_: str, *requests: bytes) -> list[bytes | BaseException]:
-        """Call a service of ROS 1 so many times at once; return the responses, or what was raised."""
+        """Call a ROS 1 service with several requests in parallel; return the responses or exceptions."""
 
         async def calling() -> list[bytes | BaseException]:
             calls = (call_raw(self.node, service, service_class(type_)._md5sum, each) for each in requests)
@@ -219,7 +218,7 @@ class Scene:
         self.run(handle.close())
 
     def until(self, condition: Callable[[Snapshot], bool]) -> None:
-        """Wait until the graph of ROS 1 is as wanted."""
+        """Wait until the ROS 1 graph fulfils a condition."""
 
         async def wait() -> None:
             while not condition(await fetch(self.node._node.master)):
@@ -229,7 +228,7 @@ class Scene:
 
 
 def reserved_domain(parts: contextlib.ExitStack) -> str:
-    """Return a domain of ROS 2 that no other test on this machine has until ``parts`` are closed: a port reserves it."""
+    """Return a ROS 2 domain that no other test on this machine uses until ``parts`` is closed: a bound port reserves it."""
     for number in range(1, 101):
         sock = parts.enter_context(socket.socket())
         with contextlib.suppress(OSError):
@@ -246,12 +245,12 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Scene]:
 
 @contextlib.contextmanager
 def running_scene(folder: Path) -> Iterator[tuple[Scene, subprocess.Popen[bytes]]]:
-    """Run a scene with a bridge, which ends without an error."""
+    """Run a scene with a bridge; assert that the bridge exits without an error."""
     with contextlib.ExitStack() as parts:
         uri = parts.enter_context(running_master("ours"))
         domain = reserved_domain(parts)
         environment = {
-            # With minirospy's packages of ROS 1 on it, those of ROS 2 could not be imported.
+            # With minirospy's ROS 1 packages on the path, those of ROS 2 could not be imported.
             **{name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
             "ROS_MASTER_URI": uri,
             "ROS_DOMAIN_ID": domain,
@@ -272,7 +271,7 @@ def running_scene(folder: Path) -> Iterator[tuple[Scene, subprocess.Popen[bytes]
 
 
 def sample(type_: str) -> bytes:
-    """Return a message of ROS 1 with something in it."""
+    """Return a ROS 1 message with non-default values."""
     message = message_class(type_)()
     _fill(message, 1)
     buffer = BytesIO()
@@ -324,7 +323,7 @@ def test_messages_are_those_that_rosbags_converts(scene: Scene) -> None:
         # DDS pads to four bytes.
         assert scene.peer.message(topic) == cdr[4:] + bytes(-len(cdr) % 4), topic
 
-    # A subscription that nothing refers to ends.
+    # rclpy destroys a subscription to which nothing refers.
     subscriptions = []
     back: list[tuple[str, queue.Queue[bytes], bytes]] = []
     for type_, (name, _, cdr) in zip(TYPES, there, strict=True):
@@ -384,20 +383,20 @@ def test_no_message_comes_back_where_both_sides_publish_and_subscribe(scene: Sce
     publisher = scene.advertise(topic, "std_msgs/Int8")
     subscription, came = scene.subscribe(topic)
     scene.peer.do("subscribe", topic, type="std_msgs/Int8")
-    # Its publisher is there with its own subscriber alone.
+    # Its publisher is connected to its own subscriber only.
     scene.peer.do("publish", topic, type="std_msgs/Int8", data="0001000007")
     scene.until(
         lambda graph: bridge in graph.subscribers.get(topic, ()) and bridge in graph.publishers.get(topic, ())
     )
 
-    # Both directions work, whichever messages were sent before they did.
+    # Wait until both directions work; ignore the messages that were sent before.
     _until_received(
         came, b"\1", lambda: scene.peer.do("publish", topic, type="std_msgs/Int8", data="0001000001")
     )
     while not scene.peer.has_said(topic, b"\2"):
         scene.publish(publisher, b"\2")
 
-    # One more from each side, and then a last one: what came between them came once.
+    # Send one more from each side, and then a last one: each message in between arrived once.
     scene.publish(publisher, b"\3")
     scene.publish(publisher, b"\4")
     received = []
@@ -410,13 +409,13 @@ def test_no_message_comes_back_where_both_sides_publish_and_subscribe(scene: Sce
     while not values or values[-1] != 6:
         values.append(came.get(timeout=LIMIT)[0])
     assert values.count(5) == 1
-    # What ROS 1 sent came to its own subscriber directly, and not again from ROS 2.
+    # Messages from ROS 1 reached its own subscriber directly, and not again from ROS 2.
     assert values.count(3) <= 1
     scene.end(subscription)
 
 
 def _until_received(came: queue.Queue[bytes], value: bytes, send: Callable[[], None]) -> None:
-    """Send until it is received: before the ends are connected, nothing is."""
+    """Send repeatedly until the value is received: messages that are sent before the endpoints are connected are lost."""
     while True:
         send()
         with contextlib.suppress(queue.Empty):
@@ -447,7 +446,7 @@ def test_messages_of_a_best_effort_publisher_come(scene: Scene) -> None:
     data = sample("sensor_msgs/Imu")
     cdr = bytes(get_typestore(Stores.ROS2_JAZZY).ros1_to_cdr(data, "sensor_msgs/msg/Imu"))
     subscription, came = scene.subscribe("/imu")
-    # The first of them may be lost.
+    # The first messages may be lost.
     publish = partial(
         scene.peer.do, "publish", "/imu", type="sensor_msgs/Imu", reliable=False, data=cdr.hex()
     )
@@ -505,7 +504,7 @@ rclpy.spin(node)
     found = b""
     while b"/motor" not in found:
         found = scene.peer.message("/rosout")
-    # After the time: ERROR is 40 in ROS 2.
+    # The level follows the time: ERROR is 40 in ROS 2.
     assert found[8] == 40
     assert b"it is hot" in found
     scene.end(publisher)
@@ -536,8 +535,8 @@ def test_list_shows_pairs_and_reasons(scene: Scene) -> None:
 
 # --- services
 
+# A service with a string in its request, and a string next to ``success`` in its response.
 ADD = "diagnostic_msgs/AddDiagnostics"
-"""A service with a text in its request, and a text beside ``success`` in its response."""
 
 
 def text(value: str) -> bytes:
@@ -560,7 +559,7 @@ def test_a_server_of_ros2_is_called_from_ros1(scene: Scene) -> None:
 
 
 def test_the_first_call_waits_until_the_server_has_found_the_bridge(scene: Scene, tmp_path: Path) -> None:
-    """rmw_fastrtps drops the response to a client whose reader it has not found."""
+    """rmw_fastrtps drops the response to a client whose reader it has not discovered."""
     compiler = shutil.which("cc")
     if compiler is None:
         pytest.skip("needs a C compiler")
@@ -571,7 +570,7 @@ def test_the_first_call_waits_until_the_server_has_found_the_bridge(scene: Scene
     environment = {**scene.environment, **{name: str(value) for name, value in late.items()}}
     other = Peer(environment, [str(PYTHON), str(HERE / "ros2_peer.py"), "late_peer"])
     try:
-        # The two processes know each other; what is new is the client of one more service.
+        # The two processes have discovered each other; only the client of one more service is new.
         other.do("serve", "/early", type=ADD, fields={"success": True})
         scene.until(lambda graph: "/early" in graph.services)
         assert scene.call("/early", ADD, text("a")) == [b"\1" + text("")]
@@ -623,7 +622,7 @@ def test_a_server_of_ros1_is_called_from_ros2(scene: Scene) -> None:
     scene.peer.do("call", "/back", type=ADD, fields=[{"load_namespace": number} for number in numbers])
     assert {scene.peer.answer("/back")["message"] for _ in numbers} == {f"got {each}" for each in numbers}
 
-    # A response with a place for it names the reason.
+    # A response with a string field reports the reason.
     scene.peer.do("call", "/back", type=ADD, fields=[{"load_namespace": "bad"}])
     refused = scene.peer.answer("/back")
     assert refused["success"] == "False"
@@ -658,7 +657,7 @@ def test_a_service_with_nested_types_passes_byte_by_byte(scene: Scene) -> None:
 
     server = scene.serve("/plan", "nav_msgs/GetPlan", answer)
     cdr = bytes(store.ros1_to_cdr(pose, "geometry_msgs/msg/PoseStamped"))
-    # Two poses: the second follows where the first has ended, aligned to a float64.
+    # Two poses: the second follows the end of the first, aligned to a float64.
     two = cdr + bytes(-(len(cdr) - 4) % 4) + cdr[4:] + bytes(-(len(cdr) - 4) % 4) + b"\0\0\0\x3f"
     scene.peer.do("call_raw", "/plan", type="nav_msgs/GetPlan", data=two.hex())
     found = scene.peer.wait(lambda each: each["op"] == "answer")
@@ -750,7 +749,7 @@ def test_goals_of_ros1_reach_a_server_of_ros2(scene: Scene) -> None:
         async with ActionClient(scene.node, "/wait", FibonacciAction) as client:
             await client.wait_for_server()
             goal = client.send(FibonacciGoal(order=3))
-            # It is at work.
+            # The goal is active.
             async for feedback in goal:
                 if len(feedback.sequence) == 3:
                     break
@@ -765,7 +764,7 @@ def test_goals_of_ros1_reach_a_server_of_ros2(scene: Scene) -> None:
 
 
 async def ended(goal: Any) -> tuple[GoalState, list[int]]:
-    """Return how a goal has ended that was not reached."""
+    """Return the final state and the feedback of a goal that was not reached."""
     with pytest.raises(GoalError) as caught:
         await goal
     return caught.value.state, list(getattr(caught.value.result, "sequence", []))
@@ -833,7 +832,7 @@ def test_goals_of_ros2_reach_a_server_of_ros1(scene: Scene) -> None:
         return found["status"], found["data"]
 
     server = scene.run(start())
-    # Of a goal that is at work all feedback comes; rclpy drops what it has not read when the result comes.
+    # All feedback of an active goal arrives; rclpy drops feedback that it has not read when the result arrives.
     assert end_of(7, is_cancelled=True) == (5, list(range(7)))
     assert end_of(5) == (4, [0, 1, 2, 3, 4])
     assert end_of(-1) == (0, [])
@@ -859,7 +858,7 @@ def test_a_goal_of_ros2_is_aborted_when_the_bridge_ends(tmp_path: Path) -> None:
         assert scene.peer.wait(lambda each: each["op"] == "feedback")["data"] == [1]
         bridge.terminate()
         assert scene.peer.wait(lambda each: each["op"] == "end")["status"] == 6
-        # Not interrupted a second time while it ends.
+        # It is not interrupted a second time during shutdown.
         assert bridge.wait(LIMIT) == 0
 
 
@@ -877,7 +876,7 @@ def example(name: str, folder: Path) -> str:
 
 
 def command(name: str) -> list[str]:
-    """Return the words of a command that docs/ros2.md has in a line of its own."""
+    """Return the command that docs/ros2.md has on a separate line."""
     page = (HERE.parents[1] / "docs" / "ros2.md").read_text(encoding="utf-8")
     (line,) = [line for line in page.split("\n") if line.startswith(f"    {name}")]
     words = shlex.split(line)
@@ -889,7 +888,7 @@ def running(words: list[str], environment: dict[str, str]) -> Iterator[subproces
     program = subprocess.Popen(
         words, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     )
-    # A program that says nothing ends a wait for its line.
+    # Killing a program that prints nothing ends the wait for its line.
     limit = threading.Timer(LIMIT, program.kill)
     limit.start()
     with program:

@@ -1,4 +1,4 @@
-"""`minirospy ros2-bridge --zenoh` with two independent implementations of what rmw_zenoh speaks: pyzeros, zenoh-ros2-sdk."""
+"""`minirospy ros2-bridge --zenoh` with two independent implementations of rmw_zenoh's protocol: pyzeros, zenoh-ros2-sdk."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ TYPES = [
 
 
 class ZenohScene(Scene):
-    """A scene with the router of `minirospy fleet router` and the bridge, and where the router listens."""
+    """A scene with `minirospy fleet router`, the bridge, and the router's endpoint."""
 
     endpoint = ""
 
@@ -133,12 +133,12 @@ def test_numbers_and_texts_pass_both_ways(scene: ZenohScene, request: pytest.Fix
 
 
 def said(peer: Peer, topic: str) -> Any:
-    """Return the value of the next message of a topic, as zenoh-ros2-sdk says it."""
+    """Return the value of a topic's next message, as zenoh-ros2-sdk prints it."""
     return peer.wait(lambda each: each["op"] == "message" and each["topic"] == topic)["value"]
 
 
 def test_who_joins_later_gets_what_was_latched(scene: ZenohScene, request: pytest.FixtureRequest) -> None:
-    # pyzeros refuses transient local.
+    # pyzeros does not support transient local.
     only(scene, "sdk", request)
     publisher = scene.advertise("/late", "std_msgs/String", latch=True)
     scene.publish(publisher, b"\4\0\0\0kept")
@@ -166,7 +166,7 @@ def test_messages_are_not_sent_back(scene: ZenohScene, request: pytest.FixtureRe
     scene.peer.do("publish", "/both", type="std_msgs/String", data="00010000020000006400")
     assert came.get(timeout=LIMIT) == b"\1\0\0\0d"
     assert scene.peer.message("/both") == b"\2\0\0\0d\0"
-    # Another message follows on each side: nothing came twice.
+    # Another message follows on each side: nothing arrived twice.
     scene.publish(publisher, b"\1\0\0\0c")
     assert scene.peer.message("/both") == b"\2\0\0\0c\0"
     assert came.get(timeout=LIMIT) == b"\1\0\0\0c"

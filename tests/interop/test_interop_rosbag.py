@@ -1,4 +1,4 @@
-"""Debian's rosbag and roslz4 beside ours, both ways: each reads what the other writes, and prints the same about it."""
+"""Debian's rosbag and roslz4 compared with minirospy's, in both directions: each reads the other's files and prints the same."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def peer(stack: str, verb: str, folder: Path) -> str:
-    """Run bag_peer.py with the Python of a stack; return what it prints."""
+    """Run bag_peer.py with the Python of a stack; return its output."""
     done = subprocess.run(
         [PYTHONS[stack], "-W", "ignore", str(PEER), verb, folder.name],
         cwd=folder.parent, capture_output=True, text=True, timeout=PATIENCE, check=False,
@@ -36,7 +36,7 @@ def peer(stack: str, verb: str, folder: Path) -> str:
 
 
 def rosbag(stack: str, folder: Path, *words: str) -> tuple[int, str, str]:
-    """Run the command of a stack in a folder; return exit status, output, errors of ROS's."""
+    """Run a stack's rosbag in a folder; return exit status, stdout and ROS's errors."""
     done = subprocess.run(
         [str(BINS[stack] / "rosbag"), *words],
         cwd=folder,
@@ -57,7 +57,7 @@ def as_read(stack: str, folder: Path) -> dict[str, dict[str, Any]]:
 
 @pytest.fixture(params=["ours", "real"])
 def bags(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
-    """Return a folder of bags, written by either."""
+    """Return a folder of bags, written by either stack."""
     folder = tmp_path / "bags"
     folder.mkdir()
     peer(request.param, "write", folder)
@@ -81,7 +81,7 @@ def test_both_write_the_same_bytes(bags: Path, tmp_path: Path) -> None:
 
     for name in ("copy_none.bag", "copy_bz2.bag"):
         assert (bags / name).read_bytes() == (other / name).read_bytes()
-    # Of LZ4 there are many right encodings.
+    # LZ4 allows many valid encodings.
     for folder in (bags, other):
         assert rosbag("real", folder, "decompress", "-q", "copy_lz4.bag")[0] == 0
     assert (bags / "copy_lz4.bag").read_bytes() == (other / "copy_lz4.bag").read_bytes()

@@ -1,4 +1,4 @@
-"""The recorder and the player beside C++ `rosbag record` and `rosbag play`: the same bags, the same messages, both ways."""
+"""minirospy's recorder and player with C++ `rosbag record` and `rosbag play`: the same bags and messages, in both directions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ pytestmark = pytest.mark.skipif(
 
 
 class Stored(NamedTuple):
-    """What a bag says of a message, but for its time."""
+    """A bag's record of a message, without its time."""
 
     topic: str
     type: str
@@ -42,7 +42,7 @@ class Stored(NamedTuple):
 
 
 def stored(path: Path) -> list[Stored]:
-    """Return the messages of a bag, sorted: two recorders receive those of two publishers in any order."""
+    """Return a bag's messages, sorted: two recorders receive two publishers' messages in any order."""
     with Reader(path) as reader:
         return sorted(
             Stored(
@@ -58,7 +58,7 @@ def stored(path: Path) -> list[Stored]:
 
 
 def order(path: Path) -> dict[str, list[bytes]]:
-    """Return the messages of each topic of a bag in the order of their times."""
+    """Return topic -> the messages in order of time."""
     found: dict[str, list[bytes]] = {}
     with Reader(path) as reader:
         for connection, _, body in reader.messages():
@@ -71,7 +71,7 @@ Run = Callable[..., "subprocess.Popen[str]"]
 
 @pytest.fixture
 def run(master: str, tmp_path: Path) -> Iterator[Run]:
-    """Return a function that starts `rosbag record` or `play`, ours or the C++ one, in tmp_path."""
+    """Return a function that starts `rosbag record` or `play`, minirospy's or the C++ one, in tmp_path."""
     started: list[subprocess.Popen[str]] = []
 
     def run(stack: str, verb: str, *words: str) -> subprocess.Popen[str]:
@@ -113,7 +113,7 @@ def finish(process: subprocess.Popen[str]) -> tuple[str, str]:
 
 
 def holds(path: Path, text: bytes) -> None:
-    """Wait until a recording with ``--chunksize 0`` has this text."""
+    """Wait until a recording with ``--chunksize 0`` contains this text."""
     active = Path(f"{path}.active")
     wait_until(lambda: active.exists() and text in active.read_bytes())
 
@@ -146,7 +146,7 @@ def test_both_recorders_record_the_same(talkers: tuple[Talker, Talker], run: Run
 def test_a_type_that_comes_later_is_recorded(
     talkers: tuple[Talker, Talker], run: Run, tmp_path: Path
 ) -> None:
-    """Not so by the C++ one: roscpp takes the md5sum of its first connection for all later ones of the topic."""
+    """C++ rosbag does not: roscpp uses the md5sum of its first connection for all later ones of the topic."""
     one, two = talkers
     texts = one.advertise("/mixed")
     recorder = run("ours", "record", "--chunksize", "0", "-O", "ours", "/mixed")
@@ -200,7 +200,7 @@ def test_split_files_are_played_by_ros(talkers: tuple[Talker, Talker], run: Run,
     assert again.stdout
     while "Subscribing" not in again.stdout.readline():
         pass
-    # It stays: a player that ends takes with it what a subscriber has not read.
+    # Keep the player running (-k): when a player exits, messages that a subscriber has not read are lost.
     player = run("cpp", "play", "-k", *parts, "--wait-for-subscribers", "/chatter:=/again")
     again.communicate(timeout=PATIENCE)
     finish(player)
@@ -220,7 +220,7 @@ def test_ros_reindexes_a_killed_recording(talkers: tuple[Talker, Talker], run: R
     recorder.kill()
     recorder.wait()
     killed = active.rename(tmp_path / "killed.bag")
-    # The end of a file that a power cut has left.
+    # The end of a file after a power cut.
     with killed.open("r+b") as stream:
         stream.truncate(killed.stat().st_size - 5)
 
@@ -233,7 +233,7 @@ def test_ros_reindexes_a_killed_recording(talkers: tuple[Talker, Talker], run: R
 
 
 def make_bag(path: Path) -> None:
-    """Write a bag of two publishers on a topic, one latched topic, and irregular times."""
+    """Write a bag with two publishers of a topic, one latched topic, and irregular times."""
     with path.open("wb") as stream:
         writer = BagWriter(stream)
         numbers = [
@@ -266,11 +266,11 @@ def test_what_is_played_is_recorded(player: str, recorder: str, run: Run, tmp_pa
     make_bag(tmp_path / "in.bag")
     recording = run(recorder, "record", "--chunksize", "0", "-O", "out", "/chatter", "/map")
     start = time.monotonic()
-    # It stays: a player that ends takes with it what a subscriber has not read.
+    # Keep the player running (-k): when a player exits, messages that a subscriber has not read are lost.
     playing = run(player, "play", "-k", "in.bag", "-d", "1", "--wait-for-subscribers")
     for text in (b"59x", b"30x"):
         holds(tmp_path / "out.bag", text)
-    # A machine that stalls makes it longer, and single distances of what is recorded longer or shorter.
+    # A stalled machine makes it longer, and single intervals of the recording longer or shorter.
     assert time.monotonic() - start > 59**2 / 3000
     output, errors = finish(playing)
     assert output.replace("\r", "\n").splitlines()[-1].startswith(" [RUNNING]  Bag Time:   100")
@@ -278,7 +278,7 @@ def test_what_is_played_is_recorded(player: str, recorder: str, run: Run, tmp_pa
     finish(recording)
 
     before, after = stored(tmp_path / "in.bag"), stored(tmp_path / "out.bag")
-    # One node publishes what several did.
+    # One node publishes the messages of several.
     assert sorted(one._replace(callerid="") for one in before) == [one._replace(callerid="") for one in after]
     assert len({one.callerid for one in after}) == 1
     assert order(tmp_path / "out.bag") == order(tmp_path / "in.bag")

@@ -1,6 +1,6 @@
-"""roslibpy and roslib.js, rosbridge's clients in Python and JavaScript, with the bridge.
+"""The bridge with roslibpy and roslib.js, rosbridge's clients in Python and JavaScript.
 
-roslibpy brings twisted and autobahn: it is installed once into a separate environment, in the user's cache folder.
+roslibpy needs twisted and autobahn: it is installed once into a separate environment, in the user's cache folder.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ def roslibpy_python() -> str:
     python = place / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     if not python.exists():
         cache.mkdir(parents=True, exist_ok=True)
-        # Others may make it at the same time: each makes its own, and the first to finish leaves it in its place.
+        # Other workers may create it at the same time: each creates its own, and the first to finish moves it into
+        # place.
         made = Path(tempfile.mkdtemp(dir=cache))
         subprocess.run([sys.executable, "-m", "venv", made], check=True, timeout=120)
         inner = made / python.relative_to(place)
@@ -65,7 +66,7 @@ def roslibpy_python() -> str:
 
 
 async def serve(node: Node) -> list[Any]:
-    """Offer what the peer wants."""
+    """Offer the topics, services and actions that the peer uses."""
 
     async def execute(goal: Any) -> dict[str, Any]:
         return {"sequence": list(range(goal.request.order))}
@@ -146,7 +147,7 @@ def test_roslibpy_uses_all_that_the_bridge_offers(master: str, roslibpy_python: 
 
 
 async def line_of(peer: asyncio.subprocess.Process) -> Any:
-    """Return the next JSON that a program prints."""
+    """Return the next JSON line that a program prints."""
     assert peer.stdout
     assert peer.stderr
     line = await asyncio.wait_for(peer.stdout.readline(), PATIENCE)
@@ -156,7 +157,7 @@ async def line_of(peer: asyncio.subprocess.Process) -> Any:
 
 
 async def end(peer: asyncio.subprocess.Process) -> None:
-    """End a program."""
+    """Stop a program."""
     peer.kill()
     await peer.communicate()
 

@@ -1,7 +1,7 @@
 # ruff: noqa: E501
-"""roslaunch of both, on the same files; our roslaunch with a real one on the "other" machine, and a real sshd.
+"""roslaunch of both stacks on the same files; minirospy's roslaunch with a real one on the "other" machine, and a real sshd.
 
-What the files say is compared in depth by the case launch_files of tests/referee.
+The case launch_files of tests/referee compares the interpretation of the files in depth.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def say(stack: str, *words: str) -> tuple[int, str]:
 def test_roslaunch_options_print_the_same_without_running(package: Path, words: list[str]) -> None:
     words = [*words, str(package / "outer.launch"), "need:=5"]
     (real_status, real), (status, ours) = say("rospy", *words), say("ours", *words)
-    # Ours runs Python programs in its own interpreter.
+    # minirospy runs Python programs in its own interpreter.
     ours = ours.replace(f"{OUR_BIN / 'python'} ", "")
     assert (status, sorted(ours.splitlines())) == (real_status, sorted(real.splitlines()))
 
@@ -107,7 +107,7 @@ def end(process: subprocess.Popen[str]) -> str:
 
 
 def test_remote_node_by_a_real_roslaunch_child(package: Path, real_master: str, tmp_path: Path) -> None:
-    """It takes our calls, and we take its."""
+    """Each accepts the other's calls."""
     folder = tmp_path / "bin"
     folder.mkdir()
     ssh = folder / "ssh"
@@ -127,7 +127,7 @@ def test_remote_node_by_a_real_roslaunch_child(package: Path, real_master: str, 
 
 @pytest.mark.skipif(os.name != "posix" or not shutil.which("sshd", path="/usr/sbin"), reason="no sshd")
 def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path: Path) -> None:
-    """With a key, to a port of the sshd's own; a user's name that is not ours would be another machine."""
+    """With a key, to the sshd's port; another user name would mean another machine."""
     for name in ("host", "user"):
         subprocess.run(
             ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(tmp_path / name)], check=True
@@ -140,7 +140,7 @@ def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path:
     )
     os.makedirs("/run/sshd", exist_ok=True)
     server = subprocess.Popen(["/usr/sbin/sshd", "-D", "-f", str(config)], stderr=subprocess.PIPE, text=True)
-    # ssh as a user types it, with a key and a list of known hosts that are not theirs.
+    # The ssh command as a user types it, with a key and known hosts that are not the user's own.
     folder = tmp_path / "bin"
     folder.mkdir()
     ssh = folder / "ssh"
@@ -159,13 +159,13 @@ def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path:
         f'<machine name="m" address="{name}" ssh-port="{port}" env-loader="{loader}" timeout="{PATIENCE}"/>'
         '<node machine="m" name="a" pkg="pkg" type="wait.py"/>'
     )
-    # A name that only this ssh knows: so it is not this machine.
+    # A host name that only this ssh resolves, so that it does not count as this machine.
     ssh.write_text(
         ssh.read_text().replace("-l root", f"-l root -o HostName=127.0.0.1 -o HostKeyAlias={name}")
     )
 
     try:
-        # A connection that is refused would be another error than that of an unknown key.
+        # A refused connection would be a different error from an unknown key.
         wait_until(lambda: listens(port))
         process = launch(text, package, real_master, PATH=f"{folder}:{os.environ['PATH']}")
         refused, _ = process.communicate(timeout=PATIENCE)

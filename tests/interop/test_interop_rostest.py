@@ -1,4 +1,4 @@
-"""rostest, rosunit and catkin_test_results beside the real ones, on one package and its .test files."""
+"""rostest, rosunit and catkin_test_results compared with the real ones, on one package and its .test files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Case = tuple[str, str, tuple[str, ...]]
 
 
 class Ran:
-    """A command of real ROS or of ours, in a separate ROS_HOME; both run at the same time."""
+    """A command of real ROS or minirospy, with a separate ROS_HOME; both run at the same time."""
 
     def __init__(self, stack: str, home: Path, *command: str) -> None:
         self.home = home
@@ -52,19 +52,19 @@ class Ran:
         )
 
     def end(self) -> tuple[int, str]:
-        """Return the exit status, and what was printed, without what no two runs have in common."""
+        """Return the exit status and the output, without parts that differ between runs."""
         if not self._popen.stdout.closed:  # type: ignore[union-attr]
             self._out = self._popen.communicate(timeout=PATIENCE)[0].replace(str(self.home), "HOME")
         return self._popen.returncode, self._out
 
     def cases(self) -> dict[str, list[Case]]:
-        """File of results -> (class, name, (kind and type of each fault, ...)) of its cases."""
+        """Return result file -> (class, name, (kind and type of each fault, ...)) of its cases."""
         found = {}
         for file in (self.home / "test_results").rglob("*.xml"):
             try:
                 root = ElementTree.parse(file).getroot()
             except ElementTree.ParseError:
-                # Real rosunit leaves an empty file where the time was over.
+                # Real rosunit leaves an empty file after a timeout.
                 continue
             found[str(file.relative_to(self.home))] = [
                 (
@@ -82,14 +82,14 @@ def both(tmp_path: Path, *command: str) -> tuple[Ran, Ran]:
 
 
 def summary(text: str) -> list[str]:
-    """Return the lines that say how it went: without tracebacks, and the files of the log."""
+    """Return the lines of the summary, without tracebacks and log files."""
     wanted = re.compile(r"\[Testcase:|\[\w+\]-|\[[\w./-]+\]\[|SUMMARY|.*\* |ERROR: The following")
     return [line.rstrip("-") for line in text.splitlines() if wanted.match(line)]
 
 
 @pytest.fixture(scope="module")
 def rostests(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tuple[Ran, Ran]]]:
-    """rostest of each file, all at the same time: they wait more than they work."""
+    """Run rostest on every file, all at the same time: the tests wait more than they compute."""
     started = {
         file: both(tmp_path_factory.mktemp("rostest"), "rostest", "tested", file, "limit:=1.0")
         for file in FILES
@@ -139,7 +139,7 @@ def test_catkin_test_results(tmp_path: Path) -> None:
 
 
 def test_rospack_depends_of_the_packages_of_ros(tmp_path: Path) -> None:
-    """As far as they are here: ours name no package of C++."""
+    """Compare the packages that exist here: minirospy's do not depend on C++ packages."""
     known = {path.name for path in (ROOT / "minirospy" / "ros").iterdir()}
     known |= {path.name for path in (ROOT / "msgs").iterdir()}
     names = ("actionlib", "rosmsg", "rospy", "rostest")

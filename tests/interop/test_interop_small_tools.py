@@ -1,4 +1,4 @@
-"""rosrun, rosversion, rosclean, rosconsole and rosgraph beside the real ones: the same folders, the same node."""
+"""rosrun, rosversion, rosclean, rosconsole and rosgraph compared with the real ones: the same folders, the same node."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ rospy.spin()
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a package with programs, and a log folder."""
+    """Return the folder of a package with programs, and of a log folder."""
     package = tmp_path / "src" / "my"
     programs = {
         "scripts/status": '#!/bin/sh\necho "$@"\nexit 7\n',
@@ -47,7 +47,7 @@ def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def run(program: str, *words: str, stdin: str = "", path: Path = OUR_BIN) -> tuple[int, str]:
-    """Return the exit status of a command, and what it prints on standard output."""
+    """Return a command's exit status and its stdout."""
     done = subprocess.run(
         [str(path / program), *words], input=stdin, capture_output=True, text=True, timeout=PATIENCE, check=False,
         env={**os.environ, "PYTHONWARNINGS": "ignore"},
@@ -56,7 +56,7 @@ def run(program: str, *words: str, stdin: str = "", path: Path = OUR_BIN) -> tup
 
 
 def both(program: str, *words: str, stdin: str = "") -> tuple[tuple[int, str], tuple[int, str]]:
-    """Return the same from ours and from the real one."""
+    """Return the results of minirospy and of the real one."""
     ours, real = (run(program, *words, stdin=stdin, path=path) for path in (OUR_BIN, REAL_BIN))
     return ours, real
 
@@ -66,7 +66,7 @@ def test_rosrun(workspace: Path) -> None:
                   ["--prefix", "echo in front", "my", "status", "x"]):  # fmt: skip
         ours, real = both("rosrun", *words)
         assert ours == real, words
-    # /usr/lib/topic_tools/relay
+    # It runs /usr/lib/topic_tools/relay.
     ours, real = both("rosrun", "topic_tools", "relay")
     assert ours == real
     assert "usage: relay" in ours[1]
@@ -88,7 +88,7 @@ def test_rosversion_of_the_packages_that_both_bring_along() -> None:
     )
     both_have = ours.keys() & real.keys()
     assert {"std_msgs", "sensor_msgs", "roscpp", "catkin"} <= both_have
-    # ros_comm is that of the end of Noetic, and one release throughout.
+    # ros_comm has the last version of Noetic, the same for all packages.
     assert {name: ours[name] for name in both_have} == {
         name: "1.17.0" if real[name] == real["rosmaster"] else real[name] for name in both_have
     }
@@ -124,7 +124,7 @@ def test_rosclean(workspace: Path) -> None:
 
 @pytest.fixture
 def talker(real_master: str) -> Iterator[str]:
-    """Start a node of real rospy."""
+    """Run a node of real rospy."""
     with subprocess.Popen(
         [REAL_PYTHON, "-c", _NODE], stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
         env={**os.environ, "ROS_MASTER_URI": real_master, "PYTHONWARNINGS": "ignore"},
@@ -146,7 +146,7 @@ def test_rosconsole(talker: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_rosgraph(talker: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The real one never ends, and has no order: one round of it, as a set of lines."""
+    """The real one never exits, and has no order: compare one round as a set of lines."""
     monkeypatch.setenv("ROS_MASTER_URI", talker)
     monkeypatch.setenv("PYTHONUNBUFFERED", "1")
     _, ours = run("rosgraph", "--once")

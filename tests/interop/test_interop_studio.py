@@ -1,4 +1,4 @@
-"""Foxglove Studio itself in Debian's chromium, as npm has its last open source version: the graph by the bridge."""
+"""Foxglove Studio in Debian's chromium, in its last open source version on npm: it shows the graph by the bridge."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class _Files(SimpleHTTPRequestHandler):
         return super().translate_path(path)
 
     def log_message(self, format: str, *args: object) -> None:
-        """Print nothing."""
+        """Suppress the log."""
 
 
 @pytest.fixture
@@ -104,13 +104,12 @@ def studio(modules: Path) -> Iterator[Callable[[str, str], Page]]:
 
 
 class Robot:
-    """A node with what the panels show, and what they publish."""
+    """A node that publishes for the panels, and subscribes to what they publish."""
 
     def __init__(self, bridge: Running) -> None:
         self._bridge = bridge
         self._node = bridge.node("robot")
-        self.heard = ""
-        """The text of the last message of /from_studio."""
+        self.heard = ""  # string of the last message of /from_studio
 
     def start(self) -> None:
         self._bridge.run(self._start())
@@ -158,7 +157,7 @@ class Robot:
 
 @pytest.fixture
 def bridge(run_bridge: Callable[..., Running]) -> Running:
-    """Return a bridge with what the command starts by default."""
+    """Return a bridge with the endpoints that the command starts by default."""
     return run_bridge(rosapi=True)
 
 
@@ -179,7 +178,7 @@ def wait_for(condition: Callable[[], bool]) -> None:
 
 
 def count(page: Page, tmp_path: Path, color: tuple[int, int, int]) -> int:
-    """Return how many pixels of what is seen have a colour, more or less."""
+    """Return how many visible pixels have approximately this colour."""
     path = tmp_path / "seen.png"
     page.screenshot(path)
     with PIL.Image.open(path) as seen:
@@ -188,7 +187,7 @@ def count(page: Page, tmp_path: Path, color: tuple[int, int, int]) -> int:
 
 
 def look(page: Page, robot: Robot, tmp_path: Path) -> None:
-    """Check what each panel shows, and publish from one."""
+    """Check each panel, and publish from one."""
     page.wait_text("*", "it works")
     page.wait_text("*", "the battery is low")
     wait_for(lambda: count(page, tmp_path, PINK) > 5000)

@@ -1,4 +1,4 @@
-"""docs/compatibility/rospy.md and its kin are up to date with real ROS and ours; nothing is missing."""
+"""docs/compatibility/rospy.md and similar pages match real ROS and minirospy; nothing is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""tf2 and tf against Debian's: the same questions to both, and transforms on the wire between ours and roscpp's."""
+"""tf2 and tf compared with Debian's: the same queries to both, and transforms on the wire between minirospy and roscpp."""
 
 from __future__ import annotations
 
@@ -52,8 +52,7 @@ for line in sys.stdin:
     where, turn, stamp = found.transform.translation, found.transform.rotation, found.header.stamp
     print(stamp.secs, stamp.nsecs, where.x, where.y, where.z, turn.x, turn.y, turn.z, turn.w, flush=True)
 """
-START = 1_700_000_000
-"""Seconds: there, a float of seconds does not hold nanoseconds."""
+START = 1_700_000_000  # seconds: at this size, a float of seconds does not resolve nanoseconds
 
 
 @pytest.mark.parametrize("lazily", [False, True], ids=["inserted", "as_bytes"])
@@ -99,12 +98,12 @@ def test_transformations_return_what_the_real_module_returns() -> None:
 
 @pytest.fixture(scope="module")
 def tf_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """tf_peer.cpp, compiled."""
+    """Return the compiled tf_peer.cpp."""
     return compiled("tf_peer.cpp", tmp_path_factory, "tf2_ros")
 
 
 class Peer:
-    """A program that answers each line by a line."""
+    """A program that answers each line with a line."""
 
     def __init__(self, program: subprocess.Popen[str]) -> None:
         self._program = program
@@ -124,7 +123,7 @@ class Peer:
 
 @contextmanager
 def running(stack: str, role: str, program: Path, uri: str) -> Iterator[Peer]:
-    """Run a peer of ours or of roscpp."""
+    """Run a peer of minirospy or of roscpp."""
     command = [str(program), role] if stack == "roscpp" else [sys.executable, "-c", OUR_PEER, role]
     started = start(command, uri, "ours" if stack == "ours" else "roscpp")
     try:
@@ -150,7 +149,7 @@ def test_transforms_between_ours_and_roscpp(
     ):
         send.ask(1, "map", "world", 0, 0, *pose())
         send.ask(1, "wrist", "hand", 0, 0, *pose())
-        # Until both listeners are connected to /tf.
+        # Repeat until both listeners are connected to /tf.
         for n in range(1000):
             send.ask(0, "world", "ready", START, n, *pose())
             answers = [each.ask("map", "ready", 0, 0, 0.05) for each in (listen, twin)]

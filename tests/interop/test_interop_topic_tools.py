@@ -1,4 +1,4 @@
-"""topic_tools: what the real programs pass on is what ours pass on (tests/ros/topic_tools/drive.txt)."""
+"""topic_tools: the real programs and minirospy's forward the same messages (tests/ros/topic_tools/drive.txt)."""
 
 from __future__ import annotations
 

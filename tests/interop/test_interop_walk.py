@@ -1,4 +1,4 @@
-"""A walk through all views in one session of Debian's chromium: from the menu, there and back, at a desk and on a phone."""
+"""Visit all views in one session of Debian's chromium: from the menu, there and back, in the sizes of a desktop and a phone."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ SEEN = {
     "smach": (".smach-state", "DOCK"),
     "diagnostics": (".report", "Battery"),
 }
-"""What a view shows of the scene, whatever the language: a selector, and text in it."""
+"""View -> a selector and a text that it shows for the scene, in any language."""
 
 UNREACHABLE = """(() => {
   const bad = [], width = innerWidth, height = innerHeight;
@@ -70,7 +70,7 @@ UNREACHABLE = """(() => {
     if (e.scrollWidth > e.clientWidth) bad.push(`${e.tagName} is wider than the window`);
   return bad;
 })()"""
-"""What can be used, but not be reached: it is outside of the window or behind something else."""
+"""Controls that cannot be reached: outside of the window or covered by another element."""
 
 LEFT_IN_ENGLISH = """import("/js/german.js").then(({ GERMAN }) => {
   const isLeft = (text) => text && Object.hasOwn(GERMAN, text) && GERMAN[text] !== text;
@@ -86,7 +86,7 @@ LEFT_IN_ENGLISH = """import("/js/german.js").then(({ GERMAN }) => {
 
 
 def furnish(served: Served) -> None:
-    """Publish the workshop's topics, and a small robot in its room."""
+    """Publish the workshop's topics, and a small robot in a room."""
     image = Image(width=4, height=2, encoding="mono8", step=4, data=bytes(range(0, 160, 20)))
     states = SmachContainerStructure(
         path="/ROOT", children=["DRIVE", "DOCK"], internal_outcomes=["arrived"], outcomes_from=["DRIVE"],
@@ -119,7 +119,7 @@ def furnish(served: Served) -> None:
 
 
 def use(page: Page, view: str) -> None:
-    """Do in a view what a person does there first, and wait for what that shows."""
+    """Perform a view's typical first action, and wait for its result."""
     if view == "plot":
         page.type(".bar input", "/button_state/data")
         page.click("button[type=submit]")
@@ -158,7 +158,7 @@ def use(page: Page, view: str) -> None:
 
 
 def walk(page: Page, check: str = "[]") -> list[str]:
-    """Open each view from the menu, twice; return what is wrong, by views."""
+    """Open each view from the menu, twice; return the faults, by view."""
     wrong = []
     for _ in range(2):
         for view in VIEWS:
@@ -195,4 +195,4 @@ def test_all_views_work_there_and_back_at_a_desk_and_on_a_phone(
         page.click("#language")
         page.wait_text("#state", "verbunden")
         assert walk(page, LEFT_IN_ENGLISH) == []
-    # browse() fails where the page has logged an error.
+    # browse() fails if the page has logged an error.

@@ -1,6 +1,6 @@
-"""Functions on names, types and values of messages, with None, wrong types, nothing and the normal case: real ROS beside ours.
+"""Call functions on names, types and message values with None, wrong types, no argument and normal values; compare with real ROS.
 
-What differs is recorded in wrong_types.json: call -> [real, ours]. RECORD=1 writes it again.
+Differences are recorded in wrong_types.json: call -> [real, ours]. RECORD=1 rewrites it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def outcomes(python: str) -> dict[str, str]:
     environment = {key: value for key, value in os.environ.items() if key not in ("ROS_IP", "ROS_HOSTNAME")}
     done = subprocess.run(
         [python, str(HERE / "wrong_types.py")],
-        # No master answers there.
+        # No master runs at this address.
         env={**environment, "ROS_MASTER_URI": "http://localhost:1"},
         stdin=subprocess.DEVNULL,
         capture_output=True,

@@ -1,6 +1,6 @@
-"""Call each function of ROS's modules with nothing, None, wrong types and a normal name; print what each call gives.
+"""Call each function of ROS's modules with no argument, None, wrong types and a normal name; print each result.
 
-Runs under real ROS and under ours; test_interop_wrong_types.py compares the two.
+Runs under real ROS and under minirospy; test_interop_wrong_types.py compares the two.
 """
 
 import inspect
@@ -44,8 +44,8 @@ OF = (
     "minirospy",
 )
 VALUES = (None, 3, b"x", "", "x", "/x/y", "~p", ["a"], {"a": 1}, 2.5, True, object())
-# What differs at each call, or looks names up in the network; what reads the terminal, waits for a service, writes a file,
-# makes a node, or is a part of a YAML loader.
+# Functions whose results differ at each call or that resolve host names; that read the terminal, wait for a service,
+# write a file or create a node; and parts of a YAML loader.
 LEFT_OUT = re.compile(
     r"local_address|get_host_name|anonymous_name|handshake_header$"
     r"|main$|^stdin_|^rosmsg_cmd|^(construct|represent)_|publish|subscriber|^call_service$"
@@ -55,7 +55,7 @@ CHANGING = re.compile(r"0x[0-9a-f]+|_\d+_\d+|\d{8,}|/(usr|work|tmp|home|root|opt
 
 
 def outcome(function, arguments):
-    """Return what a call returns or that it raises; the kind of error depends on what is tried first with a value."""
+    """Return a call's value or that it raises; the kind of error depends on the operation that fails first."""
     out, err, sys.stdout, sys.stderr = sys.stdout, sys.stderr, io.StringIO(), io.StringIO()
     try:
         result = function(*arguments)
@@ -85,7 +85,7 @@ def main():
             calls = [(), *((value, *others) for value in VALUES)]
             calls += [(*others, value) for value in VALUES] if others else []
             if name == "load_file":
-                # A number is a file descriptor to real rosparam, which closes it.
+                # Real rosparam takes a number for a file descriptor, which it closes.
                 calls = [each for each in calls if not each or not isinstance(each[0], int)]
             for arguments in calls:
                 shown = CHANGING.sub("#", repr(arguments))

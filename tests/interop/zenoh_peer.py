@@ -1,7 +1,7 @@
-"""A node of ROS 2 over Zenoh, by pyzeros or zenoh-ros2-sdk: does what lines of JSON on its input say, prints what came.
+"""A ROS 2 node over Zenoh, by pyzeros or zenoh-ros2-sdk: executes JSON lines from stdin, and prints the results.
 
-Run as `zenoh_peer.py pyzeros tcp/127.0.0.1:7447` or `zenoh_peer.py sdk ...`, by a Python that has them. Lines as those of
-ros2_peer.py: subscribe, publish, serve, call, close. Messages are decoded and encoded again by the implementation's own code.
+Run as `zenoh_peer.py pyzeros tcp/127.0.0.1:7447` or `zenoh_peer.py sdk ...`, by a Python that has them. The operations are
+those of ros2_peer.py: subscribe, publish, serve, call, close. The implementation's own code decodes and encodes the messages.
 """
 
 import asyncio
@@ -211,7 +211,8 @@ class Sdk:
         )
 
         def call():
-            # It does not wait for the service, but its whole time limit for the response of nobody.
+            # The client does not wait for the service: it would wait its whole timeout for a response that no server
+            # sends.
             while not client.querier.matching_status.matching:
                 time.sleep(0.02)
             for fields in command["fields"]:

@@ -1,4 +1,4 @@
-"""Limits of the product are waited out."""
+"""Allow for the product's time limits, which the tests wait out."""
 
 from tests.patience import patient_limits
 

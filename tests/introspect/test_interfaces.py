@@ -15,7 +15,7 @@ from minirospy.workspace.packages import Packages
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Environment:
-    """Make a workspace with a package that defines a message, a service and an action."""
+    """Create a workspace with a package that defines a message, a service and an action."""
     package = tmp_path / "src" / "my_msgs"
     for file, text in {
         "package.xml": "<package><name>my_msgs</name></package>",

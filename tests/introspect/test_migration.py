@@ -1,4 +1,4 @@
-"""ros/rosbag/migration/rules_files: paths of rules from old types to those that are installed, and what they make of messages."""
+"""ros/rosbag/migration/rules_files: paths of rules from old types to installed ones, and the migrated messages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OLD_COLOR = "float32 r\nfloat32 g\nfloat32 b\n"
 
 
 def rule(name: str, old: tuple[str, str], new: tuple[str, str], update: str, **members: object) -> str:
-    """Return a rule as a .bmr file has it."""
+    """Return a rule in the format of a .bmr file."""
     fields = {"order": 0, "migrated_types": [], "valid": True} | members
     return (
         f"class {name}(MessageUpdateRule):\n"

@@ -49,7 +49,7 @@ def node(master: str) -> Iterator[ToolNode]:
         )
         tool._loop.run(tool._node.serve(server))
         yield tool
-    gc.collect()  # what user code does not close is closed with it
+    gc.collect()  # objects that user code does not close are closed on deletion
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
@@ -147,7 +147,7 @@ def test_rosparam(master: str, tmp_path: Path) -> None:
 
 
 def test_without_a_master() -> None:
-    """Each has its own error for it."""
+    """Each module raises its own error."""
     asked: list[tuple[Any, Any]] = [
         (rostopic.get_topic_list, rostopic.ROSTopicIOException),
         (rosnode.get_node_names, rosnode.ROSNodeIOException),
@@ -185,7 +185,7 @@ def test_the_commands_as_functions(master: str, capsys: pytest.CaptureFixture[st
 
 
 def test_names_that_ros_leaks_exist_here(master: str) -> None:
-    """ROS raises the errors of its YAML and XML-RPC libraries."""
+    """ROS raises the exceptions of its YAML and XML-RPC libraries."""
     for name, value in (("/a", "{a: "), ("/a", "")):
         with pytest.raises(rosparam.RosParamException):
             rosparam.set_param(name, value)

@@ -1,4 +1,4 @@
-"""Rows for plotting tools, as real `rostopic echo -p` printed them."""
+"""Rows for plotting tools, as printed by real `rostopic echo -p`."""
 
 from __future__ import annotations
 

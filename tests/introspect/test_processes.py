@@ -1,4 +1,4 @@
-"""What processes of this machine cost."""
+"""CPU and memory of processes on this machine."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_processes_that_have_ended_are_left_out() -> None:
 def test_another_process_of_the_same_id_starts_anew() -> None:
     loads = ProcessLoads()
     loads.look([os.getpid()])
-    # As psutil has a process whose id now belongs to another.
+    # As psutil does if the process id now belongs to another process.
     loads._known[os.getpid()]._create_time = 1.0  # type: ignore[attr-defined]
     loads._known[os.getpid()]._ident = (os.getpid(), 1.0)  # type: ignore[attr-defined]
     assert loads.look([os.getpid()])[os.getpid()].cpu is None

@@ -1,4 +1,4 @@
-"""Publishing at a rate by a clock that the test holds."""
+"""Publishing at a rate, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SECOND = 10**9
 
 
 class Hand:
-    """A clock that a sleep moves on by itself; at the sleep ``jump`` it is set back to ``to`` instead."""
+    """A clock that each sleep advances; at the sleep ``jump`` it is set back to ``to`` instead."""
 
     def __init__(self, jump: int, to: int) -> None:
         self.time = 100 * SECOND
@@ -34,7 +34,7 @@ class Hand:
 
 
 def sent_by(clock: Any, published: Any = None) -> list[int]:
-    """Return the seconds at which five messages go out at 1 Hz."""
+    """Return the seconds at which five messages are published at 1 Hz."""
     times: list[int] = []
 
     def publish(_: Any) -> None:

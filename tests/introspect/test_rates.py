@@ -1,4 +1,4 @@
-"""Rates, bandwidth and delays, on times that the test holds."""
+"""Rates, bandwidth and delays, with times that the test controls."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What nodes report of themselves: processes, types, and the traffic of their connections."""
+"""The information that nodes report: processes, types, and the traffic of their connections."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def looked(seconds: float, stats: object, pid: int = 5) -> Survey:
 @pytest.mark.parametrize(
     ("before", "after"),
     [
-        # rospy and ours, then roscpp.
+        # rospy and minirospy, then roscpp.
         (
             [["/t", 0, [[1, 100, 10, True], [2, 0, 0, True]]]],
             [["/t", 0, [[1, 300, 20, True], [2, 8, 1, True]]]],
@@ -67,7 +67,7 @@ def test_traffic_leaves_out_what_cannot_be_compared() -> None:
     first = looked(10, [["/t", 0, [[1, 100, 10, True]]]])
     assert traffic(None, first) == {}
     assert traffic(first, first) == {}
-    # Another process of the same name; a counter that wrapped around; a connection that is new.
+    # Another process with the same name; a counter that wrapped around; a new connection.
     assert traffic(first, looked(12, [["/t", 0, [[1, 300, 20, True]]]], pid=6)) == {}
     assert traffic(first, looked(12, [["/t", 0, [[1, 3, 20, True]]]])) == {}
     assert traffic(first, looked(12, [["/t", 0, [[2, 300, 20, True]]]])) == {}
@@ -89,7 +89,7 @@ def test_description_has_nodes_and_what_is_wrong_with_them() -> None:
 
 
 def test_nodes_are_queried_and_their_traffic_is_counted(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    # On a busy machine an answer may come late.
+    # On a busy machine an answer may arrive late.
     monkeypatch.setattr("minirospy.introspect.doctor.graph.CONNECT_SECONDS", 30.0)
     loop = LoopThread("test-survey")
     nodes: list[Node] = []

@@ -1,4 +1,4 @@
-"""The definitions of ROS 2, as rosbags carries them, in the form in which rclpy's classes name their fields."""
+"""The definitions of ROS 2 from rosbags, with the field types named as in rclpy's classes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Actions of the bridge to ROS 2 with another side in place of rclpy: goals, cancels, ends; the pure parts."""
+"""Actions of the ROS 2 bridge with a fake backend in place of rclpy: goals, cancels, results; the pure parts."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_rules_name_actions_and_their_fields() -> None:
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Send no request before the server is reached."""
+    """Send no request before the server is reachable."""
     monkeypatch.setattr("minirospy.ros2.reach._MAX_SECONDS", LIMIT)
 
 
@@ -154,7 +154,7 @@ def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any]) -> None:
 
 
 async def sent(side: FakeSide, number: int) -> Any:
-    """Return a goal that ROS 2 has got: its CDR, where feedback goes, its handle."""
+    """Return a goal that ROS 2 has received: its CDR, its feedback callback, its handle."""
     await until(lambda: len(side.action_clients["/fly"].goals) > number)
     return side.action_clients["/fly"].goals[number]
 
@@ -316,7 +316,7 @@ def test_a_result_that_has_come_when_the_link_ends_is_not_lost() -> None:
 
 @pytest.mark.usefixtures("master")
 def test_the_loop_goes_on_while_an_action_leaves_ros2() -> None:
-    """A server of ROS 2 waits until it has sent what is known."""
+    """A ROS 2 action server blocks until it has sent its results."""
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         async def execute(_: Any) -> dict[str, list[int]]:
@@ -369,7 +369,7 @@ def test_types_of_actions_that_do_not_map_are_listed_with_the_reason() -> None:
 
 
 class LateServer:
-    """rclpy's client of an action, whose server answers when the test says so."""
+    """Replaces rclpy's action client; its server answers when the test requests it."""
 
     def __init__(self, *_: object, **__: object) -> None:
         self.answered: list[Callable[[Any], None]] = []
@@ -384,7 +384,7 @@ class LateServer:
 
 
 def rclpy_client(monkeypatch: pytest.MonkeyPatch, class_: type) -> Ros2ActionClient:
-    """Return the bridge's client over a class in place of rclpy's."""
+    """Return the bridge's client with a class in place of rclpy's."""
     monkeypatch.setitem(sys.modules, "rclpy", SimpleNamespace())
     monkeypatch.setitem(sys.modules, "rclpy.action", SimpleNamespace(ActionClient=class_))
     uuids = SimpleNamespace(UUID=lambda **_: None)
@@ -408,7 +408,7 @@ def test_client_of_rclpy_that_the_executor_sees_too_early_has_a_lock(monkeypatch
         _lock: threading.Lock
 
         def __init__(self, *_: object, **__: object) -> None:
-            # As rclpy does: from here on the executor's thread calls it.
+            # As in rclpy: from here on the executor's thread calls it.
             with self._lock:
                 pass
             self._lock = threading.Lock()
@@ -423,7 +423,7 @@ def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
         _logger: Any
 
         def __init__(self, *_: object, **__: object) -> None:
-            # As rclpy does: from here on the executor's thread calls it.
+            # As in rclpy: from here on the executor's thread calls it.
             self._logger.debug("a goal")
 
     monkeypatch.setitem(sys.modules, "rclpy", SimpleNamespace())
@@ -438,7 +438,7 @@ def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
 
 
 def test_server_of_rclpy_is_destroyed_once_results_are_sent(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A result takes some of the executor's rounds: a server that is destroyed before leaves its client waiting."""
+    """Sending a result takes several rounds of the executor: destroying the server earlier leaves its client waiting."""
     monkeypatch.setattr("minirospy.ros2.rclpy_actions._CLOSE_SECONDS", LIMIT)
     order: list[str] = []
     tasks: queue.Queue[Callable[[], object] | None] = queue.Queue()

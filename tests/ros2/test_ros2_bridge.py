@@ -1,4 +1,4 @@
-"""The bridge to ROS 2 with another side in place of rclpy: what is opened, closed, passed on; the pure parts; the command."""
+"""The ROS 2 bridge with a fake backend in place of rclpy: opening, closing, forwarding; the pure parts; the command."""
 
 from __future__ import annotations
 
@@ -234,7 +234,7 @@ class FakeSubscription:
 
 @dataclass
 class FakeProbe:
-    """Requests without effect, which are answered while ``answers`` holds."""
+    """Requests without effect, which are answered while ``answers`` is true."""
 
     answers: bool = True
     is_ready: bool = True
@@ -253,7 +253,7 @@ class FakeProbe:
 
 @dataclass
 class FakeReachable:
-    """A client of ``servers``: where they can lose responses, ``prober`` is what reaches them, None for nothing."""
+    """A client of ``servers``: if they can lose responses, ``prober`` reaches them; None if it is not needed."""
 
     is_ready: bool = True
     servers: frozenset[bytes] | None = frozenset({b"1"})
@@ -265,7 +265,7 @@ class FakeReachable:
 
 @dataclass
 class FakeClient(FakeReachable):
-    """A client whose server answers as ``response`` says, or never."""
+    """A client whose server answers with ``response``, or never."""
 
     response: bytes | None = None
     requests: list[bytes] = field(default_factory=list)
@@ -305,7 +305,7 @@ class FakeGoal:
 
 @dataclass
 class FakeActionClient(FakeReachable):
-    """A client whose server accepts each goal, or refuses it."""
+    """A client whose server accepts or rejects each goal."""
 
     accepts: bool = True
     goals: list[tuple[bytes, Callable[[bytes], None], FakeGoal]] = field(default_factory=list)
@@ -326,8 +326,7 @@ class FakeActionServer:
     accept: Accept
     is_closed: bool = False
     closing: int = 0
-    may_close: threading.Event = field(default_factory=threading.Event)
-    """What closing it waits for."""
+    may_close: threading.Event = field(default_factory=threading.Event)  # closing waits for it
 
     def __post_init__(self) -> None:
         self.may_close.set()
@@ -355,11 +354,10 @@ class FakeParameters:
 
 
 class FakeSide:
-    """A ROS 2 that a test holds in its hands."""
+    """A fake ROS 2 that the test controls."""
 
     domain = "0"
-    has_found_client = True
-    """Whether a server's responses reach its clients."""
+    has_found_client = True  # whether a server's responses reach its clients
 
     def __init__(self) -> None:
         self.graph: dict[str, Ros2Topic] = {}
@@ -444,7 +442,7 @@ class FakeSide:
 
 
 def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any], topics: NameFilter | None = None) -> FakeSide:
-    """Run a scene with a node, the side of ROS 2, and a bridge that looks when the scene says so."""
+    """Run a scene with a node, the fake ROS 2, and a bridge that refreshes when the scene requests it."""
     side = FakeSide()
 
     async def run() -> None:
@@ -461,7 +459,7 @@ def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any], topics: NameFilt
 
 
 async def connected(bridge: Ros2Bridge, count: int = 1) -> None:
-    """Wait until the bridge's subscriptions are connected to so many publishers: a look connects, too, and hangs up."""
+    """Wait until the bridge's subscriptions are connected to ``count`` publishers: a refresh connects, too, and disconnects."""
 
     def found() -> int:
         return sum(len(each._subscription.headers) for each in bridge.topics.links.values())
@@ -524,7 +522,7 @@ def test_messages_pass_to_ros1_but_not_those_that_came_from_it() -> None:
         there.deliver(b"\0\1\0\0\2\0\0\0b\0")
         assert await came.get() == b"\1\0\0\0b"
         assert came.empty()
-        # Who comes later gets the last one.
+        # A later subscriber receives the last message.
         async with Node("late", rosout=False) as late:
             other = await late.subscribe_raw("/back", lambda frame, _: came.put_nowait(bytes(frame)))
             assert await came.get() == b"\1\0\0\0b"
@@ -598,7 +596,7 @@ def test_types_that_do_not_map_are_listed_with_the_reason() -> None:
 @pytest.mark.usefixtures("master")
 def test_link_that_cannot_be_opened_leaves_nothing_open() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
-        # Kept: a subscription that the program drops leaves the graph.
+        # Keep a reference: a subscription without one leaves the graph.
         subscription = await node.subscribe_raw("/t", lambda *_: None)
         side.graph["/t"] = Ros2Topic(publishers=(STRING,))
 
@@ -700,7 +698,7 @@ def test_fast_dds_gets_room_for_images_unless_it_is_set_up_already() -> None:
 def test_without_rclpy_one_line_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # Also where ROS 2 is installed.
+    # This also applies if ROS 2 is installed.
     monkeypatch.setitem(sys.modules, "rclpy", None)
     assert main([]) == 1
     said = capsys.readouterr().err

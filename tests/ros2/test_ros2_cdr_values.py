@@ -1,4 +1,4 @@
-"""Values in CDR, by the fields of a type: rosbags is the oracle."""
+"""Values in CDR by the fields of a type, compared with rosbags."""
 
 from __future__ import annotations
 

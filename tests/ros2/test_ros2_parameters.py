@@ -1,4 +1,4 @@
-"""Parameters of the bridge to ROS 2: names and values of both sides, and the services of ROS 1."""
+"""Parameters of the ROS 2 bridge: names and values of both sides, and the services of ROS 1."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reaching a server of ROS 2 before a request that counts: what is waited for, and for how long."""
+"""Reaching a ROS 2 server before the actual request: the conditions, and the time limits."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_requests_wait_ten_seconds_at_most_in_all() -> None:
         assert second.done()
         await asyncio.wait_for(reach.wait(), 1)
 
-        # It is tried further: the responses of a server that was only busy are known to arrive some time.
+        # Probing continues: responses of a server that was only busy still arrive eventually.
         assert client.prober
         client.prober.answers = True
         await loop.advance(8)

@@ -1,4 +1,4 @@
-"""Services of the bridge to ROS 2 with another side in place of rclpy: what is offered, answered, refused, and when it ends."""
+"""Services of the ROS 2 bridge with a fake backend in place of rclpy: offers, responses, refusals, and removal."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_renamed_service_types_find_their_partner() -> None:
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Send no request before the server is reached."""
+    """Send no request before the server is reachable."""
     monkeypatch.setattr("minirospy.ros2.reach._MAX_SECONDS", LIMIT)
 
 
@@ -160,7 +160,7 @@ def test_the_first_call_waits_until_responses_of_the_server_arrive() -> None:
         client.prober.reaching[-1].set_result(None)
         assert await calling == b"\1\2\0\0\0ok"
 
-        # Calls that wait end with the link.
+        # Waiting calls fail when the link is lost.
         client.servers = frozenset({b"2"})
         client.prober.answers = False
         calling = asyncio.ensure_future(call(node, "/set", b"\1"))
@@ -280,7 +280,7 @@ def test_a_time_limit_of_calls_that_is_no_time_is_refused(capsys: pytest.Capture
 
 @pytest.mark.usefixtures("master")
 def test_call_waits_longer_for_a_busy_server_than_a_probe(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hundreds of calls at the same time take their time: none of them may fail for that."""
+    """Hundreds of concurrent calls take long: none of them may fail for that reason."""
     monkeypatch.setattr(raw, "PROBE_SECONDS", 0.05)
     answer = serialize_header({"callerid": "/n", "md5sum": "0" * 32, "type": "a/B"})
 

@@ -1,4 +1,4 @@
-"""The bridge over Zenoh against a session that writes rmw_zenoh's keys letter by letter, through a router of this machine."""
+"""The bridge over Zenoh with a session that writes rmw_zenoh's keys literally, through a router on this machine."""
 
 from __future__ import annotations
 
@@ -32,8 +32,7 @@ from tests.waiting import wait_until
 
 zenoh: Any = pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
 
-LIMIT = 60.0
-"""Seconds after which a wait fails: far more than a busy machine takes."""
+LIMIT = 60.0  # seconds after which a wait fails: far more than a busy machine takes
 CHATTER = f"0/chatter/std_msgs::msg::dds_::String_/{STRING_HASH}"
 SWITCH = f"0/switch/std_srvs::srv::dds_::SetBool_/{SERVICE_HASHES['std_srvs/SetBool']}"
 HELLO = bytes.fromhex("00010000 06000000 68656c6c6f00")
@@ -48,7 +47,7 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def endpoint() -> Iterator[str]:
-    """Return where a router listens."""
+    """Yield the endpoint of a router."""
     where = f"tcp/127.0.0.1:{free_port()}"
     session = opened("router", listen=where)
     yield where
@@ -57,7 +56,7 @@ def endpoint() -> Iterator[str]:
 
 @pytest.fixture
 def node(endpoint: str) -> Iterator[RmwNode]:
-    """Return a node of ROS 2."""
+    """Yield a ROS 2 node."""
     found = RmwNode(endpoint)
     yield found
     found.session.close()
@@ -65,7 +64,7 @@ def node(endpoint: str) -> Iterator[RmwNode]:
 
 @pytest.fixture
 def side(endpoint: str) -> Iterator[ZenohSide]:
-    """Return the bridge's side of ROS 2."""
+    """Yield the bridge's ROS 2 side."""
     found = ZenohSide(
         "minirospy_ros2_bridge", NetworkOptions((endpoint,)), Definitions(BUILT_IN, catalogue())
     )
@@ -87,7 +86,7 @@ def opened(mode: str, *, listen: str = "", connect: str = "") -> Any:
 
 
 class RmwNode:
-    """What rmw_zenoh declares for a node called peer."""
+    """The Zenoh declarations of rmw_zenoh for a node called peer."""
 
     def __init__(self, endpoint: str) -> None:
         self.session = opened("client", connect=endpoint)
@@ -103,7 +102,7 @@ class RmwNode:
         return self.token(f"0/{id}/{kind}/%/%/peer/%{'%'.join(name)}/{type_}/{hash_}/{qos}")
 
     def tokens(self) -> set[str]:
-        """Return the keys of all tokens of others."""
+        """Return the keys of all tokens of other sessions."""
         found = [str(each.ok.key_expr) for each in self.session.liveliness().get("@ros2_lv/**")]
         return {each for each in found if str(self.session.info.zid()) not in each}
 
@@ -114,7 +113,7 @@ class RmwNode:
 
 
 def numbered(sample: Any) -> tuple[int, bytes]:
-    """Return the number and the id of an attachment."""
+    """Return the sequence number and the id in an attachment."""
     data = sample.attachment.to_bytes()
     assert (len(data), data[16]) == (33, 16)
     return int.from_bytes(data[:8], "little"), data[17:]
@@ -190,7 +189,7 @@ def test_messages_of_ros2_come_but_not_those_of_the_bridge(node: RmwNode, side: 
 def test_own_subscription_is_not_the_subscriber_that_is_waited_for(node: RmwNode, side: ZenohSide) -> None:
     side.subscribe("/chatter", "std_msgs/String", bytes, depth=7, is_reliable=True, is_latched=False)
     publisher = side.publisher("/chatter", "std_msgs/String", depth=7, is_latched=False)
-    # Its token is there before messages reach it.
+    # Its token is declared before messages reach it.
     node.end(1, "MS", CHATTER)
     wait_until(lambda: side.ends("/chatter").subscribers)
     assert publisher.subscribers == 0
@@ -207,10 +206,10 @@ def test_who_joins_later_in_ros2_gets_what_was_latched(node: RmwNode, side: Zeno
         publisher.publish(HELLO)
         return any(each.payload.to_bytes() == HELLO for each in there.queue)
 
-    # One that joins while the first message is on its way gets that, too.
+    # A subscriber that joins while the first message is in transit receives that, too.
     wait_until(has_passed)
     came: queue.Queue[Any] = queue.Queue()
-    # As rmw_zenoh declares a subscriber that is transient local.
+    # As rmw_zenoh declares a transient local subscriber.
     subscriber = zenoh.ext.declare_advanced_subscriber(
         node.session,
         CHATTER,
@@ -225,7 +224,7 @@ def test_who_joins_later_in_ros2_gets_what_was_latched(node: RmwNode, side: Zeno
 
 def test_what_ros2_has_kept_comes_to_a_latched_subscription(node: RmwNode, side: ZenohSide) -> None:
     def latched(text: bytes) -> Any:
-        # As rmw_zenoh declares a publisher that is transient local.
+        # As rmw_zenoh declares a transient local publisher.
         made = zenoh.ext.declare_advanced_publisher(
             node.session,
             CHATTER,
@@ -271,7 +270,7 @@ def test_keys_of_humble_have_no_hash(node: RmwNode, side: ZenohSide) -> None:
     wait_until(lambda: publisher.subscribers)
     publisher.publish(HELLO)
     assert str(came.get(timeout=LIMIT).key_expr) == key
-    # A type that no end has yet.
+    # A type that no endpoint has yet.
     side.serve("/switch", "std_srvs/SetBool", lambda _: Future())
     wait_until(lambda: any("dds_::SetBool_/TypeHashNotSupported" in each for each in node.tokens()))
 
@@ -308,7 +307,7 @@ def test_calls_reach_a_server_of_ros2(node: RmwNode, side: ZenohSide) -> None:
 
 
 def called(node: RmwNode, key: str, request: bytes, attachment: bytes | None) -> Any:
-    """Call as rmw_zenoh does; return the reply."""
+    """Call a service as rmw_zenoh does; return the reply."""
     replies = node.session.get(
         key,
         target=zenoh.QueryTarget.ALL_COMPLETE,
@@ -337,7 +336,7 @@ def test_calls_of_ros2_are_answered_with_their_attachment(node: RmwNode, side: Z
     assert numbered(sample) == (5, GID)
     assert sample.attachment.to_bytes() != sent
 
-    # Where the response has a place for it, the reason is in there.
+    # If the response has a string field, it contains the reason.
     failed = called(node, SWITCH, b"fail", sent).ok.payload.to_bytes()
     assert failed == bytes.fromhex("00010000 00 000000 11000000") + b"the motor is hot\0"
     refused = called(node, SWITCH, b"one", None).err.payload.to_bytes()
@@ -359,7 +358,7 @@ def test_a_call_that_fails_without_place_for_the_reason_is_an_error(node: RmwNod
 
 
 class SlowNode:
-    """A node whose session sends nothing before ``released``; ``threads`` are those that wait."""
+    """A node whose session sends nothing before ``released``; ``threads`` are the blocked ones."""
 
     def __init__(self) -> None:
         self.released = threading.Event()

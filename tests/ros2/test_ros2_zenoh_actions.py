@@ -1,4 +1,4 @@
-"""Actions and parameters of the bridge over Zenoh, and its topics of every robot, with a node that writes each byte itself.
+"""Actions and parameters of the bridge over Zenoh, and the topics of every robot, with a node that writes each byte itself.
 
 Its keys and messages are those of rcl_action, rmw_zenoh and the definitions of ROS 2 Kilted, whose hashes are here.
 """
@@ -55,7 +55,7 @@ SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait longer than a machine may stop everything for."""
+    """Wait longer than a machine may stall."""
     for module, name in (("zenoh_actions", "_CLOSE_SECONDS"), ("zenoh_parameters", "_SECONDS")):
         monkeypatch.setattr(f"minirospy.ros2.{module}.{name}", LIMIT)
 
@@ -65,7 +65,7 @@ def key_of(part: str) -> str:
 
 
 def numbers(*values: int) -> bytes:
-    """Return a sequence of int32."""
+    """Return a serialized sequence of int32."""
     return struct.pack(f"<I{len(values)}i", len(values), *values)
 
 
@@ -99,9 +99,9 @@ async def end_of(goal: Any) -> tuple[GoalState, list[int]]:
 
 
 class Server:
-    """A server of /fly in ROS 2: refuses a negative order, aborts 13, ends 3 when told, and 7 when it is cancelled.
+    """A ROS 2 server of /fly: rejects a negative order, aborts 13, finishes 3 on request, and 7 when it is cancelled.
 
-    Feedback and result come by two ways: what must be seen of a goal is awaited before it ends.
+    Feedback and result arrive by two routes: tests await a goal's feedback before the goal finishes.
     """
 
     def __init__(self, node: RmwNode) -> None:
@@ -186,7 +186,7 @@ def test_goals_of_ros1_reach_a_server_over_zenoh(node: RmwNode, endpoint: str) -
 
 
 class Client:
-    """A client of /fly in ROS 2."""
+    """A ROS 2 client of /fly."""
 
     def __init__(self, node: RmwNode) -> None:
         self.node = node
@@ -219,7 +219,7 @@ class Client:
         return bytes(found[4:])
 
     def send(self, order: int, id: bytes = b"") -> bytes:
-        """Send a goal; return its id, none where it is refused."""
+        """Send a goal; return its id, or an empty one if it is rejected."""
         id = id or uuid.uuid4().bytes
         found = self.call("send_goal", id + struct.pack("<i", order))
         is_accepted, sec, _ = struct.unpack("<?xxxiI", found)
@@ -268,7 +268,7 @@ def test_goals_over_zenoh_reach_a_server_of_ros1(node: RmwNode, endpoint: str) -
         assert [client.said(id) for _ in range(3)] == [numbers(0), numbers(0, 1), numbers(0, 1, 2)]
         assert client.result(id) == (SUCCEEDED, numbers(0, 1, 2))
         client.until_status(id, SUCCEEDED)
-        # The result is kept for who comes later, and the id of a goal is used once.
+        # The result is kept for late clients, and a goal's id can be used only once.
         assert client.result(id) == (SUCCEEDED, numbers(0, 1, 2))
         assert not client.send(3, id)
         assert not client.send(-1)
@@ -296,7 +296,8 @@ def test_goals_over_zenoh_reach_a_server_of_ros1(node: RmwNode, endpoint: str) -
         await in_thread(use, client)
         id = await in_thread(client.send, 7)
         await in_thread(client.until_status, id, 2)
-        # What runs is aborted as the bridge ends. Its actions alone would be offered again by its next look.
+        # Active goals are aborted when the bridge closes. If only its actions were closed, its next refresh would
+        # offer them again.
         await bridge.close()
         await in_thread(client.until_status, id, ABORTED)
         await in_thread(wait_until, lambda: not any("fly%_action" in each for each in peer.tokens()))
@@ -315,7 +316,7 @@ VALUES.register(
         **get_types_from_msg("rcl_interfaces/Parameter[] parameters", "rcl_interfaces/msg/Parameters"),
     }
 )
-"""With the requests and responses of services, which rosbags lacks."""
+"""rosbags lacks the requests and responses of services, so register them."""
 
 
 def text(value: str) -> bytes:
@@ -333,7 +334,7 @@ def test_parameters_of_ros1_are_those_of_the_bridge_over_zenoh(node: RmwNode, en
         return bytes(found[4:])
 
     def value_of(name: str) -> Any:
-        """Return what ``get_parameters`` returns of one, as rosbags reads it."""
+        """Return the result of ``get_parameters`` for one parameter, as rosbags reads it."""
         request = TEXT.pack(1) + text(name)
         found = call("get_parameters", "GetParameters", request)
         assert TEXT.unpack(found[:4]) == (1,)

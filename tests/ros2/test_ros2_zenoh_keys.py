@@ -1,4 +1,4 @@
-"""What rmw_zenoh writes into keys, tokens and attachments, and the hashes of types: golden values, rosbags as the oracle."""
+"""rmw_zenoh's keys, tokens and attachments, and the hashes of types: golden values, compared with rosbags."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NODE = f"@ros2_lv/0/{SESSION}/0/0/NN/%/%/listener"
 # The example of rmw_zenoh's docs/design.md.
 LISTENER = f"@ros2_lv/2/{SESSION}/0/10/MS/%/%/listener/%chatter/std_msgs::msg::dds_::String_/{STRING_HASH}/::,10:,:,:,,"
 
-# What real ROS 2 Kilted has in the .json files next to its definitions.
+# From the .json files next to the definitions of real ROS 2 Kilted.
 HASHES = {
     "std_msgs/Char": "RIHS01_3ad2d04dd29ba19d04b16659afa3ccaedd691914b02a64e82e252f2fa6a586a9",
 }
@@ -55,7 +55,7 @@ ACTION_HASHES = {
     "cancel_goal": "RIHS01_573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a",
     "status": "RIHS01_6c1684b00f177d37438febe6e709fc4e2b0d4248dca4854946f9ed8b30cda83e",
 }
-"""Of the ends of an action of test_msgs/Fibonacci."""
+"""Hashes for the endpoints of an action of test_msgs/Fibonacci."""
 RULES = """
 - ros1_package_name: turtlesim
   ros1_message_name: Color
@@ -92,7 +92,7 @@ def test_tokens_of_namespaces_and_services_are_read_back() -> None:
     assert "/3/SC/%/%robot%one/arm/%robot%one%move/arm_msgs::srv::dds_::Move_/" in token
     assert parse_token(token) == client
     assert client.short_type == "arm_msgs/Move"
-    # Newer versions of rmw_zenoh append a part for buffers of GPUs.
+    # Newer versions of rmw_zenoh append a part for GPU buffers.
     assert parse_token(token + "/cuda") == client
 
 
@@ -178,7 +178,7 @@ def test_hash_is_that_of_rmw_zenoh(size: int, digest: str) -> None:
 
 
 def test_ids_are_made_of_tokens() -> None:
-    # By xxhash 4.1.0, as pyzeros makes them.
+    # Computed with xxhash 4.1.0, as in pyzeros.
     assert gid_of(LISTENER).hex() == "76148a538308fe55a6c5375462ca1de6"
 
 
@@ -197,7 +197,7 @@ def test_hashes_are_those_of_rosbags() -> None:
         for package in catalogue().packages:
             for spec in catalogue().messages(package):
                 name = BUILT_IN.ros2_messages(spec.full_name)[0]
-                # rosbags calls its number a char, which ROS 2 makes a uint8: see below.
+                # rosbags uses char for its number, which ROS 2 maps to uint8: see below.
                 if (whole := name.replace("/", "/msg/")) in store.fielddefs and name != "std_msgs/Char":
                     assert found.hash(name) == store.hash_rihs01(whole), name
                     compared += 1

@@ -1,4 +1,4 @@
-"""Topics that every robot has, over Zenoh from end to end: /tf, /tf_static, /clock, /rosout, both ways; rosbags is the oracle."""
+"""Topics of every robot over Zenoh, in both directions: /tf, /tf_static, /clock, /rosout; compared with rosbags."""
 
 from __future__ import annotations
 
@@ -37,8 +37,7 @@ TYPES = {
     "/clock": "rosgraph_msgs/Clock",
     "/rosout": "rosgraph_msgs/Log",
 }
-STATIC = "1:1:,1:,:,:,,"
-"""The quality of service of a topic that is reliable and transient local, with a depth of 1."""
+STATIC = "1:1:,1:,:,:,,"  # QoS: reliable, transient local, depth 1
 
 
 def key_of(topic: str) -> str:
@@ -52,7 +51,7 @@ def data_of(message: Any) -> bytes:
 
 
 def transforms(*children: str) -> bytes:
-    """Return a TFMessage of ROS 1."""
+    """Return a serialized ROS 1 TFMessage."""
     found = []
     for number, child in enumerate(children, 1):
         each = TransformStamped(child_frame_id=child)
@@ -76,7 +75,7 @@ def to_ros1(data: bytes) -> bytes:
 
 
 class Ros1:
-    """The ends in ROS 1: a subscription that nothing refers to ends."""
+    """The ROS 1 endpoints: a subscription to which nothing refers is closed."""
 
     def __init__(self, node: Node, bridge: Ros2Bridge) -> None:
         self.node = node
@@ -88,7 +87,7 @@ class Ros1:
         publisher = await self.node.advertise(topic, class_, latch=latch)
         self.kept.append(publisher)
         if not latch:
-            # A subscriber of the bridge's name may be the short connection that reads the header.
+            # A subscriber with the bridge's name may be the short connection that reads the header.
             await until(lambda: self._is_bridged(topic))
         publisher.publish_raw(data)
         return publisher
@@ -108,7 +107,7 @@ class Ros1:
 
 
 def subscribe(node: RmwNode, topic: str, *, static: bool = False) -> queue.Queue[bytes]:
-    """Subscribe as rmw_zenoh does; return where messages come."""
+    """Subscribe as rmw_zenoh does; return the queue of received messages."""
     came: queue.Queue[bytes] = queue.Queue()
 
     def arrived(sample: Any) -> None:
@@ -131,7 +130,7 @@ def subscribe(node: RmwNode, topic: str, *, static: bool = False) -> queue.Queue
 
 
 def publish(node: RmwNode, topic: str, data: bytes, *, static: bool = False) -> None:
-    """Publish as rmw_zenoh does: to who is there, or also to those that come later."""
+    """Publish as rmw_zenoh does: to current subscribers, or also to later ones."""
     node.end(len(node.kept), "MP", key_of(topic), STATIC if static else "::,10:,:,:,,")
     if static:
         publisher = zenoh.ext.declare_advanced_publisher(
@@ -159,7 +158,7 @@ def test_transforms_pass_both_ways_over_zenoh(node: RmwNode, endpoint: str) -> N
         ros1 = Ros1(other, bridge)
         came = await ros1.subscribe("/tf")
         await in_thread(publish, peer, "/tf", to_ros2(transforms("a", "b")))
-        # Messages of ROS 2 have no number, which is zero.
+        # Messages of ROS 2 have no sequence number: it is zero.
         assert await next_of(came) == transforms("a", "b")
 
         there = await in_thread(subscribe, peer, "/tf")
@@ -224,7 +223,7 @@ def test_time_passes_both_ways_over_zenoh(node: RmwNode, endpoint: str) -> None:
         there = await in_thread(subscribe, peer, "/clock")
         await ros1.publish("/clock", data_of(clock))
         found = await next_of(there)
-        # The last two bytes of the header say who has sent it.
+        # The last two bytes of the header identify the sender.
         assert (found[:2], found[4:]) == (cdr[:2], cdr[4:])
 
     bridged(node, endpoint, scene)

@@ -1,4 +1,4 @@
-"""The thread that stops what is driven: deadlines by a clock that the test holds."""
+"""The thread that stops what is driven: deadlines, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def guard(clock: Clock) -> Iterator[StopGuard]:
     yield guard
     for stop in list(guard._deadlines):
         guard.disarm(stop)
-    # An earlier deadline wakes the thread, which then ends.
+    # An earlier deadline wakes the thread, which then exits.
     guard.arm(_nothing, float("-inf"))
     wait_until(lambda: guard._thread is None)
 
@@ -69,7 +69,7 @@ def test_deadlines_that_are_moved_or_removed_stop_nothing(guard: StopGuard, cloc
     guard.arm(moved, clock.now + 3000)
     guard.disarm(removed)
     guard.disarm(removed)
-    # What comes with an earlier deadline does not wait behind the others.
+    # An item with an earlier deadline does not wait behind the others.
     guard.arm(stops(names, "early"), clock.now)
     wait_until(lambda: names == ["early"])
     clock.now += 2000

@@ -1,4 +1,4 @@
-"""The time limits that docs/master.md and docs/network.md state, by a clock that the test holds."""
+"""The time limits that docs/master.md and docs/network.md state, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -26,18 +26,17 @@ from minirospy.runtime.rpc.turns import Turns
 from tests.manual_loop import ManualLoop, run_manually, until
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
-LARGE = 60_000_000
-"""Bytes: more than the system keeps for a client that does not read."""
+LARGE = 60_000_000  # bytes, more than the system buffers for a client that does not read
 
 
 @pytest.fixture(autouse=True)
 def _tcp_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Connect by TCP alone: connections are counted here."""
+    """Connect by TCP only: the tests count connections."""
     monkeypatch.setenv("MINIROSPY_TRANSPORT", "tcp")
 
 
 def is_open(sock: socket.socket) -> bool:
-    """Return whether the peer has not hung up; what it has sent is read."""
+    """Return whether the peer has not closed the connection; read the data that it has sent."""
     try:
         while sock.recv(1 << 20):
             pass
@@ -57,7 +56,7 @@ def call(text: str) -> bytes:
 
 @contextlib.asynccontextmanager
 async def served() -> AsyncIterator[tuple[RpcServer, socket.socket]]:
-    """Return a server whose every answer is large, and the socket of a client."""
+    """Yield a server whose responses are all large, and the socket of a client."""
 
     def answer(method: str, args: Sequence[Any]) -> str:
         return "x" * LARGE
@@ -78,7 +77,7 @@ def test_request_must_be_whole_within_30_seconds() -> None:
             await until(lambda: len(server.deadlines))
             await clock.advance(29.9)
             assert is_open(client)
-            # A little more of the request changes nothing.
+            # A little more of the request does not extend the limit.
             client.send(b"x")
             await until(lambda: server.clients == 1)
             await clock.advance(0.2)
@@ -144,7 +143,7 @@ def test_answer_of_which_64_kib_are_read_in_30_seconds_goes_on() -> None:
                         got += len(client.recv(65536))
                     await asyncio.sleep(0)
                 assert server.clients == 1
-            # What it read last may have made room for more.
+            # The data that it read last may have made room for more.
             for _ in range(3):
                 await clock.advance(30.1)
             assert server.clients == 0
@@ -156,7 +155,7 @@ def test_answer_of_which_64_kib_are_read_in_30_seconds_goes_on() -> None:
 
 
 class Graph:
-    """A graph with one publisher of every topic, and no parameter."""
+    """A graph with one publisher of every topic, without parameters."""
 
     def publisher_uris(self, topic: str) -> list[str]:
         return ["http://x:1/"]
@@ -175,7 +174,7 @@ def test_update_soon_after_a_registration_is_delayed_20_to_30_ms() -> None:
             notified.clear()
             notifier = Notifier(Graph(), Turns(), 5.0)
             notifier.here["http://n:1/"] = lambda topic, uris: notified.append(clock.time())
-            # The answer falls anywhere between two ticks of the clock.
+            # The answer arrives anywhere between two ticks of the clock.
             await clock.advance(0.001 * fraction)
             registered = clock.time()
             notifier.defer("http://n:1/", "/t")
@@ -183,7 +182,7 @@ def test_update_soon_after_a_registration_is_delayed_20_to_30_ms() -> None:
             notifier.send(PublisherUpdate("http://n:1/", "/t"))
             while not notified:
                 await clock.advance(0.0005)
-            # One tick more, since a timer may be early by the clock's resolution.
+            # One tick more, since a timer may fire early by the clock's resolution.
             assert 0.02 <= notified[0] - registered < 0.032
             await notifier.close()
 
@@ -212,7 +211,7 @@ def test_update_after_the_pause_or_of_another_topic_is_sent_immediately() -> Non
 
 
 class SilentNode:
-    """A node's API that takes calls and answers nothing."""
+    """A node's API that accepts calls and never answers."""
 
     def __init__(self) -> None:
         self.calls = 0
@@ -300,7 +299,7 @@ def test_lists_of_a_new_master_drop_no_connection_for_10_seconds(seconds: float,
             subscription = b.make_subscription("/t", STRING, lambda *_: None)
             await b.subscribe(subscription)
             await until(lambda: subscription.links)
-            # The master has restarted, and has heard of this node before the publisher.
+            # The master has restarted, and this node registers before the publisher.
             subscription.registered_again([])
             subscription.publishers_changed([a.uri])
             await clock.advance(seconds)

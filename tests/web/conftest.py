@@ -27,7 +27,7 @@ __all__ = ["FOXGLOVE", "Client", "RosbridgeClient", "Running", "bridge", "patien
 _T = TypeVar("_T")
 FOXGLOVE = Subprotocol("foxglove.websocket.v1")
 
-# A client of a test may read nothing for long. websockets sends pings without being asked since version 15.
+# A test's client may not read for a long time. Since version 15, websockets sends pings by itself.
 _PATIENT_CLIENT: dict[str, Any] = {"open_timeout": PATIENCE}
 if "ping_interval" in inspect.signature(connect).parameters:
     _PATIENT_CLIENT["ping_interval"] = None
@@ -116,7 +116,7 @@ class Running:
 
 
 class Client:
-    """A client of the Foxglove protocol; what came is kept by its op until it is wanted."""
+    """A client of the Foxglove protocol; received messages are kept by op until a test reads them."""
 
     def __init__(
         self,
@@ -152,13 +152,13 @@ class Client:
         return self._next(lambda each: isinstance(each, bytes) and each[0] == opcode)  # type: ignore[return-value]
 
     def channel(self, topic: str) -> int:
-        """Return a topic's channel, when it is there."""
+        """Return a topic's channel once it is advertised."""
         while topic not in self.channels:
             self.next("advertise")
         return int(self.channels[topic]["id"])
 
     def service(self, name: str) -> int:
-        """Return a service's id, when it is there."""
+        """Return a service's id once it is advertised."""
         while name not in self.services:
             self.next("advertiseServices")
         return int(self.services[name]["id"])
@@ -192,7 +192,7 @@ class Client:
 
 
 class RosbridgeClient:
-    """A client of rosbridge; what came is kept until it is wanted. CBOR becomes what its library makes of it."""
+    """A rosbridge client; received messages are kept until a test reads them. CBOR is decoded by its library."""
 
     def __init__(self, port: int, *, path: str = "/", **options: Any) -> None:
         self._stack = contextlib.ExitStack()
@@ -217,7 +217,7 @@ class RosbridgeClient:
             self._kept.append(found)
 
     def call(self, service: str, args: object = None, **options: Any) -> dict[str, Any]:
-        """Return the answer to a call."""
+        """Return the response to a service call."""
         id_ = f"call:{service}"
         self.send(op="call_service", id=id_, service=service, args=args, **options)
         return self.next("service_response", id=id_)
@@ -243,7 +243,7 @@ def _has(message: dict[str, Any], op: str, fields: dict[str, Any]) -> bool:
 
 @pytest.fixture
 def run_bridge(master: str) -> Iterator[Callable[..., Running]]:
-    """Return a function that starts a bridge with these options at a free port."""
+    """Return a function that starts a bridge with these options on a free port."""
     running: list[Running] = []
 
     def start(playback: Any = None, **options: Any) -> Running:

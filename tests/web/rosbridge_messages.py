@@ -1,4 +1,4 @@
-"""Messages that went through the real rosbridge_websocket (rosbridge_suite, branch ros1); what came out is recorded."""
+"""Messages that were sent through the real rosbridge_websocket (rosbridge_suite, branch ros1), and its recorded output."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who may connect: Host, Origin, tokens; and which names clients may use."""
+"""Access control: Host, Origin, tokens; and the names that clients may use."""
 
 from __future__ import annotations
 

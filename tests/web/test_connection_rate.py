@@ -1,4 +1,4 @@
-"""The rate limit of new connections, with a clock of the test."""
+"""The rate limit of new connections, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from minirospy.web.server.rate import MAX_ADDRESSES, ConnectionRate
 
 
 class Clock:
-    """A clock that moves when the test moves it."""
+    """A clock that the test advances."""
 
     now = 0.0
 

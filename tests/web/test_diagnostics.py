@@ -56,7 +56,7 @@ def test_diagnostics_name_clients_and_warn_of_drops(
         finally:
             publishing.cancel()
 
-    # It reads nothing now.
+    # The client does not read any more.
     warned = bridge.run(overflow())
     assert "messages dropped in a second" in warned.message
     counts = {each.key: int(each.value) for each in warned.values}

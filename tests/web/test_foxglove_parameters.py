@@ -1,4 +1,4 @@
-"""Changes of parameters, of which the master notifies, as clients get them."""
+"""Parameter changes of which the master notifies the bridge, as clients receive them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from minirospy.web.graph import Filters
 
 
 class Listener:
-    """A client, and the reports that it got."""
+    """A client, and the reports that it received."""
 
     def __init__(self) -> None:
         self.reports: list[list[Parameter]] = []
@@ -26,7 +26,7 @@ class Listener:
 
 
 class Graph:
-    """A graph whose master has these parameters; what is spawned is run by the test."""
+    """A graph whose master has these parameters; the test runs spawned tasks."""
 
     filters = Filters()
 
@@ -42,7 +42,7 @@ class Graph:
         self.spawned.append(work)
 
     def change(self, name: str, value: object) -> None:
-        """Notify of a change, and finish what follows from it."""
+        """Notify of a change, and finish the tasks that follow from it."""
 
         async def finish() -> None:
             for listener in list(self.node.parameters.listeners):

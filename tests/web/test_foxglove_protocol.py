@@ -1,4 +1,4 @@
-"""Frames of the Foxglove protocol as its specification shows them, and what is refused."""
+"""Frames of the Foxglove protocol as in its specification, and refused frames."""
 
 from __future__ import annotations
 

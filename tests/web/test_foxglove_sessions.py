@@ -1,4 +1,4 @@
-"""Clients of the Foxglove protocol against a bridge, with real sockets and nodes."""
+"""Clients of the Foxglove protocol with a bridge, with real sockets and nodes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 def text_of(frame: bytes) -> tuple[int, str]:
-    """Return the subscription and the text of a message with a std_msgs/String."""
+    """Return the subscription and the string of a message with a std_msgs/String."""
     opcode, subscription, _ = struct.unpack_from("<BIQ", frame)
     assert opcode == 1
     (length,) = struct.unpack_from("<I", frame, 13)
@@ -199,7 +199,7 @@ def test_type_that_is_not_installed_is_read_from_its_publisher(bridge: Running) 
 
 
 def test_definition_that_differs_replaces_the_channel(bridge: Running) -> None:
-    """The installed std_msgs/String is not what this publisher sends."""
+    """This publisher's definition differs from the installed std_msgs/String."""
     made = raw_class(InterfaceType("std_msgs/String", "1" * 32, "int32 x\n"))
     publisher = bridge.publisher(bridge.node("odd"), "/odd", made, latch=True)
     bridge.call(lambda: publisher.publish_raw(struct.pack("<i", 5)))
@@ -283,7 +283,7 @@ def test_changes_of_parameters_reach_subscribers(bridge: Running) -> None:
     assert everything.next("parameterValues")["parameters"] == [{"name": "/ns/x", "value": 5}]
     assert everything.next("parameterValues")["parameters"] == [{"name": "/a"}]
     client.send(op="unsubscribeParameterUpdates", parameterNames=["/a", "/ns", "/ns/x"])
-    # Its answer shows that the bridge has read what came before.
+    # Its response shows that the bridge has read the earlier messages.
     client.send(op="getParameters", parameterNames=["/a"], id="unsubscribed")
     client.next("parameterValues", lambda message: message.get("id") == "unsubscribed")
     everything.close()
@@ -416,7 +416,7 @@ def test_simulated_time_is_sent_and_stamps_messages(master: str, run_bridge: Cal
 
 
 def test_restarted_publisher_is_connected_again(bridge: Running) -> None:
-    """Between two looks at the graph: the client keeps its subscription."""
+    """The restart is between two refreshes of the graph: the client keeps its subscription."""
     node = bridge.node("talker")
     publisher = bridge.publisher(node, "/chatter", String, latch=True)
     bridge.run(publisher.publish("first"))
@@ -492,7 +492,7 @@ def test_topic_subscribed_again_in_the_same_turn_goes_on(bridge: Running) -> Non
     arrived = asyncio.Event()
 
     def first(_: object) -> None:
-        """Take nothing."""
+        """Discard the message."""
 
     def second(_: object) -> None:
         arrived.set()

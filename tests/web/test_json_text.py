@@ -1,4 +1,4 @@
-"""Texts of clients: their memory; JSON with limits, and the parser in pieces against the library's."""
+"""Texts of clients: their memory; JSON with limits, and the incremental parser compared with the library's."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ALPHABET = '[]{}",:01.e-+ \n\\atrufalsn'
 
 
 def outcome(load: Any, text: str) -> str:
-    """Return what a parser makes of a text: a value's repr, which NaN has too, or that it is refused."""
+    """Return a parser's result: the value's repr, which also compares NaN, or that it is refused."""
     try:
         return repr(load(text))
     except (ValueError, RecursionError):
@@ -123,7 +123,7 @@ WIDE = "\U0001f600"
 
 
 def slow_width(text: str) -> int:
-    """Return the width by looking at each character."""
+    """Return the width by checking each character."""
     highest = max(map(ord, text), default=0)
     return 4 if highest > 0xFFFF else 2 if highest > 0xFF else 1
 
@@ -146,7 +146,7 @@ def slow_width(text: str) -> int:
 def test_width_and_size_are_those_of_memory(part: str, times: int) -> None:
     text = part * times
     assert width_of(text) == slow_width(text)
-    # Not the text of the test itself, which may keep a copy in UTF-8.
+    # Not the test's own string, which may cache a copy in UTF-8.
     made = "".join(text)
     assert size_in_memory(text.encode(errors="surrogatepass")) == slow_width(made) * len(made)
 
@@ -164,7 +164,7 @@ def test_one_wide_character_makes_a_text_four_times_as_large() -> None:
     [(",", 4_000_000, "values"), ("[", 1_000_000, "values"), ("{", 1_000_000, "values")],
 )
 def test_values_lists_and_objects_are_limited(mark: str, most: int, what: str) -> None:
-    """Marks within strings count, too: such a text is quickly parsed."""
+    """Marks within strings count, too: such a text is parsed quickly."""
     text = f'"{mark * most}"'
     assert load_json(text) == mark * most
     with pytest.raises(ValueError, match=f"more than {most} {what}"):

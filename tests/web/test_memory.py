@@ -1,4 +1,4 @@
-"""The memory of a bridge's process while strangers try to fill it: by /proc, so on Linux. Nothing here is timed."""
+"""The memory of a bridge's process under attack, from /proc, so only on Linux. The tests measure no times."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="by /proc")
 
 
 class Attacked:
-    """A bridge as a process, and clients of it that read nothing."""
+    """A bridge as a process, and clients of it that do not read."""
 
     def __init__(self, stack: contextlib.ExitStack) -> None:
         self._stack = stack
@@ -46,7 +46,7 @@ class Attacked:
 
     @property
     def peak(self) -> int:
-        """The most memory that the process has had."""
+        """Return the process's peak memory."""
         status = Path(f"/proc/{self._process.pid}/status").read_text(encoding="ascii")
         found = re.search(r"VmHWM:\s+(\d+) kB", status)
         assert found
@@ -80,7 +80,7 @@ class Attacked:
             assert sock.recv(4096)
 
     def side_by_side(self, count: int, work: Callable[[], object]) -> None:
-        """Do some work as so many clients at the same time, each in a thread; being disconnected ends a client."""
+        """Run ``work`` in ``count`` threads in parallel, one for each client; a client that is disconnected stops."""
 
         def run() -> None:
             with contextlib.suppress(OSError):
@@ -94,7 +94,7 @@ class Attacked:
 
 
 def frame(data: bytes, opcode: int = Opcode.TEXT, *, announced: int = 0) -> bytes:
-    """Return a client's frame; with ``announced`` its end is missing."""
+    """Return a client's frame; with ``announced`` it is truncated."""
     size = announced or len(data)
     return bytes((0x80 | opcode, 0xFF)) + struct.pack("!Q", size) + bytes(4) + data
 
@@ -116,7 +116,7 @@ def attacked(master: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> It
 
 
 def meshes(attacked: Attacked) -> None:
-    """25 clients request a mesh of 60 MB five times each, and read nothing."""
+    """25 clients request a mesh of 60 MB five times each, and do not read."""
     for _ in range(25):
         sock = attacked.foxglove()
         for number in range(5):
@@ -124,7 +124,7 @@ def meshes(attacked: Attacked) -> None:
 
 
 def fragments(attacked: Attacked) -> None:
-    """Twenty clients send fragments of wide characters whose messages are never whole."""
+    """Twenty clients send fragments of wide characters whose messages are never complete."""
     data = "\U0001f600" + "a" * 250_000
 
     def send() -> None:
@@ -142,7 +142,7 @@ def half_messages(attacked: Attacked) -> None:
 
 
 def wide_texts(attacked: Attacked) -> None:
-    """Texts of 60 MB with one wide character."""
+    """Send strings of 60 MB with one wide character."""
     data = frame(b'{"op": "x", "y": "\xf0\x9f\x98\x80' + b"a" * 60_000_000 + b'"}')
     attacked.side_by_side(2, lambda: attacked.rosbridge().sendall(data))
 

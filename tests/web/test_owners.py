@@ -1,4 +1,4 @@
-"""The users of sockets on this machine, by a query and by the table of all sockets."""
+"""The owners of sockets on this machine, by a query and by the table of all sockets."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_owner_of_a_socket_is_known_in_each_state(
             assert owner_of(own, ("127.0.0.7", other[1])) is None
             assert owner_of(("?", own[1]), other) is None
             assert owner_of(own, ("::2" if "." in own[0] else "127.0.0.1", other[1])) is None
-            # A server listens at this end, but has no such connection.
+            # A server listens at this endpoint, but has no such connection.
             assert owner_of(other, ("127.0.0.7" if "." in own[0] else "::2", own[1])) is None
             # The kernel lists a socket that no process has open as root's.
             client.close()

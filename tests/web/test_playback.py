@@ -22,7 +22,7 @@ PLAYING, PAUSED, ENDED = 0, 1, 3
 
 @pytest.fixture
 def player(master: str, tmp_path: Path) -> Iterator[Client]:
-    """Return a client of a player of 100 s with a message each second, which is paused at its start."""
+    """Return a client of a player of 100 s with a message each second, paused at its start."""
     name = make_bag(tmp_path / "a.bag", [("/a", number, f"message {number}") for number in range(101)])
     command = [
         sys.executable,
@@ -58,7 +58,7 @@ def player(master: str, tmp_path: Path) -> Iterator[Client]:
 def control(
     client: Client, command: int, speed: float, seek: int | None, request: bytes
 ) -> tuple[int, int, float, int]:
-    """Return the player's state in its answer: status, time, speed, whether it is elsewhere."""
+    """Return the player's state in its response: status, time, speed, whether it seeked."""
     client.send_binary(
         struct.pack("<BBfBQI", 3, command, speed, seek is not None, seek or 0, len(request)) + request
     )
@@ -75,7 +75,7 @@ def test_front_end_controls_the_player(player: Client) -> None:
     assert info["dataStartTime"] == {"sec": 1000, "nsec": 0}
     assert info["dataEndTime"] == {"sec": 1100, "nsec": 0}
     player.subscribe("/a", 3)
-    # Nothing else shows that the server is connected to what is played.
+    # Nothing else shows that the server is connected to the player's topics.
     control(player, 0, 1.0, None, b"connected")
     player.next_binary(1)
 
@@ -95,7 +95,7 @@ def test_front_end_controls_the_player(player: Client) -> None:
     while player.next_binary(5)[1] != ENDED:
         pass
 
-    # At the end: back, at another rate.
+    # At the end, seek back at another rate.
     status, time, _, _ = control(player, 0, 20.0, START + 98 * SECOND, b"back")
     assert status == PLAYING
     assert [text_of(player.next_binary(1))[1] for _ in range(3)] == [

@@ -71,12 +71,12 @@ def test_pair_is_sent_where_it_moved_enough() -> None:
 
 
 class RefusedCall(Exception):
-    """A call that was answered with an error."""
+    """A call whose response is an error."""
 
 
 @pytest.fixture
 def api(run_bridge: Callable[..., Running]) -> Callable[..., Any]:
-    """Return a function that calls a service of rosapi and returns its values; there are a talker and a server."""
+    """Return a function that calls a rosapi service and returns its values; a talker and a server are running."""
     bridge = run_bridge(
         rosapi=True,
         filters=Filters(NameFilter.of((), ["/hidden*"]), parameters=NameFilter.of((), ["/secret*"])),

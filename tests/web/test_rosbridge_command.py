@@ -22,7 +22,7 @@ Start = Callable[..., None]
 
 @pytest.fixture
 def start(master: str) -> Iterator[Start]:
-    """Return a function that starts a command and waits for a line with a text."""
+    """Return a function that starts a command and waits for a line that contains a text."""
     started: list[subprocess.Popen[str]] = []
 
     def starting(text: str, *words: str) -> None:

@@ -436,7 +436,7 @@ def test_messages_that_wait_share_the_room_of_their_client() -> None:
         assert not one.arrived(bytes(3000), 0.1)
     assert (one.dropped, other.dropped) == (3, 0)
     assert not other.arrived(bytes(6000), 0.1)
-    # The newest of a topic waits in any case.
+    # The newest message of a topic is kept in any case.
     assert other.dropped == 0
     assert not other.arrived(bytes(1), 0.1)
     assert (other.dropped, budget.taken <= 10_000) == (1, True)
@@ -465,7 +465,7 @@ def test_fragments_that_wait_are_bounded() -> None:
     assert waiting.add(first, 0.0) is None
     with pytest.raises(OperationError, match="error while trying to append fragment 0"):
         waiting.add(first, 1.0)
-    # The old message is forgotten: its first fragment is one of another message.
+    # The old message is discarded: its first fragment belongs to another message.
     assert waiting.add(first, 20.0) is None
     assert waiting.add(protocol.Fragment("i", "y", 1, 2), 21.0) == "xy"
     for number in range(6):
@@ -473,7 +473,7 @@ def test_fragments_that_wait_are_bounded() -> None:
         assert waiting.add(piece, 30.0) is None
     with pytest.raises(OperationError, match="too many"):
         waiting.add(protocol.Fragment("big", "x" * 10_000_000, 6, 9), 30.0)
-    # Also those without a text.
+    # This includes fragments without a string.
     with pytest.raises(OperationError, match="too many"):
         deque((waiting.add(protocol.Fragment(number, "", 0, 2), 40.0) for number in range(100_000)), 0)
 
@@ -571,14 +571,14 @@ def test_message_is_encoded_as_by_the_real_server(name: str) -> None:
     message, recorded = type(MESSAGES[name])(), RECORDED[name]
     message.deserialize(serialized(MESSAGES[name]))
     if hasattr(message, "header"):
-        message.header.seq = recorded["none"]["msg"]["header"]["seq"]  # which rospy numbers
+        message.header.seq = recorded["none"]["msg"]["header"]["seq"]  # rospy sets the sequence number
     assert json.loads(json.dumps(conversion.values(message))) == recorded["none"]["msg"]
     if "cbor" not in recorded:
-        # The real server fails on arrays of fixed length.
+        # The real server fails for arrays of fixed length.
         assert name == "camera"
         return
     found = cbor2.loads(cbor2.dumps(conversion.cbor_values(message)))
-    # Two NaNs are not equal.
+    # NaN does not equal NaN, so compare the repr.
     assert repr(found) == repr(cbor2.loads(bytes.fromhex(recorded["cbor"]))["msg"])
 
 

@@ -1,4 +1,4 @@
-"""The queue of a slow client: bounded, oldest of a topic dropped first, the newest always there."""
+"""The queue of a slow client: bounded, drops a topic's oldest message first, always has the newest."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from minirospy.web.server.account import LARGE_PIECE, Account
 from minirospy.web.server.queue import DEFAULT_LIMIT, ENTRY_BYTES, MAX_ANSWERS, SendQueue
 
-LIMIT = 1_000_000
-"""Bytes of a queue that a test fills."""
+LIMIT = 1_000_000  # bytes in a queue that a test fills
 
 
 def drained(queue: SendQueue) -> list[bytes]:

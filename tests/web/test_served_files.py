@@ -1,4 +1,4 @@
-"""Files that are sent in pieces: all of their bytes, one piece in memory, and what goes wrong."""
+"""Files that are sent in pieces: all of their bytes, one piece in memory, and failures."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def answer_of(file: BinaryIO, size: int) -> FileAnswer:
 
 
 def sent(answer: FileAnswer) -> tuple[list[bytes], FileSender]:
-    """Return the pieces of a file for a client that takes each immediately."""
+    """Return the pieces of a file for a client that accepts each immediately."""
 
     async def run() -> tuple[list[bytes], FileSender]:
         ready = asyncio.Event()

@@ -1,4 +1,4 @@
-"""The ROS side that clients share: what is ended while it starts, and what ends while it waits."""
+"""The ROS side that clients share: subscriptions that end while they start, and services that end while a call waits."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running,
         for _ in range(turns):
             await asyncio.sleep(0)
         publication.close()
-        # Raises what a task has raised.
+        # Raise the exceptions of the tasks.
         await asyncio.wait_for(asyncio.gather(*graph._tasks), 30)
         assert "/short" not in graph.node._published
 
@@ -88,7 +88,7 @@ def test_service_whose_node_answers_late_is_offered(bridge: Running) -> None:
 
         bridge.run(register())
         client = bridge.client()
-        # Topics are offered when the bridge has waited for services.
+        # Topics are advertised after the bridge has waited for services.
         assert client.channel("/chatter")
         assert "/late" not in client.services
         may_answer.set()
@@ -105,7 +105,7 @@ def test_earlier_look_does_not_replace_the_snapshot_of_a_later_one(
         return snapshots.pop(0)
 
     async def look_up_services(_: object) -> None:
-        """Wait for the type of a service in the first look."""
+        """Wait for the type of a service in the first refresh."""
         if not is_waiting.is_set():
             is_waiting.set()
             await may_end.wait()
@@ -129,7 +129,7 @@ def test_earlier_look_does_not_replace_the_snapshot_of_a_later_one(
 
 @pytest.mark.parametrize("turns", range(6))
 def test_graph_that_is_closed_as_it_is_to_look_again_ends(bridge: Running, turns: int) -> None:
-    """In one of these turns asyncio.wait_for before Python 3.12 swallows the cancelling: the event has come with it."""
+    """asyncio.wait_for before Python 3.12 swallows the cancellation if the event arrives in the same iteration."""
 
     async def look_and_close() -> None:
         graph = SharedGraph(bridge.bridge.node, max_refresh_interval=60.0)

@@ -1,4 +1,4 @@
-"""Tasks of the bridges that run for long: what nobody foresaw is reported in one line, and the work goes on."""
+"""Long-running tasks of the bridges: an unexpected exception is reported in one line, and the task continues."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ LIMIT = 60.0
 
 
 class Failing:
-    """A function that raises what nobody foresaw at the calls of these numbers, and notifies of its last call."""
+    """A function that raises an unexpected exception at the calls with these numbers, and sets an event at its last call."""
 
     def __init__(self, fails_at: set[int], calls: int, returns: object = None) -> None:
         self._fails_at = fails_at
@@ -106,7 +106,7 @@ def test_text_of_an_error_is_one_line_without_control_characters(caplog: pytest.
 
 
 class Network:
-    """A network on which nothing comes."""
+    """A network that receives nothing."""
 
     def __getattr__(self, _: str) -> Callable[..., Any]:
         return lambda *_: stub(undeclare=lambda: None)
@@ -193,7 +193,7 @@ def test_robot_that_cannot_be_shown_keeps_no_other_away(
         made.contents.robots = lambda _lost=(): robots  # type: ignore[method-assign]
         await made._reconcile()
         assert shown == ["b"]
-        # It is tried again without a new token.
+        # It is retried without a new token.
         fails = False
         await until(lambda: "a" in shown)
         await made.close()

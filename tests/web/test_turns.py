@@ -1,4 +1,4 @@
-"""How the clients of a server share its event loop: whose work is done when, with a clock that the test holds."""
+"""How the clients of a server share its event loop: the order of their work, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Machine:
-    """A clock, the iterations of a loop, and clients whose pieces of work take a time."""
+    """A clock, the iterations of a loop, and clients whose work takes time."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -42,7 +42,7 @@ class Machine:
         return self.turns.start(self.shares[name])
 
     def iterate(self) -> list[str]:
-        """Run an iteration of the loop; return the clients whose pieces were done, in order."""
+        """Run a loop iteration; return the clients whose work was done, in order."""
         before = len(self.done)
         ready, self.soon[:] = list(self.soon), []
         for function in ready:
@@ -69,7 +69,7 @@ def test_work_of_all_clients_in_one_iteration_is_bounded() -> None:
     start = machine.now
     for name in names:
         machine.send(name, 100)
-    # Two pieces are a slice, after which the others are queued; the credit of one turn is used up after four.
+    # Two pieces of work fill a slice, after which the other clients are queued; four use up the credit of one turn.
     assert machine.now - start <= 0.005
     for _ in range(20):
         start = machine.now
@@ -204,7 +204,7 @@ def test_client_does_not_pay_while_other_processes_have_the_processor() -> None:
 
 
 def test_interactive_client_goes_before_clients_whose_work_is_never_done() -> None:
-    """Also if it uses more than an equal part of the time: its requests take longer than a slice."""
+    """It goes first even if it uses more than an equal share of the time: its requests take longer than a slice."""
     machine = Machine()
     machine.join("good", 0.003)
     for number in range(250):
@@ -218,7 +218,7 @@ def test_interactive_client_goes_before_clients_whose_work_is_never_done() -> No
         before = len(machine.done)
         while "good" not in machine.done[before:]:
             machine.iterate()
-        # The rest of the slices that bulk clients have, and no slice of each.
+        # It waits for the rest of the bulk clients' slices, not for a slice of each.
         assert machine.done[before:].index("good") <= 12
         machine.iterate()
 
@@ -253,7 +253,7 @@ def test_bulk_client_becomes_interactive_after_a_short_burst() -> None:
         machine.iterate()
     for _ in range(20):
         machine.iterate()
-    # Its burst was longer than ten slices: it waits like the other one, then no more.
+    # Its burst was longer than ten slices: it waits like the other client, then no more.
     waits = []
     for _ in range(2):
         machine.send("a", 1)
@@ -279,5 +279,5 @@ def test_clients_that_come_when_nobody_waits_start_at_the_same_tag() -> None:
     machine.done.clear()
     while machine.left["busy"]:
         machine.iterate()
-    # The one first that takes less: what they have used before they were idle does not count.
+    # The client that needs less goes first: its use before it was idle does not count.
     assert machine.done[:2] == ["good", "idle"]

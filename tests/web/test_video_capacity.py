@@ -1,4 +1,4 @@
-"""The limit on images that are worked on at the same time, and how many pixels a message has."""
+"""The limit of images that are processed at the same time, and the number of pixels in a message."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_work_that_does_not_fit_waits_in_order() -> None:
         events["c"].set()
         await tasks[2]
         await asyncio.sleep(0)
-        # What is larger than all there is goes on alone.
+        # An item that is larger than the capacity runs alone.
         assert (done, capacity.taken_units) == (["a", "b", "c", "d"], 10)
         events["d"].set()
         await tasks[3]
@@ -60,7 +60,7 @@ def test_cancelled_work_gives_its_turn_back(has_turn: bool) -> None:
             await asyncio.sleep(0)
             if not has_turn:
                 first.cancel()
-        # With the block's end it is the turn of the first one, which has not run yet.
+        # At the end of the block, it is the turn of the first one, which has not run yet.
         first.cancel()
         await asyncio.wait([first, second])
         assert first.cancelled()

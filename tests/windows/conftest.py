@@ -1,4 +1,4 @@
-"""The environment of the tests of Windows' CPython under Wine.
+"""The environment for tests of Windows' CPython under Wine.
 
 `make windows` sets Wine up; without it these tests are skipped.
 """
@@ -56,7 +56,7 @@ def environ(place: Path) -> dict[str, str]:
 
 @pytest.fixture
 def start(place: Path, environ: dict[str, str]) -> Iterator[Start]:
-    """Return a function that starts a command of Windows; in the end all that runs there is ended by force."""
+    """Return a function that starts a Windows command; kill all Windows processes after the test."""
     runs: list[Run] = []
 
     def start(*words: str, **more: str) -> Run:
@@ -66,7 +66,7 @@ def start(place: Path, environ: dict[str, str]) -> Iterator[Start]:
     yield start
     for run in runs:
         run.process.kill()
-    # The connection of a killed client may stay open in Wine: its virtual board would wait for it.
+    # Wine may keep a killed client's connection open: its virtual board would wait for it.
     WINDOWS.stop_server()
     for run in runs:
         run.close()

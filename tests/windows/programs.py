@@ -1,4 +1,4 @@
-"""What the tests of Windows share: programs that run in Wine, the commands, and the files of a node."""
+"""Helpers of the Windows tests: programs that run in Wine, the commands, and the files of a node."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from tests.windows.windows import Windows
 
 WINDOWS = Windows()
 
-SECONDS = 240.0
-"""A process takes seconds to start under Wine, several times as many on a busy machine."""
+SECONDS = 240.0  # a process takes seconds to start under Wine, and several times as many on a busy machine
 
 MANIFEST = """<package><name>pkg</name><version>1.0.0</version><description>d</description>
 <maintainer email="a@b.c">m</maintainer><license>BSD</license></package>"""
@@ -31,8 +30,7 @@ while not rospy.is_shutdown():
     rospy.sleep(0.05)
 """
 
-ESCAPED = r"Gr\xF6\xDFe"
-"""As rostopic prints it, in YAML."""
+ESCAPED = r"Gr\xF6\xDFe"  # as rostopic prints it, in YAML
 
 WAIT = """#!/usr/bin/env python
 import rospy
@@ -44,7 +42,7 @@ rospy.spin()
 
 
 class Run:
-    """A program of Windows that runs; what it prints is read as it comes."""
+    """A running Windows program, whose output is read as it arrives."""
 
     def __init__(self, process: subprocess.Popen[bytes]) -> None:
         self.process = process
@@ -54,7 +52,7 @@ class Run:
         self._reader.start()
 
     def until(self, *words: str) -> str:
-        """Read until all words were printed; return what was printed so far."""
+        """Read until all words were printed; return the output so far."""
         end = time.monotonic() + SECONDS
         while not all(word in self.said for word in words):
             try:
@@ -67,7 +65,7 @@ class Run:
         return self.said
 
     def reaches(self, words: str) -> bool:
-        """Read until the words were printed; return False if it ends before."""
+        """Read until the words were printed; return False if the program exits before."""
         while words not in self.said:
             line = self._lines.get(timeout=SECONDS)
             if not line:
@@ -76,7 +74,7 @@ class Run:
         return True
 
     def available(self) -> str:
-        """Return what was printed so far."""
+        """Return the output so far."""
         while not self._lines.empty():
             line = self._lines.get()
             assert line, f"it ended:\n{self.said}"
@@ -84,17 +82,17 @@ class Run:
         return self.said
 
     def rest(self) -> str:
-        """Return what a program that has ended has printed."""
+        """Return the remaining output of a program that has exited."""
         self._reader.join()
         while line := self._lines.get():
             self.said += line
         return self.said
 
     def close(self) -> None:
-        """End it by force."""
+        """Kill the program."""
         self.process.kill()
         self.process.wait()
-        # Closed by the last that has it: what a launcher has started, too.
+        # The pipe is closed by its last process, including those that a launcher has started.
         self._reader.join(SECONDS)
         if self._reader.is_alive():
             pytest.fail(f"what it started still has its output:\n{self.said}")
@@ -112,7 +110,7 @@ Start = Callable[..., Run]
 
 
 def no_process_left() -> None:
-    """Wait until no Python of Windows runs any more."""
+    """Wait until no Windows Python runs any more."""
     end = time.monotonic() + SECONDS
     while left := WINDOWS.processes():
         assert time.monotonic() < end, [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in left]
@@ -120,5 +118,5 @@ def no_process_left() -> None:
 
 
 def command(name: str) -> str:
-    """Return the file of a command, as pip for Windows made it."""
+    """Return the path of a command, as pip for Windows created it."""
     return rf"C:\Python312\Scripts\{name}.exe"

@@ -1,4 +1,4 @@
-"""Windows' CPython under Wine: commands, nodes on both sides, launch files, workspaces, and what is left of a killed launcher."""
+"""Windows' CPython under Wine: commands, nodes on both sides, launch files, workspaces, and leftovers of a killed launcher."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_demo(environ: dict[str, str], place: Path) -> None:
 
 
 def test_the_first_evening(start: Start, environ: dict[str, str], place: Path) -> None:
-    """A master, a node of the workshop, topics, services, parameters."""
+    """Run a master, a node of the workshop, and the commands for topics, services and parameters."""
 
     def run(name: str, *words: str) -> str:
         status, said = WINDOWS.run(command(name), *words, folder=place, environ=environ)
@@ -46,7 +46,7 @@ def test_the_first_evening(start: Start, environ: dict[str, str], place: Path) -
     assert run("minirospy", "board", "get", "2") == "1\n"
     server.close()
 
-    # A node of the same name.
+    # A node with the same name.
     start(command("rosrun"), "rpi_feros", "led_actuator.py")
     while "/button_state" not in run("rostopic", "list"):
         pass
@@ -61,7 +61,7 @@ def test_the_first_evening(start: Start, environ: dict[str, str], place: Path) -
 def test_nodes_of_linux_and_windows_exchange_messages(
     start: Start, environ: dict[str, str], place: Path, master: str
 ) -> None:
-    """Over a master of Linux, in both directions; the text has an umlaut."""
+    """With a master on Linux, in both directions; the string has an umlaut."""
     write_files(place, {"talker.py": TALKER})
     linux = {**os.environ, "ROS_MASTER_URI": master, "PYTHONUTF8": "1"}
     with subprocess.Popen([sys.executable, "talker.py", "_place:=Linux"], cwd=place, env=linux) as talker:
@@ -110,7 +110,7 @@ def test_launch_file_with_line_ends_of_windows(start: Start, place: Path, enviro
 
 
 def test_workspace(place: Path, environ: dict[str, str]) -> None:
-    """Built, and used through setup.bat."""
+    """Build a workspace, and use it through setup.bat."""
     package = place / "ws" / "src" / "pkg"
     lists = "cmake_minimum_required(VERSION 3.0)\nproject(pkg)\nfind_package(catkin REQUIRED message_generation)\n"
     lists += "add_message_files(FILES Led.msg)\ngenerate_messages()\ncatkin_package()\n"
@@ -143,7 +143,7 @@ def test_bag(start: Start, place: Path, environ: dict[str, str]) -> None:
 
 @pytest.mark.parametrize("launcher", ["roslaunch", "rosrun", "minirospy"])
 def test_nothing_outlives_a_launcher_that_is_ended_by_force(launcher: str, start: Start, place: Path) -> None:
-    """Also while it starts: ended at different moments, and by its command's .exe."""
+    """Also while the launcher starts: kill it at different moments, also as its command's .exe."""
     write_files(
         place / "pkg",
         {
@@ -158,7 +158,7 @@ def test_nothing_outlives_a_launcher_that_is_ended_by_force(launcher: str, start
         "minirospy": (["demo"], ["Starting", "pressed"]),
     }[launcher]
     for moment in moments:
-        # A board that has a name outlives what started it; the demo's own must not.
+        # A board with a name outlives the process that started it; the demo's own must not.
         run = start(command(launcher), *words, MINIROSPY_BOARD="")
         run.until(moment)
         run.close()

@@ -1,4 +1,4 @@
-"""The workshop's first evening and what follows, typed on Windows' CPython under Wine; nodes of real ROS on the other side."""
+"""The workshop's first evening and later pages on Windows' CPython under Wine, with nodes of real ROS on the other side."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ print("ready", flush=True)
 while not is_over.wait(0.5):
     cancel.publish(GoalID())
 """
-"""Cancels whatever goal there is, again and again, until a result comes."""
+"""Cancels any goal repeatedly, until a result arrives."""
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def typed(environ: dict[str, str], place: Path) -> Typed:
 
 
 class Typed:
-    """Commands that a student types in another terminal: what they print is returned."""
+    """Runs commands as in a student's other terminal, and returns their output."""
 
     def __init__(self, environ: dict[str, str], folder: Path) -> None:
         self._environ = environ
@@ -58,7 +58,7 @@ class Typed:
 
 
 def listing(name: str) -> str:
-    """Return the path of a program of the workshop, as it was printed there."""
+    """Return the path of a workshop program, as printed in the course."""
     return WINDOWS.path(LISTINGS / name)
 
 
@@ -137,7 +137,7 @@ def test_recorded_messages_are_played(start: Start, place: Path, typed: Typed) -
 @pytest.mark.skipif(not (REAL_BIN / "rosmaster").exists(), reason="real ROS 1 is not installed: make interop")
 @pytest.mark.parametrize("direction", ["from Windows", "to Windows"])
 def test_nodes_of_real_ros_and_windows(direction: str, place: Path, environ: dict[str, str]) -> None:
-    """Over rosmaster: four types, one of them an image of 6 MB, and a service; the same bytes on both sides."""
+    """With rosmaster: four types, one of them an image of 6 MB, and a service; the bytes on both sides are equal."""
     with running_master("rospy") as uri:
         here = {**environ, "ROS_MASTER_URI": uri}
 

@@ -1,4 +1,4 @@
-"""Launchers that are ended by force, many times; and Ctrl-C in a console, as Wine delivers it."""
+"""Killing launchers many times; and Ctrl-C in a console, as Wine delivers it."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ if sys.platform != "win32":
 
 @pytest.mark.timeout(3000)
 def test_fifty_launches_ended_by_force_leave_no_process(start: Start) -> None:
-    """`minirospy demo`, five at a time; ended while it starts, when its nodes work, and in between."""
+    """Run `minirospy demo`, five at a time; kill it while it starts, when its nodes work, and in between."""
     killed = 0
     moments = itertools.cycle(MOMENTS)
     while killed < LAUNCHES:
-        # Each has a board of its own.
+        # Each has a separate board.
         runs = [start(command("minirospy"), "demo", MINIROSPY_BOARD="") for _ in range(TOGETHER)]
         for run in runs:
-            # On a very busy machine a demo may give up before its nodes work: that is none of the fifty.
+            # On a very busy machine a demo may give up before its nodes work: that one does not count.
             killed += run.reaches(next(moments))
             run.close()
         no_process_left()
@@ -64,7 +64,7 @@ def test_ctrl_c_in_the_console_ends_roslaunch_and_its_nodes(place: Path, environ
 
 
 class _Terminal:
-    """What programs print on a pseudo terminal."""
+    """Reads the output of programs on a pseudo terminal."""
 
     def __init__(self, file: int) -> None:
         self._file = file

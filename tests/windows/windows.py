@@ -1,7 +1,7 @@
-"""Windows' CPython on Linux, by Wine: it is set up with the wheel of this checkout, and runs programs.
+"""Windows' CPython on Linux with Wine: set it up with the wheel of this checkout, and run programs.
 
-A program, too: ``python tests/windows/windows.py setup``; ``run ARGUMENT ...`` for python.exe with these arguments;
-``test TEST ...`` for tests of this checkout, which run there on the installed wheel.
+Also a program: ``python tests/windows/windows.py setup``; ``run ARGUMENT ...`` runs python.exe with these arguments;
+``test TEST ...`` runs tests of this checkout there, with the installed wheel.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ TEST_WHEELS = (
 
 
 class Windows:
-    """The folder of a Windows, in which programs run."""
+    """A Windows installation in a folder, in which programs run."""
 
     def __init__(self, folder: Path = FOLDER) -> None:
         self.folder = folder
@@ -63,11 +63,11 @@ class Windows:
         if not self.is_ready:
             shutil.rmtree(self.folder, ignore_errors=True)
             self.folder.mkdir(parents=True)
-            # Else a Wine without a screen waits for an answer to its questions.
+            # Otherwise a Wine without a screen waits for an answer to its questions.
             self._checked([_wine(), "wineboot", "-i"])
             self._checked([_wine(), "winecfg", "-v", "win10"])
             self._unpack_python()
-            # All together: a second call would replace numpy by its newest.
+            # All in one call: a second call would replace numpy by its newest version.
             wheels = [*WHEELS, *TEST_WHEELS]
             self._checked([*_PIP, "install", "-q", "--target", str(self.packages), *_FOR_WINDOWS, *wheels])
             (self.folder / "ready").touch()
@@ -81,10 +81,10 @@ class Windows:
         has_input: bool = False,
         console: int | None = None,
     ) -> subprocess.Popen[bytes]:
-        """Start a program of Windows: ``.py`` and options go to python.exe.
+        """Start a Windows program: ``.py`` files and options are run with python.exe.
 
-        Its streams are pipes, its input is empty, or with ``has_input`` for the caller to close; or they are ``console``, a
-        terminal of Linux.
+        Its streams are pipes; stdin is empty, or with ``has_input`` for the caller to close; or they are ``console``, a
+        Linux terminal.
         """
         command = (
             [_wine(), *words]
@@ -92,11 +92,11 @@ class Windows:
             else [_wine(), rf"{PYTHON}\python.exe", *words]
         )
         if console is not None:
-            # The terminal of a new session: then its Ctrl-C is a signal for what runs in it.
+            # Make it the terminal of a new session, so that Ctrl-C in it is a signal for the programs that run there.
             command = ["setsid", "--ctty", *command]
         process = subprocess.Popen(
             command,
-            # No file and no /dev/null: Python for Windows takes neither for a standard stream in Wine.
+            # Neither a file nor /dev/null: Python for Windows accepts neither as a standard stream in Wine.
             stdin=subprocess.PIPE if console is None else console,
             stdout=subprocess.PIPE if console is None else console,
             stderr=subprocess.STDOUT,
@@ -114,7 +114,7 @@ class Windows:
         environ: Mapping[str, str] | None = None,
         timeout: float = 300.0,
     ) -> tuple[int, str]:
-        """Run a program of Windows; return its exit status and what it printed, in Windows' code page."""
+        """Run a Windows program; return its exit status and its output, in Windows' code page."""
         with self.popen(*words, folder=folder, environ=environ) as process:
             try:
                 printed = _printed_until_exit(process, timeout)
@@ -124,7 +124,7 @@ class Windows:
         return process.returncode, printed.decode("cp1252", "replace").replace("\r\n", "\n")
 
     def copy_tests(self) -> Path:
-        """Copy the tests of this checkout, without the package: what is installed is tested. Return their folder."""
+        """Copy the tests of this checkout, without the package, since the installed one is tested. Return their folder."""
         folder = self.drive / "checkout"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
@@ -135,23 +135,23 @@ class Windows:
         return folder
 
     def start_server(self) -> None:
-        """Start Wine's server and its services, which else keep the streams of the first program open."""
+        """Start Wine's server and its services, which otherwise keep the streams of the first program open."""
         self._quietly([_server(), "-p"])
         self._quietly([_wine(), "cmd", "/c", "exit"])
 
     def stop_server(self) -> None:
-        """End the server, and all programs of this Windows."""
+        """Stop the server, and all programs of this Windows."""
         self._quietly([_server(), "-k"])
 
     def path(self, path: Path) -> str:
-        """Return what Windows calls a file or folder of Linux."""
+        """Return the Windows path of a Linux file or folder."""
         try:
             return "C:\\" + str(path.relative_to(self.drive)).replace("/", "\\")
         except ValueError:
             return "Z:" + str(path).replace("/", "\\")
 
     def processes(self) -> list[int]:
-        """Return the numbers, of Linux, of the Pythons that run in there."""
+        """Return the Linux process ids of the Windows Pythons."""
         found = []
         for entry in Path("/proc").iterdir():
             if not entry.name.isdecimal():
@@ -181,14 +181,14 @@ class Windows:
             **kept,
             "WINEPREFIX": self._prefix,
             "WINEDEBUG": "-all",
-            # No windows that ask whether to download a browser, and no menu entries of Linux.
+            # No windows that ask whether to download a browser, and no entries in Linux menus.
             "WINEDLLOVERRIDES": "mscoree,mshtml,winemenubuilder.exe=",
             "WINEPATH": rf"{PYTHON};{PYTHON}\Scripts",
             **more,
         }
 
     def _unpack_python(self) -> None:
-        """Unpack the embeddable Python, and let it find packages as an installed one does."""
+        """Unpack the embeddable Python, and make it find packages as an installed one does."""
         with tempfile.TemporaryDirectory() as name:
             self._checked(
                 [
@@ -213,13 +213,13 @@ class Windows:
 
         self.packages.mkdir(parents=True)
         for path_file in self.python.glob("*._pth"):
-            # It would isolate Python from PYTHONPATH and from the folder of the script.
+            # The file would isolate Python from PYTHONPATH and from the script's folder.
             path_file.unlink()
-        # Wine 8 crashes in it; `platform` does without.
+        # Wine 8 crashes in it; `platform` works without.
         (self.python / "_wmi.pyd").unlink()
 
     def _install_wheel(self) -> None:
-        """Build the wheel, and install it by Windows' own pip, which makes the commands."""
+        """Build the wheel, and install it with Windows' own pip, which creates the commands."""
         with tempfile.TemporaryDirectory() as name:
             self._checked(
                 [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", name, str(ROOT)]
@@ -258,9 +258,9 @@ _FOR_WINDOWS = ["--platform", "win_amd64", "--python-version", VERSION, "--only-
 
 
 def _printed_until_exit(process: subprocess.Popen[bytes], timeout: float) -> bytes:
-    """Return what a process prints until it exits: the end of the stream may come late.
+    """Return a process's output until it exits: the end of the stream may arrive late.
 
-    In Wine, unlike in Windows, what it starts keeps its standard error: a virtual board, which goes on for others.
+    In Wine, unlike in Windows, child processes inherit its stderr: a virtual board, which outlives it.
     """
     assert process.stdout
     file = process.stdout.fileno()
@@ -280,7 +280,7 @@ def _printed_until_exit(process: subprocess.Popen[bytes], timeout: float) -> byt
 
 
 def _wine() -> str:
-    """Return the program that runs Windows' 64 bit programs."""
+    """Return the program that runs 64-bit Windows programs."""
     found = shutil.which("wine64") or "/usr/lib/wine/wine64"
     if not Path(found).exists():
         sys.exit("there is no wine64: sh tests/windows/install_wine.sh")
@@ -288,12 +288,12 @@ def _wine() -> str:
 
 
 def _server() -> str:
-    """Return the program that is the kernel of a Windows in Wine."""
+    """Return Wine's server program."""
     return shutil.which("wineserver") or "/usr/lib/wine/wineserver64"
 
 
 def main(words: list[str]) -> int:
-    """Do what the command line says."""
+    """Run the command line's action."""
     windows = Windows()
     if words == ["setup"]:
         windows.setup()
@@ -307,7 +307,7 @@ def main(words: list[str]) -> int:
 
 
 def _show(process: subprocess.Popen[bytes]) -> int:
-    """Print what a program prints, as it comes; return its exit status."""
+    """Print a program's output as it arrives; return its exit status."""
     with process:
         assert process.stdout
         for line in process.stdout:

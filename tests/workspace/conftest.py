@@ -1,4 +1,4 @@
-"""A workspace of packages, written for a test."""
+"""A workspace of packages that a test writes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Scene:
         return folder
 
     def messages(self, name: str, files: dict[str, str], depends: str = "std_msgs") -> Path:
-        """Write a package with definitions (``msg/A.msg``), each named in its CMakeLists.txt."""
+        """Write a package with definitions (``msg/A.msg``), each listed in its CMakeLists.txt."""
         lines = ["find_package(catkin REQUIRED COMPONENTS rospy message_generation)"]
         for kind, macro in (("msg", "message"), ("srv", "service"), ("action", "action")):
             names = [Path(file).name for file in files if file.startswith(f"{kind}/")]
@@ -54,7 +54,7 @@ class Scene:
         return self.package(name, "\n".join(lines), f"rospy {depends}", files)
 
     def build(self, *chosen: str) -> dict[str, Report]:
-        """Build the packages; what was reported of each."""
+        """Build the packages; return each package's report."""
         workspace = Workspace.at(self.root)
         reports: dict[str, Report] = {}
         build(
@@ -70,5 +70,5 @@ class Scene:
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Scene:
-    """Return an empty workspace, in a folder whose name has a blank."""
+    """Return an empty workspace, in a folder whose name has a space."""
     return Scene(tmp_path / "my ws")

@@ -1,4 +1,4 @@
-"""The order to build packages in."""
+"""The build order of packages."""
 
 from __future__ import annotations
 

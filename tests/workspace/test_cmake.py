@@ -1,4 +1,4 @@
-"""The reader of CMakeLists.txt."""
+"""The parser of CMakeLists.txt."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def test_a_new_package(
 def test_name_against_the_conventions_is_a_warning(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As with catkin_create_pkg, whose text this is."""
+    """As in catkin_create_pkg, which has the same text."""
     monkeypatch.chdir(tmp_path)
     assert catkin_create_pkg(["MyPkg"]) == 0
     assert capsys.readouterr().err.startswith(
@@ -46,7 +46,7 @@ def test_name_against_the_conventions_is_a_warning(
 def test_beside_src(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Made in the workspace's folder, where catkin_make would never see it."""
+    """The package is in the workspace's folder, where catkin_make would never find it."""
     for folder in ("src", "devel"):
         (tmp_path / folder).mkdir()
     for folder, warning in (

@@ -1,4 +1,4 @@
-"""workspace/packages: where packages lie, and what can be run in them."""
+"""workspace/packages: locations of packages, and their programs."""
 
 from __future__ import annotations
 

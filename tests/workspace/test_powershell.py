@@ -1,4 +1,4 @@
-"""What PowerShell sources, as text: there is no PowerShell on most machines that run these tests."""
+"""The PowerShell script as text: most machines that run these tests have no PowerShell."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_every_command_is_completed() -> None:
 
 
 def completed(*words: str, index: int | None = None) -> list[str]:
-    """Return what TAB offers for the last word, by the call that ros.ps1 makes."""
+    """Return the completions of the last word, with the call that ros.ps1 makes."""
     call = re.search(r"minirospy complete (\S+) \$index @words", ROS_PS1.read_text())
     assert call
     place = str(index or len(words) - 1)
@@ -109,7 +109,7 @@ def completed(*words: str, index: int | None = None) -> list[str]:
 
 def test_candidates_are_words_of_powershell() -> None:
     assert completed("rosmsg", "sho") == ["show"]
-    # A word that has not been started is not passed on.
+    # An empty last word is not passed on.
     assert completed("rostopic", "pub", "/t", "std_msgs/Bool", index=4) == ["'data: false'"]
     assert completed("rostopic", "pub", "'/t'", "std_msgs/String", index=4) == ["'data: '''''"]
     assert completed("rostopic", "pub", "/t", "std_msgs/String", '"da') == ["\"data: ''\""]

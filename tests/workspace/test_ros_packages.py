@@ -1,4 +1,4 @@
-"""ROS's own packages, as far as we stand in for them: rospack and rospkg find them and what they need."""
+"""ROS's packages that minirospy provides: rospack and rospkg find them and their dependencies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from minirospy.workspace.packages import Packages
 
 ROOT = Path(__file__).parents[2] / "minirospy"
 FOLDERS = sorted(path.parent for path in (ROOT / "ros").glob("*/package.xml"))
-# Packages of Python alone, not of ROS; camera_info_manager is a module of the package camera_info_manager_py.
+# Python packages that are not ROS packages; camera_info_manager is a module of the package camera_info_manager_py.
 NO_PACKAGES = {"PyKDL", "RPi", "ament_index_python", "camera_info_manager", "rospkg"}
 
 
@@ -29,7 +29,7 @@ def test_importable_packages_are_found() -> None:
     overlay = {
         path.parent.name
         for path in (ROOT / "overlay").glob("*/__init__.py")
-        # The import of these raises an error that names what to do.
+        # Importing these raises an error that names the solution.
         if "minirospy.ros.elsewhere" not in path.read_text(encoding="utf-8")
     }
     assert overlay - NO_PACKAGES <= known
@@ -66,7 +66,7 @@ def test_rospkg() -> None:
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 def test_modules_of_a_package_are_not_its_programs(folder: Path) -> None:
-    """`rosrun rosserial_python serial_node.py` is the program, not the module that it runs."""
+    """`rosrun rosserial_python serial_node.py` runs the program, not the module of that name."""
     for name in Packages.below(ROOT / "ros").executables(folder.name):
         (found,) = Packages.below(ROOT / "ros").find_executables(folder.name, name)
         assert Path(found[-1]).read_text(encoding="utf-8").startswith("#!")

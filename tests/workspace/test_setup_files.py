@@ -1,4 +1,4 @@
-"""devel/setup.bash and its like, in real shells: variables, chains of workspaces, the workshop's chapter."""
+"""devel/setup.bash and similar files in real shells: variables, chains of workspaces, the workshop's chapter."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="shells of Unix"
 
 
 def run(shell: str, script: str, home: Path, **variables: str) -> str:
-    """Return what a shell prints; it must be silent on stderr."""
+    """Return a shell's output; assert that stderr is empty."""
     program = shutil.which(shell)
     if program is None:
         pytest.skip(f"no {shell} here")
@@ -70,7 +70,7 @@ def test_the_variables(scene: Scene, shell: str, ending: str) -> None:
     }
     once = f". '{scene.devel}/setup.{ending}'"
     assert variables(shell, once, scene.root) == expected
-    # Sourced twice, nothing is there twice.
+    # Sourcing it twice adds nothing twice.
     assert variables(shell, f"{once}\n{once}", scene.root) == expected
 
 
@@ -133,7 +133,7 @@ def test_workspaces_stand_on_one_another(scene: Scene, shell: str, ending: str) 
     above = type(scene)(scene.root / "above")
     above.build()
     write_set_up(above.devel, (above.source,), {"CMAKE_PREFIX_PATH": str(scene.devel)})
-    # A build without the first one sourced does not forget it.
+    # A build in a shell that has not sourced the first workspace keeps it.
     write_set_up(above.devel, (above.source,), {})
     both = variables(shell, f". '{above.devel}/setup.{ending}'", scene.root)
     assert both["CMAKE_PREFIX_PATH"] == f"{above.devel}:{scene.devel}"
@@ -285,7 +285,7 @@ open("CMakeLists.txt", "w").write(text.replace("catkin_package(\\n", macros, 1))
 
 
 def test_the_workshop_word_for_word(tmp_path: Path) -> None:
-    """The chapters on workspaces, packages, nodes and messages, typed into bash."""
+    """Run the chapters on workspaces, packages, nodes and messages in bash."""
     (tmp_path / ".bashrc").write_text("")
     (tmp_path / "edit.py").write_text(EDIT)
     said = run("bash", WORKSHOP.replace("edit.py", "~/edit.py"), tmp_path)

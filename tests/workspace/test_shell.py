@@ -1,4 +1,4 @@
-"""workspace/shell: the functions and TAB in real shells; one that is not installed is skipped."""
+"""workspace/shell: the functions and TAB in real shells; a shell that is not installed is skipped."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="shells of POSIX
 
 
 class Result(NamedTuple):
-    """How a script ended, and what it printed."""
+    """A script's exit status and output."""
 
     status: int
     out: list[str]
@@ -34,14 +34,14 @@ class Result(NamedTuple):
 
 @cache
 def dotfiles() -> Path:
-    """Return where zsh keeps what its completion system has found: for all tests, as that takes it a second."""
+    """Return the folder of zsh's completion cache: shared by all tests, as filling it takes a second."""
     folder = tempfile.TemporaryDirectory()
     atexit.register(folder.cleanup)
     return Path(folder.name)
 
 
 class Shell:
-    """A shell that has sourced our file, in a workspace with the package ``my_robot``."""
+    """A shell that has sourced minirospy's file, in a workspace with the package ``my_robot``."""
 
     def __init__(self, name: str, root: Path) -> None:
         self.name = name
@@ -57,7 +57,7 @@ class Shell:
         }
 
     def run(self, script: str, stdin: str = "", **environ: str) -> Result:
-        """Run a script; it starts in the workspace."""
+        """Run a script in the workspace."""
         file = SHELL / ("ros.fish" if self.name == "fish" else "ros.bash")
         bare = {"bash": ["--norc", "--noprofile"], "zsh": ["-f"], "fish": ["--no-config"]}[self.name]
         done = subprocess.run(
@@ -101,7 +101,7 @@ def make_workspace(root: Path) -> None:
 
 @pytest.fixture(params=["bash", "zsh", "fish"])
 def shell(request: pytest.FixtureRequest, tmp_path: Path) -> Shell:
-    """Each shell in turn."""
+    """Return each shell in turn."""
     if not shutil.which(request.param):
         pytest.skip(f"{request.param} is not installed")
     make_workspace(tmp_path)
@@ -110,7 +110,7 @@ def shell(request: pytest.FixtureRequest, tmp_path: Path) -> Shell:
 
 @pytest.fixture
 def bash(tmp_path: Path) -> Shell:
-    """bash alone."""
+    """Return bash."""
     if not shutil.which("bash"):
         pytest.skip("bash is not installed")
     make_workspace(tmp_path)
@@ -290,7 +290,7 @@ def test_the_stack_has_no_such_number(shell: Shell) -> None:
 
 
 def bash_tab(bash: Shell, line: str, words: list[str] | None = None, at: int | None = None) -> list[str]:
-    """Return what bash is given for a TAB at the end of ``line``, or ``at``; ``words``: as bash takes it apart."""
+    """Return bash's completions for TAB at the end of ``line``, or ``at``; ``words``: as bash splits the line."""
     words = line.split(" ") if words is None else words
     current = len(words if at is None else line[:at].split(" ")) - 1
     done = bash.run(
@@ -332,12 +332,12 @@ def test_bash_takes_words_apart_at_colons(bash: Shell) -> None:
 def test_bash_inserts_a_message(bash: Shell) -> None:
     assert bash_tab(bash, "rostopic pub /t std_msgs/Bool ") == ['"data: false" ']
     assert bash_tab(bash, "rostopic pub /t geometry_msgs/Point ") == ['"x: 0.0\ny: 0.0\nz: 0.0" ']
-    # readline closes a quote that is not closed.
+    # readline closes an open quote.
     assert bash_tab(bash, 'rostopic pub /t std_msgs/Bool "da') == ['data: false"']
 
 
 def test_bash_completes_at_the_cursor(bash: Shell) -> None:
-    # Behind the cursor there is a word already: no space is added.
+    # The cursor is before another word: no space is added.
     assert bash_tab(bash, "rosrun my_robot ta --rate 5", at=len("rosrun my_robot ta")) == ["talker.py"]
     assert bash_tab(bash, "rosrun my_robot talker.py", at=len("rosrun my_robot ta")) == ["talker.py"]
 
@@ -347,7 +347,7 @@ def test_bash_completes_behind_a_break(bash: Shell) -> None:
     words = ["roslaunch", "my_robot", "all.launch", "name", ":="]
     assert bash_tab(bash, line, words) == ["a\\ robot "]
     assert bash_tab(bash, line + '"a r', [*words, '"a r']) == ['a robot"']
-    # Who has taken the colon out of COMP_WORDBREAKS.
+    # For users who removed the colon from COMP_WORDBREAKS.
     assert bash_tab(bash, line, [*words[:-2], "name:", "="]) == ["a\\ robot "]
     assert bash_tab(bash, line, [*words[:-2], "name:="]) == ["name:=a\\ robot "]
     assert bash_tab(bash, "rosparam load --x=", ["rosparam", "load", "--x", "="]) == []
@@ -388,7 +388,7 @@ def zsh_or_skip(tmp_path: Path) -> Shell:
 
 def test_zsh_tab(tmp_path: Path) -> None:
     zsh = zsh_or_skip(tmp_path)
-    # Outside of its line editor zsh has no compadd: one that prints takes its place.
+    # Outside of its line editor zsh has no compadd: replace it by one that prints.
     script = """
     compadd() { for last; do :; done; for each in "${(@P)last}"; do print -r -- "$*:$each"; done }
     tab() { words=("$@"); CURRENT=${#words}; _ros_complete_zsh }
@@ -434,7 +434,7 @@ def test_fish_tab(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["bash", "zsh", "fish"])
 def test_tab_at_the_keyboard(name: str, tmp_path: Path) -> None:
-    """A shell at a terminal: types TAB and reads the line."""
+    """Run a shell in a terminal: press TAB and read the line."""
     import pty
     import select
 
@@ -460,7 +460,7 @@ def test_tab_at_the_keyboard(name: str, tmp_path: Path) -> None:
     try:
         source = SHELL / ("ros.fish" if name == "fish" else "ros.bash")
         ready = "math 6 x 7" if name == "fish" else "echo $((6 * 7))"
-        # The answer, not its echo: from then on the line editor reads.
+        # Wait for the output, not its echo: from then on the line editor reads.
         os.write(keyboard, f"source {source}\n{ready}\n".encode())
         read_until(b"42")
         message = rb"data:\ false" if name == "fish" else b'"data: false"'
@@ -490,6 +490,6 @@ def test_shellcheck() -> None:
 
 
 def test_lines_of_the_batch_file_end_as_cmd_needs_them() -> None:
-    # cmd.exe misses labels in a file whose lines end in a line feed alone.
+    # cmd.exe does not find labels in a file with only line feeds.
     text = (SHELL / "ros.bat").read_bytes()
     assert text.count(b"\r\n") == text.count(b"\n") > 0

@@ -1,4 +1,4 @@
-"""SO_LINGER of Zenoh's links: it is removed where it is Zenoh's, and nowhere else."""
+"""SO_LINGER on Zenoh's links: removed from Zenoh's sockets, and from no others."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_link_whose_linger_is_set_after_a_look_loses_it() -> None:
 
 
 def test_links_of_a_router_do_not_linger(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also a test of Zenoh: where it sets another linger, or none, nothing is found."""
+    """Also a test of Zenoh: if it sets another linger time, or none, no socket is found."""
     found: list[int] = []
     look = LingerRemover.look
 
@@ -62,8 +62,7 @@ def test_links_of_a_router_do_not_linger(monkeypatch: pytest.MonkeyPatch) -> Non
         endpoint = f"tcp/127.0.0.1:{free_port()}"
         router = await FleetNetwork.open(NetworkOptions(listen=(endpoint,)))
         robot = await FleetNetwork.open(NetworkOptions(connect=(endpoint,)))
-        # Both ends of the link are in this process.
-        # Links of earlier tests may be counted, too.
+        # Both sockets of the link are in this process. Links of earlier tests may be counted, too.
         await until(lambda: sum(found) >= 2)
         await robot.close()
         await router.close()

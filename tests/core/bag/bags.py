@@ -1,4 +1,4 @@
-"""Bags of any shape, record by record: what a test wants in which chunk, in which order."""
+"""Bags of any shape, record by record: the test chooses the messages of each chunk, and their order."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STRING_MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 
 
 class Given(NamedTuple):
-    """A message of a bag that is to be made."""
+    """A message of a bag to be made."""
 
     connection: int
     time: int

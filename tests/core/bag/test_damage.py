@@ -1,4 +1,4 @@
-"""Damaged bags: an error in one line, or messages that were in the bag; never another message, a hang or a crash."""
+"""Damaged bags: an error in one line, or messages that were in the bag; never other messages, a hang or a crash."""
 
 from __future__ import annotations
 
@@ -66,12 +66,12 @@ def repaired(data: bytes) -> list[Found]:
 
 
 def boundaries(data: bytes) -> list[int]:
-    """Return where the records of a bag end."""
+    """Return the positions at which the records of a bag end."""
     return [13, *(record.end + 13 for record in parse_records(data[13:]))]
 
 
 def attempt(action: Callable[[bytes], _T], data: bytes) -> _T | None:
-    """Return what an action makes of a bag, None if it refuses it in one line."""
+    """Return the result of an action on a bag, None if it raises an error of one line."""
     try:
         return action(data)
     except BagError as error:
@@ -120,12 +120,12 @@ def test_flipped_byte_never_gives_another_message(
 ) -> None:
     data = make_bag(GIVEN[:5], compression=compression)
     expected = {tuple(each) for chunk in GIVEN[:5] for each in chunk}
-    # The header's record is filled up to 4,096 bytes with spaces, which mean nothing.
+    # The header's record is padded to 4,096 bytes with spaces, which have no meaning.
     spaces = data.index(b" " * 100)
     start = [*range(spaces), *range(spaces, 4096, 64)]
     places = start if part == "start" else range(max(len(data) - 4096, 4096), len(data))
 
-    # Threads that decompress ahead would be started ten thousand times.
+    # Threads that decompress in advance would be started ten thousand times.
     monkeypatch.setattr(reading, "THREADS", 0)
     for at in places:
         damaged = data[:at] + bytes((data[at] ^ 0xFF,)) + data[at + 1 :]
@@ -183,7 +183,7 @@ def test_damaged_chunk_costs_its_own_messages_alone() -> None:
 
 
 def chunk_places(data: bytes) -> list[tuple[int, int, int]]:
-    """Return where each chunk of a bag is, where its data starts, and where it ends with its index records."""
+    """Return each chunk's position, its data's start, and its end after the index records."""
     reader = open_bag(io.BytesIO(data))
     assert isinstance(reader, ChunkedReader)
     headers = reader.chunk_headers()
@@ -195,7 +195,7 @@ def chunk_places(data: bytes) -> list[tuple[int, int, int]]:
 
 
 def spoilt(data: bytes, kind: str) -> bytes:
-    """Return a bag whose fourth chunk is damaged so that its records do not follow each other any more."""
+    """Return a bag whose fourth chunk is damaged so that its records are no longer consecutive."""
     start, body, end = chunk_places(data)[3]
     lengths = {
         "header length": (start, start + 4, b"\xff" * 4),
@@ -247,7 +247,7 @@ def test_repair_goes_on_at_the_next_chunk(compression: str, kind: str, lost: int
 @pytest.mark.parametrize("place", [1, 2, 3, 4])
 @pytest.mark.parametrize("kind", ["missing byte", "wrong byte"])
 def test_repair_writes_a_wrong_offset_of_the_index_again(compression: str, place: int, kind: str) -> None:
-    """The last four bytes of a chunk's index records are an offset: its times are right, and so is its length."""
+    """The last four bytes of a chunk's index records are an offset: its times and its length are right."""
     bag = make_bag(GIVEN, compression=compression)
     at = chunk_places(bag)[3][2] - place
     damaged = bag[:at] + (bytes((bag[at] ^ 0xFF,)) if kind == "wrong byte" else b"") + bag[at + 1 :]
@@ -302,7 +302,7 @@ def test_damage_of_any_kind_is_survived(data: st.DataObject) -> None:
 
 
 def described(data: bytes) -> str:
-    """Return the info of a bag, and read its whole index."""
+    """Return the info of a bag, and read its complete index."""
     reader = open_bag(io.BytesIO(data))
     summary = info.summarize(reader, "a.bag", frequencies=True)
     return info.as_text(summary) + info.as_yaml(summary)
@@ -347,7 +347,7 @@ def test_definitions_of_hostile_bags_are_not_executed() -> None:
 
 
 def test_index_that_names_a_chunk_many_times_is_damaged() -> None:
-    # Messages of one time, connection and place were compared by what cannot be compared.
+    # Messages with the same time, connection and position were compared by values that have no order.
     data = make_bag([[Given(0, 5, b"\1\0\0\0a"), Given(1, 5, b"\1\0\0\0b")]])
     reader = open_bag(io.BytesIO(data))
     (chunk,) = reader.chunks
@@ -361,14 +361,14 @@ def test_index_that_names_a_chunk_many_times_is_damaged() -> None:
         open_bag(io.BytesIO(damaged))
     assert raised.value.why.startswith("the index names a chunk twice")
     assert repaired(damaged) == read(data)
-    # A reader of a bag that is being written gets its chunks from elsewhere.
+    # A reader of a bag that is still being written gets its chunks from the caller.
     twice = ChunkedReader(io.BytesIO(data), reader.connections, [chunk] * 3)
     assert sorted(each.body for each in twice.messages()) == sorted([b"\1\0\0\0a", b"\1\0\0\0b"] * 3)
 
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_time_that_no_index_holds_costs_its_chunk_alone(closed: bool) -> None:
-    # Seconds and nanoseconds of 32 bits are more than seconds of 32 bits, once the nanoseconds are below a billion.
+    # 32-bit seconds and nanoseconds exceed 32-bit seconds, once the nanoseconds are below a billion.
     last = (2**32 - 1) * 10**9 + 999_999_999
     data = make_bag([[Given(0, last, b"\1\0\0\0a")], [Given(0, 5, b"\1\0\0\0b")]], closed=closed)
     stamp = struct.pack("<II", 2**32 - 1, 999_999_999)

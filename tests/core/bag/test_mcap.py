@@ -1,4 +1,4 @@
-"""MCAP files: what McapWriter writes is read by the mcap library and by McapReader; bags survive the way there and back."""
+"""MCAP files: the mcap library and McapReader read McapWriter's files; bags survive conversion in both directions."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def made(compression: str = "none") -> io.BytesIO:
 
 
 def content(messages: list[StoredMessage]) -> list[tuple[int, bytes, str, dict[str, bytes]]]:
-    """Return what must not change."""
+    """Return the parts that conversion must not change."""
     return [(one.time, one.body, one.connection.topic, one.connection.header) for one in messages]
 
 
@@ -200,7 +200,7 @@ def repaired(data: bytes) -> tuple[McapRepair, io.BytesIO]:
 
 
 def library_reads(stream: io.BytesIO) -> list[tuple[int, bytes]]:
-    """Return times and bodies as the mcap library reads them, by the summary, and without it."""
+    """Return times and bodies as the mcap library reads them, with the summary and without it."""
     stream.seek(0)
     by_summary = [(each.log_time, each.data) for _, _, each in make_reader(stream).iter_messages()]
     stream.seek(0)
@@ -219,7 +219,7 @@ def test_a_file_that_is_cut_off_is_repaired_up_to_its_last_whole_chunk(compressi
     expected = library_reads(whole)
     data = whole.getvalue()
     last = 0
-    # What comes behind the chunks is compressed in no file.
+    # The data after the chunks is never compressed.
     step = 1 if compression == "none" else 7
     for size in [
         *range(60, len(data) - 700, len(data) // 100),
@@ -252,7 +252,7 @@ def test_a_damaged_chunk_costs_its_own_messages_alone(compression: str) -> None:
 
 
 class Full(io.BytesIO):
-    """A disk that takes so many bytes."""
+    """A disk with room for a number of bytes."""
 
     room = 0
 
@@ -303,7 +303,7 @@ def made_bytes() -> io.BytesIO:
 
 
 def made_by_the_library(seed: int, **options: Any) -> bytes:
-    """Return a file of three channels, one of which is not of ROS 1, with times in random order."""
+    """Return a file of three channels, one of which is not ROS 1, with times in random order."""
     from mcap.writer import Writer
 
     source = random.Random(seed)
@@ -387,7 +387,7 @@ def with_chunk(compression: str, stored: bytes, size: int) -> bytes:
     repair = McapRepair(stream := io.BytesIO(head))
     list(repair.run())
     repair.apply()
-    # The repair leaves a bomb out of its index: without one, chunks are found by reading the file.
+    # The repair leaves a bomb out of its index: without an index, chunks are found by reading the file.
     return stream.getvalue()
 
 

@@ -1,4 +1,4 @@
-"""core/bag/reader: messages in the order of time from any arrangement of chunks, against sorting them all."""
+"""core/bag/reader: messages in time order from any arrangement of chunks, compared with sorting all messages."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def plain(stored: StoredMessage) -> Given:
 
 
 def in_order(chunks: list[list[Given]], reader: BagReader) -> list[Given]:
-    """Sort as rosbag does: by time, then by the order of the connections, then by place."""
+    """Sort as rosbag does: by time, then by the order of the connections, then by position."""
     rank = {number: at for at, number in enumerate(reader.connections)}
     return sorted(
         (each for chunk in chunks for each in chunk), key=lambda each: (each.time, rank[each.connection])

@@ -78,7 +78,7 @@ def test_messages_are_filtered() -> None:
 
 def test_bag_that_was_not_closed_is_unindexed_and_scanned() -> None:
     data = make_bag12(MESSAGES)
-    last_index = data.rindex(b"op=\x04") - 8  # at a record's boundary nobody can know that one is missing
+    last_index = data.rindex(b"op=\x04") - 8  # at a record's boundary, a missing record cannot be detected
     for end in set(range(data.rindex(b"op=\x02") + 60, len(data))) - {last_index}:
         stream = io.BytesIO(data[:end])
         with pytest.raises(BagUnindexedError):

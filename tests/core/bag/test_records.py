@@ -1,4 +1,4 @@
-"""core/bag/records: golden bytes of the format, round trips, and damage that is refused with one line."""
+"""core/bag/records: golden bytes of the format, round trips, and one-line errors for damaged data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bags by time: counts, the message of a moment, the times around it."""
+"""Bags by time: counts, the message at a time, the times around it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What BagWriter writes: the bytes of rosbag's Python writer, whole chunks only, a readable bag when the disk is full."""
+"""BagWriter: the same bytes as rosbag's Python writer, only complete chunks, a readable bag when the disk is full."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def header(topic: str) -> dict[str, str]:
 
 
 class Disk(io.BytesIO):
-    """A stream that takes ``room`` bytes, each write at most ``step`` of them, and keeps what it was given."""
+    """A stream that accepts ``room`` bytes, at most ``step`` of them per write, and records them."""
 
     def __init__(self, room: int = sys.maxsize, step: int = sys.maxsize) -> None:
         super().__init__()
@@ -50,7 +50,7 @@ class Disk(io.BytesIO):
 
 
 class Parsed:
-    """A whole bag: its header, connections, chunk infos, and its messages in the order of the file."""
+    """A complete bag: its header, connections, chunk infos, and its messages in file order."""
 
     def __init__(self, data: bytes) -> None:
         stream = io.BytesIO(data)
@@ -91,7 +91,7 @@ class Parsed:
 
 
 def test_bytes_are_those_of_rosbag() -> None:
-    # Written by rosbag 1.15.15 of Debian: Bag(f, "w", chunk_threshold=100), four messages.
+    # Written by Debian's rosbag 1.15.15: Bag(f, "w", chunk_threshold=100), four messages.
     wanted = "b86940be2fcbbadc8243e6fbc0cd1ddbb7a52f4375b5aa835d33eb4c278826a5"
     stream = io.BytesIO()
     writer = BagWriter(stream, chunk_threshold=100)
@@ -271,7 +271,7 @@ def test_a_full_disk_leaves_a_readable_bag(late: bool) -> None:
 
     for room in range(4117, len(whole.getvalue()), 61):
         stream = Disk(room)
-        # A stream with a thread behind it reports the fault later: what it has taken meanwhile is not in the file.
+        # A stream with a thread behind it reports the fault later: data accepted meanwhile is not in the file.
         writer = BagWriter(Late(stream) if late else stream, chunk_threshold=500)
         with pytest.raises(OSError, match="No space left"):
             fill(writer)
@@ -286,7 +286,7 @@ def test_a_full_disk_leaves_a_readable_bag(late: bool) -> None:
 
 
 class Late(io.RawIOBase):
-    """A stream that reports a fault of the one behind it one write later."""
+    """A stream that reports an error of the stream behind it one write later."""
 
     def __init__(self, behind: Disk) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""The tables of a goal's life: complete, and without a way out of its end."""
+"""The state tables of a goal: complete, and without transitions out of final states."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_client_that_heard_nothing_takes_every_status() -> None:
     "before", [GoalState.PENDING, GoalState.ACTIVE, GoalState.RECALLING, GoalState.PREEMPTING]
 )
 def test_a_client_follows_each_step_of_a_server(before: GoalState, event: GoalEvent) -> None:
-    """Whatever a server may do, a client that heard the status before takes the next one."""
+    """For any transition of a server, a client that has received the status before it accepts the next one."""
     after = SERVER_STEPS[event].get(before)
     if after is None:
         return

@@ -131,7 +131,7 @@ def test_updates_go_to_the_subscribers_above_and_below() -> None:
         ParameterUpdate("u2", "/a/b/"),
         ParameterUpdate("u3", "/a/b/c/"),
     ]
-    # Who set it knows it, but not what it did to a parameter inside.
+    # The node that set it is not notified of it, but of the change to a parameter inside.
     assert list(tree.set("/a", {"b": 3}, "/n2")) == [
         ParameterUpdate("u1", "/a/"),
         ParameterUpdate("u2", "/a/b/"),
@@ -201,7 +201,7 @@ def test_too_many_subscriptions_are_refused(monkeypatch: pytest.MonkeyPatch) -> 
         tree.subscribe("/a", f"/n{number}", f"http://bad:1/{number}")
     with pytest.raises(ParametersFullError, match="no more than 5 subscriptions of one host and port"):
         tree.subscribe("/a", "/n6", "http://bad:1/")
-    # What is there may be subscribed to again.
+    # An existing subscription may be repeated.
     tree.subscribe("/a", "/n0", "http://bad:1/0")
     tree.subscribe("/a", "/other", "http://bad:2/")
     tree.subscribe("/b", "/other", "http://bad:2/")
@@ -325,7 +325,7 @@ def test_room_shrinks_by_each_parameter_and_its_name() -> None:
 
 
 def test_namespace_is_copied_once_after_it_was_returned() -> None:
-    # To copy a large one at each change would take long.
+    # Copying a large value at each change would take long.
     tree = tree_of(a={"x": 1})
     for _ in range(2):
         returned = tree.get("/a")
@@ -363,7 +363,7 @@ def test_names_come_in_the_order_of_the_tree() -> None:
 
 
 def test_names_are_in_no_cycle_of_references() -> None:
-    # The master's garbage collector does not look at old objects: a list in a cycle would never be freed.
+    # The master's garbage collector skips old objects: a list in a cycle would never be freed.
     names = tree_of(a={"b": 1}).names()
     assert [each for each in gc.get_referrers(names) if isinstance(each, CellType)] == []
 

@@ -111,7 +111,7 @@ def test_one_node_registers_so_much_and_no_more(monkeypatch: pytest.MonkeyPatch)
         registry.register_publisher("/n", f"/t{number}", "a/B", "u")
     with pytest.raises(RegistryFullError, match="3 topics, services and parameters of one node"):
         registry.register_publisher("/n", "/t3", "a/B", "u")
-    # What is there may be registered again, and others may register.
+    # An existing registration may be repeated, and other nodes may register.
     registry.register_publisher("/n", "/t0", "a/B", "u")
     registry.register_publisher("/m", "/t3", "a/B", "um")
     assert "/t3" in registry.publishers()
@@ -152,7 +152,7 @@ def test_limits_are_as_documented() -> None:
 
 
 def fill(registry: Registry, uri: str, prefix: str = "") -> int:
-    """Register nodes at ``uri`` until that is refused; return how many."""
+    """Register nodes at ``uri`` until that is refused; return their number."""
     for number in range(100_000):
         try:
             registry.register_publisher(f"/{prefix}n{number}", f"/{prefix}t{number}", "a/B", uri)
@@ -162,7 +162,7 @@ def fill(registry: Registry, uri: str, prefix: str = "") -> int:
 
 
 def register_node(registry: Registry, number: int) -> None:
-    """Register what an ordinary node does, at its own port."""
+    """Register a node as an ordinary program does, at its own port."""
     uri = f"http://robot:{1000 + number}/"
     for topic in ("/rosout", f"/good{number}/out", "/status"):
         registry.register_publisher(f"/good{number}", topic, "std_msgs/String", uri)
@@ -216,7 +216,7 @@ KINDS: dict[str, Callable[[Registry, int], object]] = {
 
 
 def size_of(value: Any, seen: set[int]) -> int:
-    """Return the bytes that an object takes, with all that it refers to."""
+    """Return the memory of an object in bytes, including all objects to which it refers."""
     if id(value) in seen or isinstance(value, (type, MethodType)):
         return 0
     seen.add(id(value))
@@ -238,7 +238,7 @@ def test_registrations_count_what_they_take_in_memory(kind: str) -> None:
     for number in range(count):
         KINDS[kind](registry, number)
     taken = size_of(registry, set())
-    # Counted for 64 bits: with 32 an object takes about half.
+    # Counted for 64 bits: with 32 bits an object takes about half.
     most = 2.5 if maxsize > 2**32 else 5.0
     assert 0.8 * taken < registry._shares.total < most * taken
 
@@ -256,7 +256,7 @@ def test_a_registration_is_counted_until_the_last_of_it_is_gone() -> None:
     list(registry.register_parameter("/n", "/t", "u"))
     more = counted()
     assert more > one
-    # Again, and with another URI of the service and another type, as long.
+    # Repeat it, and use another service URI and another type of equal length.
     registry.register_publisher("/n", "/t", "a/C", "u")
     registry.register_subscriber("/n", "/t", "a/D", "u")
     registry.register_service("/n", "/t", "rosrpc://n:2", "u")
@@ -293,7 +293,7 @@ def test_size_of_a_text_does_not_change_while_it_is_counted() -> None:
         uri = f"rosrpc://{text}:{number}"
         registry.register_service("/n", f"/s{text}", uri, "http://n:1/")
         registry.register_publisher("/n", f"/t{text}", f"a/{text}{number}", "http://n:1/")
-        # The journal has Python make a copy of each as UTF-8, which it keeps.
+        # For the journal, Python makes and caches a UTF-8 copy of each string.
         for row in (*registry.offers(), *registry.topic_types().items()):
             serialize_record(list(row))
     registry.unregister_service("/n", f"/s{text}", uri)
@@ -328,7 +328,7 @@ def test_as_many_old_types_are_remembered_as_may_be(monkeypatch: pytest.MonkeyPa
     assert len(registry.topic_types()) == 5
     registry.set_type("/old4", "a/B")
     assert list(registry.topic_types()) == ["/published", "/subscribed", "/old2", "/old3", "/old4"]
-    # One that is registered again is not an old one any more.
+    # A node that registers again does not count as old any more.
     registry.register_publisher("/n", "/old2", "*", "u")
     registry.set_type("/old5", "a/B")
     assert registry.topic_types()["/old2"] == "a/B"

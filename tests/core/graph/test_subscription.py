@@ -1,4 +1,4 @@
-"""core/graph/subscription: whom to connect, and when again."""
+"""core/graph/subscription: which publishers to connect to, and when to reconnect."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Write golden.json: what real genpy makes of every type in msgs/.
+"""Write golden.json: real genpy's results for every type in msgs/.
 
 Run it with real ROS 1's Python:
 
 /usr/bin/python3 tests/core/idl/make_golden.py
 
-The types of packages that Debian does not have come from golden_elsewhere.json: real genmsg's md5sums of noetic's texts
+The types of packages that Debian does not have come from golden_elsewhere.json: real genmsg's md5sums of noetic's definitions
 (control_msgs, tf, the tutorials, theora_image_transport, sick_safetyscanners), those of actions after genaction.py.
 """
 
@@ -18,7 +18,7 @@ MSGS = HERE.parents[2] / "msgs"
 
 
 def types() -> Iterator[tuple[str, str]]:
-    """Yield the kind and pkg/Name of every definition; the messages of an action are seven."""
+    """Yield the kind and pkg/Name of every definition; an action has seven messages."""
     for folder in sorted(MSGS.iterdir()):
         for path in sorted(path for kind in KINDS for path in folder.glob(f"{kind}/*.{kind}")):
             names = [path.stem]

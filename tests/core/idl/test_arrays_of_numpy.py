@@ -1,4 +1,4 @@
-"""Arrays of numpy as values of fields: any shape, any number type that fits."""
+"""numpy arrays as field values: any shape, any number type that fits."""
 
 from __future__ import annotations
 

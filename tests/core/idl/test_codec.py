@@ -1,4 +1,4 @@
-"""serialize and deserialize of random types: against a slow, readable writer of the wire's rules as oracle."""
+"""serialize and deserialize of random types, compared with a slow, readable implementation of the wire format."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def messages(draw: st.DrawFn) -> Any:
     parts = text.split(f"\n{SEPARATOR}\n")
 
     def make(base: str) -> Any:
-        # The class of an inner type: from the part of the text that is its own, and all others after it.
+        # Make the class of an inner type from its own part of the text, followed by all others.
         own = next(part for part in parts if part.startswith(f"MSG: {base}\n"))
         rest = [part for part in parts if part.startswith("MSG:")]
         return class_from_text(base, f"\n{SEPARATOR}\n".join([own.partition("\n")[2], *rest]))()
@@ -100,7 +100,7 @@ def messages(draw: st.DrawFn) -> Any:
 
 
 def wire(message: Any) -> bytes:
-    """Return the bytes of a message, field by field as http://wiki.ros.org/msg says."""
+    """Return the bytes of a message, field by field as http://wiki.ros.org/msg specifies."""
     return b"".join(
         wire_field(getattr(message, name), type_)
         for name, type_ in zip(message.__slots__, message._slot_types, strict=True)
@@ -135,7 +135,7 @@ def serialized(message: Any) -> bytes:
 
 
 def same(a: Any, b: Any) -> bool:
-    """Equal, a tuple like a list of the same values."""
+    """Return whether two values are equal; a tuple equals a list of the same values."""
     if hasattr(a, "_slot_types"):
         return all(same(getattr(a, name), getattr(b, name)) for name in a.__slots__)
     if isinstance(a, list | tuple):
@@ -173,7 +173,7 @@ def test_any_bytes_are_read_or_refused(text: str, data: bytes) -> None:
         message = data_class().deserialize(data)
     except DeserializationError:
         return
-    # What was read takes no more than what there was.
+    # The message is not larger than the input.
     assert len(wire(message)) <= len(data) + data.count(0xEF) * 3 + 3 * len(data)
 
 
@@ -194,7 +194,7 @@ def test_lengths_that_32_bits_do_not_hold_are_refused(text: str, length: int) ->
     ],
 )
 def test_elements_that_only_slices_read_are_not_made_without_bytes(element: str) -> None:
-    """A slice beyond the end is empty: four bytes could ask for millions of elements, which filled the memory."""
+    """A slice beyond the end is empty: four bytes could request millions of elements, which filled the memory."""
     text = f"\n{SEPARATOR}\n".join(["p/M1[] a\n", f"MSG: p/M1\n{element}", "MSG: p/M2\nint8 d\n"])
     length = 5_000_000
     tracemalloc.start()
@@ -256,7 +256,7 @@ def test_bytes_that_are_no_utf_8_are_replaced() -> None:
 
 
 def test_a_buffer_is_not_held() -> None:
-    """A message keeps no view of the buffer that it was read from, which is used again for the next one."""
+    """A message keeps no view into the buffer from which it was read, because the buffer is reused for the next one."""
     data_class = class_from_text("p/M", "uint8[] c\nint32[] a")
     buffer = bytearray(serialized(data_class(c=b"12", a=[5])))
     message = data_class().deserialize(memoryview(buffer))
@@ -265,7 +265,7 @@ def test_a_buffer_is_not_held() -> None:
 
 
 def test_lists_and_tuples_of_equal_items_are_equal() -> None:
-    """genpy reads arrays of numbers as tuples, and compares them with the lists that a program wrote."""
+    """genpy reads arrays of numbers as tuples, and compares them with lists that a program assigned."""
     message_class = class_from_text("p/Numbers", "float64[] position\nstring[] names\n")
     written = message_class(position=[1.0, 2.0], names=["a"])
     buffer = BytesIO()

@@ -1,4 +1,4 @@
-"""Every type in msgs/ has the md5sum that real ROS 1 gives it (golden.json, made by make_golden.py)."""
+"""Every type in msgs/ has the md5sum of real ROS 1 (golden.json, made by make_golden.py)."""
 
 from __future__ import annotations
 

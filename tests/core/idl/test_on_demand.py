@@ -1,4 +1,4 @@
-"""Packages whose modules are made from their definitions when they are first imported."""
+"""Packages whose modules are generated from their definitions at first import."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_only_packages_of_ros_are_files() -> None:
 
 
 def test_module_is_made_once_and_then_cached(tmp_path: Path) -> None:
-    """Python's own cache holds the result: the second process needs no compiler."""
+    """Python's own cache has the result: the second process needs no compiler."""
     program = """
 import sys
 from gazebo_msgs.msg import ModelState, ModelStates
@@ -63,7 +63,7 @@ def test_folder_that_cannot_be_written_to_works(tmp_path: Path) -> None:
 
 
 def test_cache_of_other_definitions_is_not_used(tmp_path: Path) -> None:
-    """A newer minirospy has other definitions: what an older one cached is made again."""
+    """A newer minirospy has other definitions: the older one's cached modules are regenerated."""
     program = "import sys, {0}.msg as m; m.UniqueID; print('minirospy.core.idl.emit' in sys.modules)"
     prefix = str(tmp_path / "cache")
     site = tmp_path / "site"

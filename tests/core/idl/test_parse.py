@@ -1,4 +1,4 @@
-"""Definition texts: what they say, and each mistake with its line."""
+"""Definition texts: their parsed contents, and each error with its line."""
 
 from __future__ import annotations
 

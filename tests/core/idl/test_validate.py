@@ -1,4 +1,4 @@
-"""No text of a foreign definition is executed: names are refused, all other text stays text."""
+"""No text of a third-party definition is executed: names are refused, all other text stays text."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from minirospy.introspect.messages import MessageClasses
 
 SEPARATOR = "=" * 80
 EXECUTED: list[str] = []
-"""What the canary was called with: it must stay empty."""
+"""The canary's arguments: the list must stay empty."""
 
 CODE = "__import__('builtins').canary('x')"
 ATTACKS = [
@@ -77,7 +77,7 @@ NAMES_OF_GENERATED_CODE = {
 
 @pytest.fixture(autouse=True)
 def canary() -> Iterator[None]:
-    """Provide what an attack of these tests would call."""
+    """Provide the function that an attack of these tests would call."""
     builtins.canary = EXECUTED.append  # type: ignore[attr-defined]
     yield
     del builtins.canary  # type: ignore[attr-defined]
@@ -87,7 +87,7 @@ def canary() -> Iterator[None]:
 
 
 def assert_harmless(source: str, names: set[str]) -> None:
-    """Assert that generated source has the names of generated code, those of the definition, and nothing else."""
+    """Assert that generated source contains only the names of generated code and of the definition."""
     tree = ast.parse(source)
     stored = {
         node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
@@ -106,7 +106,7 @@ def assert_harmless(source: str, names: set[str]) -> None:
 
 
 def executed_by(type_: str, definition: str) -> None:
-    """Make a class of what a publisher's header says, as the commands do, and use it."""
+    """Make a class from a publisher's header, as the commands do, and use it."""
     header = {"type": type_, "md5sum": "*", "message_definition": definition}
     try:
         message = MessageClasses().for_header(header)()

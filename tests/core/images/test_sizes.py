@@ -1,4 +1,4 @@
-"""Sizes of compressed images from their heads, as Pillow finds them; images that are too large are never decoded."""
+"""Sizes of compressed images from their headers, as Pillow finds them; too large images are never decoded."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_any_bytes_have_a_size_or_none(head: bytes, rest: bytes) -> None:
 
 
 def large_png(width: int, height: int) -> bytes:
-    """Return a PNG of some hundred kilobytes that has this size, and none of its pixels."""
+    """Return a PNG of some hundred kilobytes with this size and no pixels."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack("!I", len(data)) + kind + data + struct.pack("!I", zlib.crc32(kind + data))
@@ -124,7 +124,7 @@ def test_large_image_is_refused_before_it_is_decoded(library: str, monkeypatch: 
     with pytest.raises(ValueError, match="20x30 pixels is too large: 599 are allowed"):
         decode(large_png(20, 30), max_pixels=599)
     if library == "OpenCV":
-        # The size of such a file is not known before it is decoded.
+        # The size of such a file is unknown before it is decoded.
         with pytest.raises(ValueError, match="an image format that is not known"):
             decode(b"#?RADIANCE\n", max_pixels=600)
 
@@ -145,7 +145,7 @@ FRAMES = [0xC0, 0xC1, 0xC2, 0xC3, 0xC5, 0xC6, 0xC7, 0xC9, 0xCA, 0xCB, 0xCD, 0xCE
 def test_size_of_a_jpeg_is_behind_each_of_its_frame_markers(marker: int) -> None:
     frame = bytes((0xFF, marker)) + b"\0\x11\x08\0\x09\0\x08" + bytes(10)
     last = b"\xff\xc0\0\x11\x08\0\x07\0\x06" + bytes(10)
-    # The other markers of this range are tables, which are passed over by their length.
+    # The other markers of this range are tables, which are skipped by their length.
     assert size_of(b"\xff\xd8" + frame + last) == ((8, 9) if marker in FRAMES else (6, 7))
 
 
@@ -173,6 +173,6 @@ def test_shortest_heads_have_a_size() -> None:
     assert len(extended) == 30
     assert size_of(extended) == (5, 10)
     assert size_of(extended[:-1]) is None
-    # The entries of a TIFF need not be in front.
+    # The entries of a TIFF need not be at the start.
     entries = struct.pack("<HHHIIHHII", 2, 256, 4, 1, 70_000, 257, 4, 1, 5)
     assert size_of(b"II*\0" + struct.pack("<I", 100) + bytes(92) + entries) == (70_000, 5)

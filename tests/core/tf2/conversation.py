@@ -1,7 +1,7 @@
-"""A conversation with a transform buffer: questions as JSON -> answers as JSON, of the real tf2_py or of ours.
+"""A conversation with a transform buffer: queries as JSON -> answers as JSON, of the real tf2_py or minirospy's.
 
-Run as a program under the interpreter that has the real tf2_py: questions on stdin, answers on stdout. It imports nothing
-else of this folder, so that it runs there.
+Run as a program under the interpreter that has the real tf2_py: queries on stdin, answers on stdout. It imports nothing
+else from this folder, so that it runs there.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Answer = list[Any]
 
 
 def questions(seed: int, count: int) -> list[Question]:
-    """Return a random tree, filled over some seconds, and ``count`` lookups in it, good ones and bad ones."""
+    """Return a random tree, filled over some seconds, and ``count`` lookups in it, valid and invalid ones."""
     rng = random.Random(seed)
     names = [f"frame{n}" for n in range(rng.randrange(4, 14))]
     queries: list[Question] = []
@@ -58,7 +58,7 @@ def questions(seed: int, count: int) -> list[Question]:
 
 
 def edge_cases() -> list[list[Question]]:
-    """Return conversations about what random trees seldom have: loops, depth, odd names, cleared and static frames."""
+    """Return conversations about cases that are rare in random trees: loops, depth, odd names, cleared and static frames."""
     unit = [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]
     second = 1_000_000_000
 
@@ -161,7 +161,7 @@ def pose(rng: random.Random) -> list[float]:
 
 
 def nanoseconds(seconds: float) -> int:
-    """Return a time that a float of seconds holds exactly, as tf2_py needs it."""
+    """Return a time that a float of seconds represents exactly, as tf2_py needs it."""
     return max(0, int(round(seconds * 1024) * 9765625 // 10))
 
 
@@ -230,14 +230,14 @@ def query_real(conversations: list[list[Question]]) -> list[list[Answer]]:
 
 
 def shortened(answer: Answer) -> Answer:
-    """Return the answer with a digest in place of a text that would fill the record."""
+    """Return the answer with a digest in place of a string that would bloat the recording."""
     verb, value = answer
     is_long = isinstance(value, (str, list)) and len(json.dumps(value)) > 1000
     return [verb, hashlib.sha256(json.dumps(value).encode()).hexdigest()] if is_long else answer
 
 
 def difference(real: Answer, ours: Answer, tolerance: float = 1e-12) -> str:
-    """Return how two answers differ; "" where they do not, numbers within the tolerance of their size."""
+    """Return the difference between two answers; "" if there is none, with numbers within the tolerance of their size."""
     if real[0] != ours[0]:
         return f"{real} but ours {ours}"
     if isinstance(real[1], list) and len(real[1]) == 3 and isinstance(real[1][1], list):

@@ -1,4 +1,4 @@
-"""The answers of our own buffer to a conversation: transforms inserted one by one, or as bytes of TFMessages."""
+"""The answers of minirospy's buffer in a conversation: transforms inserted one by one, or as bytes of TFMessages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ BILLION = 1_000_000_000
 
 
 def tf_message(*transforms: tuple[str, str, int, list[float]]) -> bytes:
-    """Return a serialised TFMessage of (parent, child, stamp in nanoseconds, seven numbers)."""
+    """Return a serialized TFMessage of (parent, child, stamp in nanoseconds, seven numbers)."""
     pieces = [struct.pack("<I", len(transforms))]
     for parent, child, stamp, numbers in transforms:
         above, below = parent.encode(), child.encode()
@@ -24,7 +24,7 @@ def tf_message(*transforms: tuple[str, str, int, list[float]]) -> bytes:
 
 
 def our_answers(queries: list[Question], *, lazily: bool = False) -> list[Answer]:
-    """Return our answers; ``lazily``: what is not static comes as serialised messages."""
+    """Return minirospy's answers; ``lazily``: non-static transforms arrive as serialized messages."""
     buffer = TransformBuffer()
 
     def insert(

@@ -1,4 +1,4 @@
-"""TimeCache against a slow, readable reference."""
+"""TimeCache compared with a slow, readable reference."""
 
 from __future__ import annotations
 

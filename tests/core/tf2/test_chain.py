@@ -1,4 +1,4 @@
-"""The frames between two others, of names that do not exist: as Debian's tf2_py answers. The rest is in recorded.json."""
+"""The frames between two others, with names that do not exist: as Debian's tf2_py. The rest is in recorded.json."""
 
 from __future__ import annotations
 

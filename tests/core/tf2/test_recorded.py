@@ -1,4 +1,4 @@
-"""What the real tf2_py answered, recorded (`make_recorded.py`), and what our buffer answers."""
+"""Compare the recorded answers of the real tf2_py (`make_recorded.py`) with those of minirospy's buffer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rotations against matrices."""
+"""Rotations compared with matrices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses of joints against matrices by numpy, and the graph of a robot."""
+"""Poses of joints compared with numpy matrices, and the graph of a robot."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ HERE = Path(__file__).parent
 
 
 def turn(axis: tuple[float, float, float], angle: float) -> np.ndarray:
-    """Return the matrix of a turn about a unit axis, by Rodrigues' formula."""
+    """Return the matrix of a rotation about a unit axis, by Rodrigues' formula."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross

@@ -1,4 +1,4 @@
-"""Robot descriptions read as Debian's urdfdom reads them: its words, and which robots it refuses."""
+"""Robot descriptions read as by Debian's urdfdom: its messages, and which robots it refuses."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from minirospy.core.urdf.values import NotANumberError, as_float
 
 HERE = Path(__file__).parent
 GOLDEN: dict[str, dict[str, Any]] = json.loads((HERE / "check_urdf.json").read_text(encoding="utf-8"))
-"""What Debian's `check_urdf` prints; recorded by tests/interop/test_interop_robots.py."""
+"""Output of Debian's `check_urdf`, recorded by tests/interop/test_interop_robots.py."""
 
 OURS = {
     "badcolor": "a colour of three numbers is passed over in silence there",
@@ -28,11 +28,11 @@ OURS = {
     "mimicunk": "a mimicked joint that does not exist is accepted there",
     "twoparents": "a link with two parents is accepted there",
 }
-"""Where ours says more."""
+"""Cases in which minirospy prints more."""
 
 
 def lines_of(text: str) -> tuple[list[str], list[str], int]:
-    """Return stdout, stderr (without places) and status of our `check_urdf`."""
+    """Return stdout, stderr (without positions) and status of minirospy's `check_urdf`."""
     try:
         robot = parse_robot(text, "x.urdf")
     except UrdfError as error:
@@ -49,7 +49,7 @@ def without_places(lines: Any) -> list[str]:
 def test_reader_agrees_with_urdfdom(name: str) -> None:
     golden = GOLDEN[name]
     stdout, stderr, status = lines_of(golden["urdf"])
-    # There an undefined material is reported twice.
+    # Debian's urdfdom reports an undefined material twice.
     assert (stdout, stderr, status) == (
         golden["stdout"],
         [*dict.fromkeys(golden["stderr"])],
@@ -162,6 +162,6 @@ def test_shapes_may_share_a_link() -> None:
 
 
 def test_long_numbers_take_no_time() -> None:
-    # Each digit was tried as the end of the whole part, and each rest as its decimals: 30 s.
+    # Each digit was tried as the end of the integer part, and each rest as its decimals: 30 s.
     with pytest.raises(NotANumberError):
         as_float("1" * 100_000 + "x")

@@ -1,4 +1,4 @@
-"""How much memory code allocates."""
+"""Measure how much memory code allocates."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["Allocations"]
 
 
 class Allocations:
-    """What is allocated inside the ``with`` block: ``peak()`` since ``mark()``."""
+    """Measures allocations inside the ``with`` block: ``peak()`` since ``mark()``."""
 
     def __enter__(self) -> Allocations:
         tracemalloc.start()
@@ -19,11 +19,11 @@ class Allocations:
         tracemalloc.stop()
 
     def mark(self) -> None:
-        """Count from here on."""
+        """Start counting here."""
         tracemalloc.reset_peak()
         self._before, _ = tracemalloc.get_traced_memory()
 
     def peak(self) -> int:
-        """Return by how many bytes the memory in use has grown at its peak."""
+        """Return the peak growth of the memory in use, in bytes."""
         _, peak = tracemalloc.get_traced_memory()
         return peak - self._before

@@ -1,4 +1,4 @@
-"""core/wire/framing: frames in any chunks, against a slow readable reference."""
+"""core/wire/framing: frames in any chunks, compared with a slow readable reference."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from minirospy.core.wire.framing import (
 
 
 def feed(reader: FrameReader, data: bytes, step: int) -> list[bytes]:
-    """Hand ``data`` over in pieces of at most ``step`` bytes, as a socket would."""
+    """Feed ``data`` in pieces of at most ``step`` bytes, as a socket would."""
     frames = []
     at = 0
     while at < len(data):
@@ -120,7 +120,7 @@ def test_small_message_is_one_frame(sizes: list[int]) -> None:
 
 
 def test_length_of_an_array_is_that_of_its_bytes() -> None:
-    """The len() of an array of numbers is not in bytes, alone or beside others."""
+    """The len() of an array of numbers is not in bytes, alone or with other buffers."""
     numbers = memoryview(array("I", [1, 2, 3]))
     for written in ([numbers], [b"ab", numbers]):
         assert pieces(*written).frame() == serialize_frame(b"".join(map(bytes, written)))
@@ -155,7 +155,7 @@ def test_buffers_of_a_large_message() -> None:
     frame = LargeFrame((head, tail), CHUNK + 8)
     length = struct.pack("<I", CHUNK + 8)
     assert frame.buffers(split=False) == [length, head, tail]
-    # 1 in the highest bit of the length, and then the size of the array.
+    # The highest bit of the length is 1, and the size of the array follows.
     assert frame.buffers(split=True) == [struct.pack("<II", CHUNK + 8 + 0x80000000, CHUNK) + head, tail]
     for others in [(tail,), (b"head", tail), (head, tail, b"more")]:
         whole = LargeFrame(others, sum(map(len, others)))

@@ -1,4 +1,4 @@
-"""core/wire/journal: what is written is read again; of a damaged file, everything up to the damage."""
+"""core/wire/journal: written records are read again; from a damaged file, everything up to the damage."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def written(records: list[list[Any]]) -> bytes:
 
 
 def framed(body: bytes) -> bytes:
-    """Return a record with this body, which need not be one."""
+    """Return a record with this body, which may be invalid."""
     return struct.pack("<II", len(body), zlib.crc32(body)) + body
 
 
@@ -126,7 +126,7 @@ def test_damage_is_named(data: bytes, damage: str) -> None:
 
 
 def test_dictionary_may_have_any_keys() -> None:
-    """A master that would not start for a record of another version is worse than one that passes it on."""
+    """A master that did not start because of another version's record would be worse than one that passes it on."""
     assert parse_journal(HEAD + framed(b"\x91\x81\1\2")).records == [[{1: 2}]]
 
 
@@ -149,7 +149,7 @@ def test_pieces_are_the_whole_value(value: Any) -> None:
 @pytest.mark.parametrize("count", [0, 1, 3 * _STEP_ITEMS, 3 * _STEP_ITEMS + 1])
 def test_list_of_numbers_comes_in_pieces_of_so_many(count: int) -> None:
     pieces = list(pack_in_steps([7] * count))
-    # A head of up to five bytes, and a byte for each number.
+    # A header of up to five bytes, and a byte for each number.
     assert len(pieces) == count // _STEP_ITEMS + 1
     assert max(map(len, pieces)) <= _STEP_ITEMS + 5
     assert unpack(b"".join(pieces)) == [7] * count
@@ -163,7 +163,7 @@ def test_long_text_comes_in_pieces(kind: type) -> None:
     assert max(map(len, pieces)) == _STEP_BYTES
     assert sum(len(each) == _STEP_BYTES for each in pieces) == 3
     assert unpack(b"".join(pieces)) == [1, value, 2]
-    # As long as may be in one piece.
+    # The longest value that fits into one piece.
     short = value[:_STEP_BYTES]
     assert len(list(pack_in_steps(short))) == 1
 
@@ -171,7 +171,7 @@ def test_long_text_comes_in_pieces(kind: type) -> None:
 def test_long_text_of_any_characters_comes_in_pieces() -> None:
     value = "\u0151" * (3 * _STEP_BYTES + 5)
     pieces = list(pack_in_steps([1, value, 2]))
-    # Nothing at first: only what is encoded has a length.
+    # The first pieces are empty: a length is known only after encoding.
     assert [len(each) for each in pieces[:6]] == [2, 0, 0, 0, 0, 5]
     assert max(map(len, pieces)) == 2 * _STEP_BYTES
     assert unpack(b"".join(pieces)) == [1, value, 2]

@@ -1,4 +1,4 @@
-"""core/wire/tcpros: who accepts whom. The two sides' checks are joined in memory."""
+"""core/wire/tcpros: which peer accepts which. The checks of both sides are joined in memory."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_text_of_a_refusal_is_escaped() -> None:
     assert "\x1b" not in str(raised.value)
 
 
-# The fields that go out, as rospy and roscpp send them.
+# The header fields that are sent, as rospy and roscpp send them.
 
 
 def test_subscriber_header_fields() -> None:

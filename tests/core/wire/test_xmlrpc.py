@@ -1,4 +1,4 @@
-"""core/wire/xmlrpc against the standard library's, both ways; and what is refused."""
+"""core/wire/xmlrpc compared with the standard library's, in both directions; and refused messages."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from minirospy.core.wire.xmlrpc import (
 from minirospy.core.wire.xmlrpc_reader import MAX_DEPTH, Reader
 from tests.core.wire.memory import Allocations
 
-# What XML 1.0 can hold: no control characters but tab and line feed, no surrogates.
+# The characters that XML 1.0 allows: no control characters but tab and line feed, no surrogates.
 TEXT = st.text(
     st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff")
     | st.sampled_from("\t\n]>&<")
@@ -178,7 +178,7 @@ def test_long_base64_is_decoded_as_it_comes() -> None:
 
 @pytest.mark.parametrize("kind", ["value", "string", "base64", "name", "methodName"])
 def test_long_text_is_not_copied_when_it_is_whole(kind: str) -> None:
-    # To join 60 MiB at their end would take 50 ms.
+    # Joining 60 MiB at the end would take 50 ms.
     if sys.gettrace() and kind != "base64":
         pytest.skip("Python copies more where it is traced")
     if sysconfig.get_config_var("Py_GIL_DISABLED") and sys.version_info < (3, 14) and kind != "base64":
@@ -233,7 +233,7 @@ def test_width_of_a_text_is_not_that_of_the_one_before() -> None:
 
 
 def test_lines_of_a_text_are_one_piece() -> None:
-    # expat hands out each line: a text of short ones would take many times its size.
+    # expat reports each line separately: short lines would take many times the size of the string.
     reader = Reader()
     reader.feed(b"<a>" + b"x\n" * 1000)
     assert len(reader._text) == 1

@@ -1,4 +1,4 @@
-"""core/wire/xmlrpc_plain reads what the parser reads, or leaves it to the parser."""
+"""core/wire/xmlrpc_plain reads the same values as the parser, or leaves the message to the parser."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PIECES = [
 
 
 def check(body: bytes) -> bool:
-    """Return whether ``body`` was read; as the parser reads it."""
+    """Return whether ``body`` was read; assert that the parser reads the same."""
     found = read_plain(body)
     if found is None:
         return False
@@ -82,7 +82,7 @@ def test_any_pieces(pieces: bytes) -> None:
 
 
 def test_what_ros_sends_is_plain() -> None:
-    """The calls and answers of rosmaster, rospy, roscpp and our own."""
+    """Calls and responses of rosmaster, rospy, roscpp and minirospy."""
     for args in (
         ("/node", "/topic", "std_msgs/String", "http://here:1/"),
         ("/node", "key", -5),

@@ -1,4 +1,4 @@
-"""Actions of asyncio programs: each way in which a goal may end, between our two ends and with the rospy API's."""
+"""Actions of asyncio programs: each final state of a goal, with minirospy's client and server and with the rospy API's."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def run(
     work: Callable[[Goal], Awaitable[Any]] = execute,
     **options: Any,
 ) -> None:
-    """Run a test's coroutine between a client and a server of two nodes."""
+    """Run a test's coroutine with a client and a server of two nodes."""
 
     async def bounded() -> None:
         async with (
@@ -67,7 +67,7 @@ async def _done(work: Awaitable[None]) -> None:
 
 
 async def started(goal: Any) -> None:
-    """Return when the server works on the goal."""
+    """Return when the server executes the goal."""
     await until(lambda: goal.state is GoalState.ACTIVE)
 
 
@@ -78,7 +78,7 @@ def test_feedback_and_result() -> None:
         assert (await goal).result == 1
         assert goal.done
         assert goal.state is GoalState.SUCCEEDED
-        # A goal that has ended may be asked again.
+        # A finished goal can be awaited again.
         assert (await goal).result == 1
 
     run(main)
@@ -128,7 +128,7 @@ def test_cancel() -> None:
         with pytest.raises(GoalError) as caught:
             await goal
         assert caught.value.state is GoalState.PREEMPTED
-        goal.cancel()  # of no effect
+        goal.cancel()  # has no effect
         async with client.send(msg.TestGoal(3)) as goal:
             await started(goal)
         with pytest.raises(GoalError, match="preempted"):
@@ -170,7 +170,7 @@ def test_a_newer_goal_takes_the_place_of_the_one_that_runs() -> None:
 
 
 def test_concurrent_goals_each_end() -> None:
-    """One that makes way before its work has started, too."""
+    """Includes a goal that is preempted before its execution starts."""
 
     async def main(client: Client, server: Server) -> None:
         await client.wait_for_server()
@@ -266,13 +266,13 @@ def test_a_cancel_that_comes_before_its_goal(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A goal of a client that is not minirospy's waits a moment before it is taken, and a cancel waits longer."""
+    """A goal of a third-party client waits a moment before it is accepted, and a cancel request waits longer."""
 
     async def main(_: Client, server: Server) -> None:
         pauses: list[float] = []
 
         async def sleep(seconds: float) -> None:
-            # Both have come by now; the one whose pause is shorter is done before the other goes on.
+            # Both have arrived by now; the one with the shorter pause is done before the other continues.
             pauses.append(seconds)
             await until(
                 lambda: not (len(pauses) < 2 or (seconds == max(pauses) and "other-1" not in server._goals))

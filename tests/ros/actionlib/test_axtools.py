@@ -1,4 +1,4 @@
-"""axclient.py and axserver.py, at a pipe: a form of the goal's type, the progress, how it ends."""
+"""axclient.py and axserver.py with pipes: a form of the goal's type, the progress, the final state."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def ask(answers: str, *words: str) -> tuple[str, str, int]:
 
 
 def ask_server(server: subprocess.Popen[str], answers: str, *words: str, until: str) -> tuple[str, str, int]:
-    """Run axclient; the server succeeds once the client has printed a line with ``until``."""
+    """Run axclient; the server succeeds after the client has printed a line that contains ``until``."""
     process = subprocess.Popen(
         [*command("axclient"), *words],
         stdin=subprocess.PIPE,
@@ -157,7 +157,7 @@ def test_a_person_serves(master: str) -> None:
     assert said.endswith("Succeeded: well done\nresult: 7\n")
     assert status == 0
     process.stdin.close()
-    # The next goal finds nobody to answer it.
+    # For the next goal, no user answers.
     said, _, status = ask("", "/ask", "{goal: 6}")
 
     assert "Aborted: the person who answered has left\n" in said

@@ -1,4 +1,4 @@
-"""StatusList beside the generated class: the same bytes, the same statuses."""
+"""StatusList compared with the generated class: the same bytes, the same statuses."""
 
 from __future__ import annotations
 

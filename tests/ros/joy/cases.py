@@ -1,4 +1,4 @@
-"""What joy_node and teleop_node are driven with (drive.py)."""
+"""Inputs for joy_node and teleop_node (drive.py)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ OPTIONS: dict[str, dict[str, object]] = {
     "old deadzone": {"deadzone": 8000},
     "negative": {"deadzone": -1, "autorepeat_rate": -1},
 }
-# Each step: events that are sent together, and the number of messages that come of them.
+# Each step: events that are sent together, and the number of resulting messages.
 STEPS = (
     ([(AXIS | INIT, 0, 20000), (AXIS | INIT, 3, -32767), (BUTTON | INIT, 0, 0), (BUTTON | INIT, 2, 1)], 1),
     ([(BUTTON, 0, 1)], 1),

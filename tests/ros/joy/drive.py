@@ -1,7 +1,8 @@
-"""Drive joy_node by a simulated device, and teleop_node by states: what they publish, line by line.
+"""Drive joy_node with a simulated device, and teleop_node with states; print the messages that they publish.
 
-`drive.py JOY_NODE TELEOP_NODE [PYTHON [NAME...]]`: programs of either stack; NAME: only these cases. drive.txt is what the real
-ones printed (joy 1.15.1 and teleop_twist_joy 0.1.3, which Debian does not have, built from their sources).
+`drive.py JOY_NODE TELEOP_NODE [PYTHON [NAME...]]`: programs of either stack; NAME: only these cases. drive.txt is the
+output for the
+real programs (joy 1.15.1 and teleop_twist_joy 0.1.3, which Debian does not have, built from source).
 """
 
 from __future__ import annotations
@@ -68,13 +69,13 @@ def joysticks(program: list[str], names: list[str]) -> None:
 
 
 def has_opened(process: subprocess.Popen[bytes], path: str) -> bool:
-    """Return whether a process has a file open, as far as the system shows it."""
+    """Return whether a process has a file open, as far as the system reports it."""
     try:
         files = os.listdir(f"/proc/{process.pid}/fd")
     except FileNotFoundError:
         return True
     for each in files:
-        # One that is closed meanwhile.
+        # The file may be closed meanwhile.
         with contextlib.suppress(FileNotFoundError):
             if os.readlink(f"/proc/{process.pid}/fd/{each}") == path:
                 return True
@@ -84,7 +85,7 @@ def has_opened(process: subprocess.Popen[bytes], path: str) -> bool:
 def follow_joystick(master: int, path: str, subscriber: rospy.Subscriber, states: queue.Queue[Joy]) -> None:
     while not subscriber.get_num_connections():
         time.sleep(0.02)
-    # It opens the device twice: what is sent before is lost.
+    # joy_node opens the device twice: earlier events are lost.
     time.sleep(1)
     for events, count in STEPS:
         os.write(master, b"".join(struct.pack("<IhBB", 0, value, kind, at) for kind, at, value in events))
@@ -116,7 +117,7 @@ def follow_teleop(
     for axes, buttons in STATES:
         publisher.publish(Joy(axes=axes, buttons=buttons))
         try:
-            # A busy machine may need long for one that comes.
+            # On a busy machine a message may take long.
             twist = twists.get(timeout=10)
         except queue.Empty:
             print("  nothing")

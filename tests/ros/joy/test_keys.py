@@ -1,4 +1,4 @@
-"""teleop_twist_keyboard: what keys mean, and the program in a terminal."""
+"""teleop_twist_keyboard: the meaning of keys, and the program in a terminal."""
 
 from __future__ import annotations
 
@@ -152,13 +152,13 @@ def test_motion_is_repeated_stamped_and_ends_without_keys(master: str) -> None:
             async for message in node.subscribe("cmd_vel", TwistStamped):
                 if not motions:
                     await asyncio.to_thread(terminal.read_until, "currently:")
-                # Again where the machine was so busy that the key's time was over before it was repeated.
+                # Try again if the machine was so busy that the key timed out before it was repeated.
                 if not motions or (motions[-1] == 0 and motions.count(1.0) <= 2):
                     os.write(terminal.master, b"j")
                 assert message.header.frame_id == "base"
                 assert message.header.stamp.secs > 0
                 motions.append(message.twist.angular.z)
-                # Once by the key, and more often by the rate.
+                # Published once for the key, and more often by the rate.
                 if motions.count(1.0) > 2 and motions[-1] == 0:
                     break
 

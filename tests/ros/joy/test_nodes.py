@@ -30,7 +30,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminal
 
 
 class Pad:
-    """A pseudo-terminal that sends events of a joystick."""
+    """A pseudo-terminal that sends joystick events."""
 
     def __init__(self, link: Path) -> None:
         import pty
@@ -49,7 +49,7 @@ class Pad:
     def unplug(self) -> None:
         if self._is_open:
             self._is_open = False
-            # The next pseudo-terminal of any process gets its name.
+            # The next pseudo-terminal of any process may get the same name.
             self._link.unlink(missing_ok=True)
             os.close(self._slave)
             os.close(self._master)
@@ -103,7 +103,7 @@ def test_pad_drives_a_robot_and_may_be_plugged_in_again(start: Start, tmp_path: 
             if status.message == "OK":
                 break
         moving = asyncio.ensure_future(first_motion(twists))
-        # Again until teleop_node, which publishes before it subscribes, has a state.
+        # Repeat until teleop_node, which publishes before it subscribes, has a state.
         while not moving.done():
             second = await press(pad, states)
             assert second.header.frame_id == str(link)
@@ -121,7 +121,7 @@ def test_pad_drives_a_robot_and_may_be_plugged_in_again(start: Start, tmp_path: 
             again.unplug()
 
     async def press(pad: Pad, states: object) -> Joy:
-        """Press button 0 until a state shows it: what is sent while the device is opened is lost."""
+        """Press button 0 until a state shows it: events are lost while the device is being opened."""
         waiting = asyncio.ensure_future(first(states))
         while not waiting.done():
             pad.send(EVENT_AXIS, 1, -32767)
@@ -249,7 +249,7 @@ def test_pygame_gives_the_events_of_linux(monkeypatch: pytest.MonkeyPatch) -> No
         Event(EVENT_BUTTON | EVENT_INIT, 1, 1),
         Event(EVENT_AXIS | EVENT_INIT, 0, 16384),
         Event(EVENT_AXIS | EVENT_INIT, 1, -32767),
-        # A hat's up is the negative end of its second axis.
+        # Up on a hat is the negative end of its second axis.
         Event(EVENT_AXIS | EVENT_INIT, 2, 0),
         Event(EVENT_AXIS | EVENT_INIT, 3, -32767),
     ]

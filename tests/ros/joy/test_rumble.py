@@ -1,4 +1,4 @@
-"""Force feedback: the kernel's structures, and what joy/set_feedback makes of the motors."""
+"""Force feedback: the kernel's structures, and the motor commands from joy/set_feedback."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from minirospy.ros.joy.rumble import Rumble, RumbleError, event_device, pack_eff
 
 
 class FakeDevice:
-    """A joystick that notes what its motors are to do."""
+    """A joystick that records its motor commands."""
 
     name = "pad"
 

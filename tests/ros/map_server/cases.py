@@ -1,4 +1,4 @@
-"""Maps of many kinds: what the real map_server publishes of them is in recorded.json (make_recorded.py)."""
+"""Maps of many kinds; recorded.json has the messages that the real map_server publishes for them (make_recorded.py)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Case(NamedTuple):
 
 
 def write_images(folder: Path) -> None:
-    """Write the images, each 4 by 4, or 8 by 2 where it is of bits."""
+    """Write the images, each 4 by 4 pixels, or 8 by 2 for one bit per pixel."""
     (folder / "grey.pgm").write_bytes(b"P5\n# by hand\n4 4\n255\n" + GREYS)
     (folder / "few.pgm").write_bytes(b"P5 4 4 100\n" + bytes(value % 101 for value in GREYS))
     (folder / "plain.pgm").write_bytes(
@@ -132,7 +132,7 @@ def write_map(folder: Path, case: Case) -> Path:
 
 
 class Grid(NamedTuple):
-    """What map_saver gets, and its options."""
+    """The map that map_saver receives, and its options."""
 
     name: str
     data: tuple[int, ...]

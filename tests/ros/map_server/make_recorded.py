@@ -1,6 +1,6 @@
-"""Write recorded.json, what the real map_server and map_saver do: `python make_recorded.py map_server map_saver`.
+"""Write recorded.json, the results of the real map_server and map_saver: `python make_recorded.py map_server map_saver`.
 
-Both programs are those of ROS's navigation (1.17.3), which Debian does not have: built from its source, with Debian's libraries.
+Both programs are from ROS's navigation (1.17.3), which Debian does not have: built from source, with Debian's libraries.
 A master must run at ROS_MASTER_URI.
 """
 
@@ -22,7 +22,7 @@ SAVED = Path(__file__).with_name("saved.json")
 
 
 def published(program: str, folder: Path, case: object) -> object:
-    """Return the map that the program publishes, or its lines at the end."""
+    """Return the map that the program publishes, or the last lines of its output."""
     process = subprocess.Popen(
         [program, str(write_map(folder, case)), "__name:=map_server"],
         stdout=subprocess.PIPE,
@@ -53,7 +53,7 @@ def published(program: str, folder: Path, case: object) -> object:
 
 
 def saved(program: str, folder: Path, grid: Grid) -> object:
-    """Return the two files that the program saves of a grid."""
+    """Return the two files that the program saves for a grid."""
     message = OccupancyGrid(data=list(grid.data))
     info = message.info
     info.width, info.height, info.resolution = grid.width, grid.height, grid.resolution

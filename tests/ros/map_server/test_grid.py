@@ -1,4 +1,4 @@
-"""Maps of cases.py: the same occupancies as the real map_server publishes (recorded.json)."""
+"""Maps of cases.py: the same occupancies as those of the real map_server (recorded.json)."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from tests.ros.map_server.cases import FIELDS, GREYS, GRIDS, USUAL, Case, Grid, 
 
 RECORDED = json.loads((Path(__file__).parent / "recorded.json").read_text(encoding="utf-8"))
 SAVED = json.loads((Path(__file__).parent / "saved.json").read_text(encoding="utf-8"))
+# Accepted by minirospy, refused by the real one: a comment after the size.
 WIDER = {"usual: plain15.pgm", "raw: plain15.pgm"}
-"""What ours reads and the real one refuses: a comment behind the size."""
 OWN_WORDS = {
     name: tag
     for names, tag in (
@@ -44,7 +44,7 @@ OWN_WORDS = {
     )
     for name in names
 }
-"""Where the real program ends with `bad conversion`, and its own text, which names the field, is never printed."""
+"""Cases in which the real program fails with `bad conversion`, and never prints its own text, which names the field."""
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +165,7 @@ def test_saved_files_are_byte_by_byte_those_of_the_real_program(grid: Grid) -> N
     image = pgm_of_grid(grid.data, grid.width, grid.height, resolution, options.occupied, options.free)
     assert image.decode("latin-1") == real["pgm"]
     yaw = yaw_of_quaternion(*grid.orientation)
-    # The one difference: what the real program writes of 0, 0, 0, 0 cannot be read.
+    # The one difference: the real program's output for 0, 0, 0, 0 cannot be parsed.
     expected = real["yaml"].replace("-nan", "0.000000")
     assert yaml_of_map("saved.pgm", resolution, (*grid.position, yaw)) == expected
 

@@ -1,4 +1,4 @@
-"""bondpy: the state machine, and ends in one process; the ends of real ROS are in tests/interop."""
+"""bondpy: the state machine, and endpoints in one process; tests/interop uses endpoints of real ROS."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""cv_bridge: padding, views and faults. Which pixels come out is compared with ROS by tests/referee."""
+"""cv_bridge: padding, views and faults. tests/referee compares the pixels with ROS."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_bytes_between_rows_are_left_out(encoding: str, size: int, big: bool) ->
         encoding=encoding,
         step=5 * size + 3,
         is_bigendian=big,
-        # The last row may end without its padding.
+        # The last row may omit its padding.
         data=b"xxx".join(rows),
     )
     np.testing.assert_array_equal(bridge.imgmsg_to_cv2(padded), bridge.imgmsg_to_cv2(packed))
@@ -74,7 +74,7 @@ def test_array_that_is_not_an_image_is_refused(shape: tuple[int, ...]) -> None:
 
 
 def without(module: str, code: str) -> str:
-    """Run a program that cannot import a module; return what it prints."""
+    """Run a program that cannot import a module; return its output."""
     head = (
         f"import sys; sys.modules[{module!r}] = None; sys.modules['cv2'] = None\n"
         "import numpy as np; from cv_bridge import CvBridge, CvBridgeError; from sensor_msgs.msg import Image\n"

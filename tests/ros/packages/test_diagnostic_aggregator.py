@@ -1,4 +1,4 @@
-"""diagnostic_aggregator: what its programs publish, as the real ones; drive.txt is what those made of the same statuses."""
+"""diagnostic_aggregator: its programs publish the same messages as the real ones; drive.txt has those for the same statuses."""
 
 from __future__ import annotations
 

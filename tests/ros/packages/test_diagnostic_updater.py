@@ -1,6 +1,6 @@
-"""diagnostic_updater where clocks stand still or jump, and parameters are not numbers.
+"""diagnostic_updater with clocks that stand still or jump, and parameters that are not numbers.
 
-What it reports otherwise is compared with real ROS by tests/referee/cases/diagnostic_updater_tasks.py.
+tests/referee/cases/diagnostic_updater_tasks.py compares its other reports with real ROS.
 """
 
 from __future__ import annotations

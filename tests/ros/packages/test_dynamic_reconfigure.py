@@ -1,4 +1,4 @@
-"""dynamic_reconfigure: faults that ROS answers with a traceback, and what differs from ROS on purpose."""
+"""dynamic_reconfigure: faults for which ROS prints a traceback, and deliberate differences from ROS."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def failure(call):
 
 
 def run(body: str) -> list[str]:
-    """Run a program with a lamp's configuration; return its lines."""
+    """Run a program with a lamp's configuration; return its output lines."""
     done = subprocess.run(
         [sys.executable, "-c", LAMP + body], capture_output=True, text=True, timeout=100, check=False
     )

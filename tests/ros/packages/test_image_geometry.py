@@ -1,4 +1,4 @@
-"""image_geometry: rectification without OpenCV and with it, the way back, and faults. Numbers: tests/referee."""
+"""image_geometry: rectification with and without OpenCV, the inverse, and faults. tests/referee compares the numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""image_transport: what republish makes of images, the formats' texts, faults, and the program itself."""
+"""image_transport: republish's conversions of images, the format strings, faults, and the program itself."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ RECORDED = json.loads(Path(__file__).with_name("compressed_images.json").read_te
 
 
 def image(encoding: str) -> Image:
-    """Return a smooth picture of 32x24 pixels."""
+    """Return a smooth image of 32x24 pixels."""
     dtype, channels = BRIDGE.encoding_to_dtype_with_channels(encoding)
     v, u = np.mgrid[:24, :32]
     planes = [(u * 7 + v * 3 * (at + 1)) % 251 for at in range(channels)]
@@ -98,7 +98,7 @@ def test_jpeg_is_close_and_smaller_with_less_quality(encoding: str) -> None:
 
 
 def recorded_source(encoding: str) -> Image:
-    """Return the image that the real plug-ins compressed for the record."""
+    """Return the image that the real plug-ins compressed for the recording."""
     dtype, channels = BRIDGE.encoding_to_dtype_with_channels(encoding)
     v, u = np.mgrid[:48, :64]
     if dtype == "float32":
@@ -113,7 +113,7 @@ def recorded_source(encoding: str) -> Image:
 
 @pytest.mark.parametrize("row", RECORDED, ids=lambda row: row["format"])
 def test_messages_of_the_real_plug_ins_are_read_as_they_read_them(row: dict[str, Any]) -> None:
-    """The record is what Debian's republish and the plug-ins of image_transport_plugins 1.15 (noetic) made and read."""
+    """Debian's republish and the plug-ins of image_transport_plugins 1.15 (noetic) made and read the recording."""
     message = CompressedImage(format=row["format"], data=bytes.fromhex(row["data"]))
     source = recorded_source(row["encoding"])
     assert hashlib.sha256(source.data).hexdigest() == row["source"]
@@ -125,7 +125,7 @@ def test_messages_of_the_real_plug_ins_are_read_as_they_read_them(row: dict[str,
     *shape, digest = row["decoded"]
     assert [found.encoding, found.width, found.height, found.step, found.is_bigendian] == shape
     if "jpeg" in row["format"]:
-        # Decoders of JPEG round differently.
+        # JPEG decoders round differently.
         ours = BRIDGE.imgmsg_to_cv2(uncompressed(compressed(source, Settings()))).astype(int)
         assert abs(ours - BRIDGE.imgmsg_to_cv2(found)).max() <= 12
     else:

@@ -1,6 +1,6 @@
-"""interactive_markers where ROS's server raises, and after a clock that jumped back.
+"""interactive_markers in cases in which ROS's server raises, and after the clock jumped back.
 
-What is published otherwise is compared with real ROS by tests/referee/cases/interactive_markers_server.py.
+tests/referee/cases/interactive_markers_server.py compares the other messages with real ROS.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""message_filters: the search against ROS's loops, and what its synchronizers do where ROS's hang."""
+"""message_filters: the search compared with ROS's loops, and the synchronizers in cases in which ROS's hang."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def queue_of(stamps: list[int]) -> StampQueue:
 
 
 def found_by_loops(queues: list[list[int]], stamp: int, slop: int, index: int | None) -> list[int] | None:
-    """Return what ROS finds: every combination in turn, the stamps of each queue by their distance."""
+    """Return the result of ROS's algorithm: every combination in turn, the stamps of each queue by their distance."""
     near = [
         [stamp]
         if at == index
@@ -57,7 +57,7 @@ def test_the_search_finds_what_the_loops_find(
 
 
 def test_search_of_many_topics_without_a_match_ends() -> None:
-    # 50 stamps to either side, and none that fits those of the other side: 100 ** 12 combinations.
+    # 50 stamps on either side, of which none fits those of the other side: 100 ** 12 combinations.
     sides = [queue_of([*range(50), *range(151, 201)]) for _ in range(12)]
     sides.append(queue_of([*range(50)]))
     sides.append(queue_of([*range(151, 201)]))

@@ -1,4 +1,4 @@
-"""sensor_msgs.point_cloud2 as numpy arrays. What it reads as tuples is compared with ROS by tests/referee."""
+"""sensor_msgs.point_cloud2 as numpy arrays. tests/referee compares the tuples with ROS."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def clouds(draw: st.DrawFn) -> PointCloud2:
 
 
 def slowly(cloud: PointCloud2, *, skip_nans: bool) -> list[tuple[float, ...]]:
-    """Return what ROS reads: each point by struct."""
+    """Return the points as ROS reads them: each with struct."""
     fmt, end = ">" if cloud.is_bigendian else "<", 0
     for field in sorted(cloud.fields, key=lambda each: each.offset):
         fmt += "x" * (field.offset - end) + FORMATS[field.datatype] * field.count

@@ -1,4 +1,4 @@
-"""ros_numpy: messages go to arrays and back."""
+"""ros_numpy: conversion of messages to arrays and back."""
 
 from __future__ import annotations
 

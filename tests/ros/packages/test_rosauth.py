@@ -1,4 +1,4 @@
-"""rosauth: which requests its node takes, and what it refuses to start with."""
+"""rosauth: which requests its node accepts, and with which settings it refuses to start."""
 
 from __future__ import annotations
 

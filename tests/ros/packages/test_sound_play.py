@@ -1,4 +1,4 @@
-"""sound_play: the requests of its client, and its node with players that write down how they are called."""
+"""sound_play: its client's requests, and its node with players that record how they are called."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ True
 
 @pytest.fixture
 def players(tmp_path: Path) -> tuple[Path, Path]:
-    """Return a folder with players that write a line for each call, and the file that they write to."""
+    """Return a folder with players that write a line for each call, and the file to which they write."""
     log = tmp_path / "log"
     log.touch()
     folder = tmp_path / "bin"
@@ -227,7 +227,7 @@ def players(tmp_path: Path) -> tuple[Path, Path]:
         program.write_text(
             f"#!{sys.executable}\nimport sys, time\nsaid = {text}\n"
             f"open({str(log)!r}, 'a').write(' '.join([{name!r}, *sys.argv[1:]]) + (' | ' + said if said else '') + chr(10))\n"
-            # The last one sends feedback while it plays.
+            # The last player sends feedback while it plays.
             "time.sleep(2 if said == 'once' else 0.1)\n"
         )
         program.chmod(0o755)

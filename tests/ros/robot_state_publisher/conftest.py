@@ -1,4 +1,4 @@
-"""Programs of ROS packages as `rosrun` starts them, and what they publish."""
+"""Fixtures that start programs of ROS packages as `rosrun` does, and read the messages that they publish."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Start = Callable[..., "subprocess.Popen[str]"]
 
 @pytest.fixture
 def start(master: str) -> Iterator[Start]:
-    """Start a package's program: ``start(package, program, *words)``; it is ended with the test."""
+    """Return a function that starts a program: ``start(package, program, *words)``; stop the programs after the test."""
     with ExitStack() as running:
 
         def run(package: str, program: str, *words: str) -> subprocess.Popen[str]:
@@ -35,7 +35,7 @@ def start(master: str) -> Iterator[Start]:
 
 
 def end(process: subprocess.Popen[str]) -> tuple[str, str]:
-    """End a program, and return its output; a traceback is a fault."""
+    """Stop a program, and return its output; assert that there is no traceback."""
     if process.stdout is None or process.stdout.closed:
         return "", ""
     process.terminate()
@@ -48,7 +48,7 @@ def end(process: subprocess.Popen[str]) -> tuple[str, str]:
 
 
 def python(code: str) -> str:
-    """Return what a program prints that is a separate node."""
+    """Return the output of a program that runs a separate node."""
     return subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=SECONDS
     ).stdout

@@ -1,4 +1,4 @@
-"""docs/robots.md is true: its first command is typed, and prints what it shows."""
+"""docs/robots.md: run its first command, and compare the output with the page."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BIN = Path(sys.executable).parent
 
 
 def typed(line: str, until: str) -> str:
-    """Return what a launch prints, up to a line; then Ctrl-C."""
+    """Return a launch's output up to a line; then send Ctrl-C."""
     import signal
 
     command, *words = line.split()
@@ -52,7 +52,7 @@ def test_arm_of_the_page_prints_what_the_page_shows() -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C of Unix")
 def test_arguments_of_the_launch_file_reach_the_description() -> None:
-    # 0.1 + 0.8 + 0.4: the arm is stretched upwards.
+    # 0.1 + 0.8 + 0.4: the arm points straight up.
     read = typed(
         "roslaunch two_link_arm arm.launch upper_length:=0.8 shoulder:=0.0 elbow:=0.0", "RPY .degree"
     )

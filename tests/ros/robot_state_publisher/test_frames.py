@@ -1,4 +1,4 @@
-"""Positions of joints -> poses of links."""
+"""Joint positions -> link poses."""
 
 from __future__ import annotations
 

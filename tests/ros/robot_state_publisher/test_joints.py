@@ -1,4 +1,4 @@
-"""The joints of a description that can be set, and the lists that are published of them."""
+"""The joints of a description that can be set, and the published lists of them."""
 
 from __future__ import annotations
 

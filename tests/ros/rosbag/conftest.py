@@ -20,12 +20,11 @@ from minirospy.runtime.transport.loop import LoopThread
 from tests.waiting import wait_until
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
-GUARD = 45.0
-"""Seconds after which a program is taken to hang; a machine that runs tests may stand still for some."""
+GUARD = 45.0  # seconds after which a program is considered hung; a machine that runs tests may stall
 
 
 class Recorded(NamedTuple):
-    """A message of a bag."""
+    """A message in a bag."""
 
     topic: str
     callerid: str
@@ -43,7 +42,7 @@ def messages(path: Path) -> list[Recorded]:
 
 
 class Talker:
-    """A node that publishes texts."""
+    """A node that publishes strings."""
 
     def __init__(self, name: str) -> None:
         self._loop = LoopThread(name)
@@ -51,26 +50,26 @@ class Talker:
         self._loop.run(self.node.start())
 
     def advertise(self, topic: str, *, latch: bool = False, type_: InterfaceType = STRING) -> Publication:
-        """Publish a topic from now on."""
+        """Advertise a topic."""
         publication = Publication(topic, type_, latch=latch)
         self._loop.run(self.node.advertise(publication))
         return publication
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Shut down the node."""
         self._loop.run(self.node.close())
         self._loop.close()
 
 
 def say(publication: Publication, text: str | bytes) -> None:
-    """Publish a text."""
+    """Publish a string."""
     data = text if isinstance(text, bytes) else text.encode()
     body = len(data).to_bytes(4, "little") + data
     publication.publish(len(body).to_bytes(4, "little") + body)
 
 
 def said(body: bytes) -> str:
-    """Return the text of a message."""
+    """Return the string of a message."""
     return body[4:].decode()
 
 
@@ -81,7 +80,7 @@ def connected(publication: Publication) -> None:
 
 @pytest.fixture
 def talker(master: str) -> Iterator[Talker]:
-    """Return the node /talker."""
+    """Yield the node /talker."""
     talker = Talker("talker")
     try:
         yield talker
@@ -123,7 +122,7 @@ def start(tmp_path: Path) -> Iterator[Start]:
 
 
 def read_until(process: subprocess.Popen[str], text: str, stream: IO[str] | None = None) -> None:
-    """Read the lines that a program prints, up to the one with this text."""
+    """Read a program's output lines up to the one that contains this text."""
     stream = stream or process.stdout
     assert stream
     for line in stream:

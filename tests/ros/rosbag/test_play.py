@@ -1,4 +1,4 @@
-"""`rosbag play` as a process: what subscribers get, what it prints, and the keys."""
+"""`rosbag play` as a process: messages that subscribers receive, output, and keys."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ START = 1000 * SECOND
 
 
 class Heard(NamedTuple):
-    """A message that was received."""
+    """A received message."""
 
     topic: str
     body: bytes
@@ -40,19 +40,19 @@ class Heard(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Return its text."""
+        """Return the message's string."""
         return said(self.body)
 
 
 class Ear:
-    """A node that subscribes to anything."""
+    """A node that subscribes to any type."""
 
     def __init__(self) -> None:
         self.node = ToolNode(Environment.read(), "ear")
         self.heard: list[Heard] = []
 
     def listen(self, topic: str) -> None:
-        """Keep the messages of a topic."""
+        """Record the messages of a topic."""
         self.node.measure(
             topic,
             lambda one: self.heard.append(Heard(topic, one.body, one.header.get("latching", ""), one.time)),
@@ -60,18 +60,18 @@ class Ear:
 
     @property
     def texts(self) -> list[str]:
-        """Return what was said."""
+        """Return the received strings."""
         return [one.text for one in self.heard]
 
     def expect(self, *texts: str) -> None:
-        """Assert that these were said, and no others: the last may come when the player has ended."""
+        """Assert that exactly these strings are received: the last may arrive after the player has exited."""
         wait_until(lambda: len(self.heard) >= len(texts))
         assert self.texts == list(texts)
 
 
 @pytest.fixture
 def ear(master: str) -> Iterator[Ear]:
-    """Return a node that listens."""
+    """Yield a node that subscribes."""
     ear = Ear()
     try:
         yield ear
@@ -87,7 +87,7 @@ def make_bag(
     latched: tuple[str, ...] = (),
     **changes: str,
 ) -> str:
-    """Write a bag of texts (topic, seconds, text); return its name."""
+    """Write a bag of strings (topic, seconds, string); return its name."""
     with path.open("wb") as stream:
         writer = BagWriter(stream)
         numbers: dict[str, int] = {}
@@ -116,7 +116,7 @@ def make_bag(
 
 
 def play(start: Start, *words: str, prelude: str = "", **kwargs: int) -> subprocess.Popen[str]:
-    # Subscribers connect meanwhile.
+    # Give subscribers time to connect.
     return start("play", *words, "--wait-for-subscribers", prelude=prelude, **kwargs)
 
 
@@ -124,7 +124,7 @@ def test_messages_are_played_in_the_order_of_time(ear: Ear, start: Start, tmp_pa
     one = make_bag(tmp_path / "one.bag", [("/a", 0, "1"), ("/a", 0.2, "3")])
     two = make_bag(tmp_path / "two.bag", [("/a", 0.1, "2"), ("/a", 0.3, "4")])
     ear.listen("/a")
-    # Three seconds: of less there may be little left where the first message comes late.
+    # Three seconds: of a shorter time, little may remain if the first message arrives late.
     output, errors = play(start, one, "-r", "0.1", "--bags", two).communicate(timeout=GUARD)
 
     assert errors == ""
@@ -197,7 +197,7 @@ def test_the_clock_is_published(ear: Ear, start: Start, tmp_path: Path) -> None:
     name = make_bag(tmp_path / "b.bag", [("/a", 0, "1"), ("/a", 0.5, "2")])
     ear.listen("/clock")
     ear.listen("/a")
-    # Five seconds: a player that stalls skips what it would have shown meanwhile.
+    # Five seconds: a player that stalls skips the output of that time.
     play(start, name, "--clock", "--hz", "50", "-r", "0.1").communicate(timeout=GUARD)
     wait_until(lambda: [one.topic for one in ear.heard].count("/a") == 2)
 
@@ -227,7 +227,7 @@ def test_keys_pause_and_step(ear: Ear, start: Start, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("paused", [False, True])
 def test_pause_requested_while_it_waits_for_subscribers_counts(paused: bool) -> None:
-    """The service is offered before the clock runs."""
+    """The service is offered before the clock starts."""
     bags: Any = Mock()
     player = Player(bags, PlayOptions(paused=paused), output=Mock())
     assert not player.set_paused(paused)
@@ -314,8 +314,7 @@ def test_immediate(ear: Ear, start: Start, tmp_path: Path) -> None:
 
 
 STALLED = "from minirospy.ros.rosbag.recording import player; player._STALLED_SECONDS = {}"
-PATIENT = STALLED.format(1e9)
-"""Nothing but what a test does ends the wait for a subscriber."""
+PATIENT = STALLED.format(1e9)  # only the test's action ends the wait for a subscriber
 
 
 def test_slow_subscriber_gets_all_that_waits_for_it(ear: Ear, start: Start, tmp_path: Path) -> None:
@@ -399,7 +398,7 @@ def test_keys_of_a_terminal(ear: Ear, start: Start, tmp_path: Path) -> None:
     ear.listen("/a")
     ours, theirs = pty.openpty()
     before = termios.tcgetattr(theirs)
-    # In a new session, whose terminal this is.
+    # Start a new session whose controlling terminal this is.
     take = "import os, fcntl, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0)"
     process = start("play", name, "--pause", "--wait-for-subscribers", stdin=theirs, prelude=take)
     read_until(process, "Finished waiting")

@@ -1,4 +1,4 @@
-"""ros/rosbag/recording/sources: the messages of several bags."""
+"""ros/rosbag/recording/sources: merging the messages of several bags."""
 
 from __future__ import annotations
 

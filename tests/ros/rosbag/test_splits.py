@@ -1,4 +1,4 @@
-"""When a recording is split, and what its files are called."""
+"""The splitting of a recording, and the names of its files."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def outcome(label, call):
         show(label, "raises", type(error).__name__, "|", error)
 
 
-# What roslaunch itself prints is not asked for here.
+# Discard roslaunch's own output.
 lines, out = [], sys.stdout
 sys.stdout = sys.stderr = open(os.devnull, "w")
 

@@ -13,7 +13,7 @@ import pytest
 
 BIN = Path(sys.executable).parent
 
-# One write a line: roslaunch writes to the same pipe at the same time.
+# A single write per line: roslaunch writes to the same pipe at the same time.
 WAIT = """import signal, sys, time
 def stop(number, frame):
     sys.stdout.write(f'ended by {signal.Signals(number).name}\\n')
@@ -33,7 +33,7 @@ sys.exit(int(sys.argv[1]))
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the folder of package ``pkg``: wait.py waits, stop.py ends with the status in its first argument."""
+    """Return the folder of package ``pkg``: wait.py waits, stop.py exits with the status in its first argument."""
     folder = tmp_path / "pkg"
     folder.mkdir()
     (folder / "package.xml").write_text("<package><name>pkg</name></package>")
@@ -44,13 +44,13 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 class Running:
-    """A roslaunch that runs."""
+    """A running roslaunch."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self.process = process
 
     def read_until(self, *words: str) -> str:
-        """Return what is printed until all of ``words`` were."""
+        """Return the output up to the point at which all of ``words`` have been printed."""
         assert self.process.stdout
         said = ""
         for line in self.process.stdout:
@@ -60,7 +60,7 @@ class Running:
         raise AssertionError(f"no {words} in:\n{said}")
 
     def children(self) -> list[psutil.Process]:
-        """All that it started."""
+        """Return all processes that it started."""
         found: list[psutil.Process] = psutil.Process(self.process.pid).children(recursive=True)
         return found
 

@@ -1,4 +1,4 @@
-"""ros/roslaunch/launcher/load: what files say, and every error with its line."""
+"""ros/roslaunch/launcher/load: the contents of files, and every error with its line."""
 
 from __future__ import annotations
 
@@ -369,7 +369,7 @@ def test_file_that_explodes_is_refused_in_one_line(packages: Packages, body: str
 
 
 def test_files_that_include_the_next_one_twice_are_refused(packages: Packages, tmp_path: Path) -> None:
-    # 2^40 includes, if nobody counts them.
+    # 2^40 includes, without a limit.
     for number in range(40):
         include = f'<include file="$(dirname)/f{number + 1}.launch"/>'
         (tmp_path / f"f{number}.launch").write_text(f"<launch>{include * 2}</launch>")

@@ -1,4 +1,4 @@
-"""ros/roslaunch/launcher/registrations: what dead nodes leave with the master is removed, and nothing of the living."""
+"""ros/roslaunch/launcher/registrations: unregisters dead nodes at the master, and leaves live ones."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_a_new_node_of_the_same_name_stays_registered(master: str) -> None:
     register(master, "/node", old := refusing())
     with Graph(MasterProxy(master, "/test"), "test") as graph:
         state = graph.state()
-        # It starts between the look at the old one and the calls that unregister that.
+        # It starts between the check of the old one and the calls that unregister that.
         register(master, "/node", refusing())
         forget_node(graph, NodeAddress("/node", old), state)
         after = graph.state()
@@ -126,7 +126,7 @@ def test_close_waits_for_the_nodes_added_before(master: str) -> None:
 
 
 def process_of(launch: Running, name: str) -> psutil.Process:
-    # Of another test's roslaunch there may be a node of the same name.
+    # Another test's roslaunch may have a node of the same name.
     return next(child for child in launch.children() if f"__name:={name}" in child.cmdline())
 
 

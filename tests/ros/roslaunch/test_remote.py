@@ -1,4 +1,4 @@
-"""Nodes of other machines, as their roslaunches report them; with real ones: tests/interop/test_interop_roslaunch.py."""
+"""Nodes on other machines, as reported by their roslaunches; tests/interop/test_interop_roslaunch.py uses real ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from minirospy.ros.roslaunch.launcher.remote import RemoteMachines
 def test_node_that_ends_before_the_others_have_started_does_not_run(
     ended: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its roslaunch reports the end by a separate connection, perhaps before it answers that it has started it."""
+    """Its roslaunch reports the exit on a separate connection, perhaps before it answers that the node has started."""
     machines = RemoteMachines(Mock(), "run", Mock(), Mock(), Mock())
     nodes: Any = [SimpleNamespace(name=name, to_xml=lambda: "<node/>") for name in ("/a", "/b")]
     ssh: Any = SimpleNamespace(is_running=True)

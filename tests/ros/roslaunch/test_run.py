@@ -1,4 +1,4 @@
-"""roslaunch as a process: what it starts, how it ends what it started, and what it says of that."""
+"""roslaunch as a process: starting and stopping processes, and its output."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_nothing_outlives_a_roslaunch_that_is_killed(start: Start, monkeypatch: 
     launch.process.kill()
     _, left = psutil.wait_procs(children, timeout=30)
     assert not left
-    # In the end the pipe is closed; the node was asked kindly.
+    # The pipe is closed at the end; the node received SIGINT.
     assert "ended by SIGINT" in launch.read_until("ended by")
 
 
@@ -77,7 +77,7 @@ def test_where_a_node_prints_and_runs(start: Start, master: str, package: Path) 
         '<node pkg="pkg" type="stop.py" name="b" args="0" output="screen"/>'
     )
     said, _ = launch.process.communicate(timeout=30)
-    # Standard error is shown, for any value of `output`.
+    # Stderr is shown for any value of `output`.
     assert said.count("err\n") == 2
     assert f"out {home} 1 2\n" in said
     folder = home / "log" / str(run_id.get_param("/run_id"))
@@ -126,7 +126,7 @@ def test_watch_starts_a_node_again_when_its_file_changes(start: Start, master: s
     launch = start(f'{NODE}"a" output="screen"/>', "--watch")
     launch.read_until("waiting")
     file = package / "wait.py"
-    # In one step: it may look at the file at any moment.
+    # Replace the file atomically: roslaunch may read it at any moment.
     changed = package / "changed"
     changed.write_text(file.read_text().replace("waiting", "changed"))
     changed.replace(file)
@@ -185,7 +185,7 @@ def test_rosparam_commands_come_before_the_parameters(start: Start, master: str,
 
 @pytest.fixture
 def ssh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return an ssh that runs here what it is to run there, and writes down how it was called."""
+    """Return a fake ssh that runs the remote command on this machine, and records its arguments."""
     folder = tmp_path / "bin"
     folder.mkdir()
     said = tmp_path / "ssh-said"

@@ -1,4 +1,4 @@
-"""The summary of a launch: values of parameters as roslaunch shortens them."""
+"""The summary of a launch: parameter values as roslaunch shortens them."""
 
 from __future__ import annotations
 

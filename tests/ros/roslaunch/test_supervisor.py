@@ -1,4 +1,4 @@
-"""ros/roslaunch/launcher/supervisor: when a node starts again, and when the run is over. By a clock that the test holds."""
+"""ros/roslaunch/launcher/supervisor: respawning of nodes and the end of a run, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from minirospy.ros.roslaunch.launcher.supervisor import Supervisor
 
 
 class FakePopen:
-    """A process that exits when the test says so; its thread waits until then."""
+    """A process that exits on the test's request; its thread waits until then."""
 
     def __init__(self, pid: int) -> None:
         self.pid = pid
@@ -38,7 +38,7 @@ class FakePopen:
 
 
 class Clock:
-    """Seconds that pass only while the supervisor waits for an event."""
+    """A clock that advances only while the supervisor waits for an event."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -48,7 +48,7 @@ class Clock:
 
 
 class Events(queue.SimpleQueue):  # type: ignore[type-arg]
-    """A queue whose timeouts pass immediately on the test's clock if it is empty; while no node is to respawn it waits."""
+    """A queue whose timeouts expire immediately on the test's clock; it blocks while no node is to be respawned."""
 
     def __init__(self, clock: Clock, supervisor: Supervisor) -> None:
         self.clock = clock
@@ -68,7 +68,7 @@ class Events(queue.SimpleQueue):  # type: ignore[type-arg]
 
 
 class Scene:
-    """A supervisor of nodes that a test starts and ends."""
+    """A supervisor of nodes that a test starts and stops."""
 
     def __init__(self) -> None:
         self.clock = Clock()
@@ -148,14 +148,14 @@ def test_a_stop_ends_a_run_that_waits_to_respawn() -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends a Unix signal to a thread")
 def test_a_signal_that_interrupts_no_wait_is_noticed() -> None:
-    """One that arrives just before the wait starts does not interrupt it, and neither does one that another thread receives."""
+    """A signal just before the wait starts, or in another thread, does not interrupt the wait."""
     supervisor = Scene().supervisor
     supervisor._events = queue.SimpleQueue()
     before = signal.signal(signal.SIGUSR1, lambda *_: supervisor.stop("SIGUSR1"))
     too_late = threading.Timer(20.0, supervisor.stop, ("timeout",))
 
     def send() -> None:
-        # Until the main thread waits.
+        # Wait until the main thread blocks.
         time.sleep(0.1)
         signal.pthread_kill(threading.get_ident(), signal.SIGUSR1)
 

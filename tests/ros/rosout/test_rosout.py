@@ -1,4 +1,4 @@
-"""rosout: the node that gathers the log lines of all others keeps neither the master waiting nor its memory full."""
+"""rosout: the node that collects all log messages blocks neither the master nor exhausts its memory."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_long_text_is_written_in_steps() -> None:
     node._file = SimpleNamespace(text=lines.append)
     text = "\x1b[1m\n\t" * 10_000
     steps = node._on_message(body_of(text, "/a\nb"), {})
-    # A text of control characters takes some 0.5 us for each of them.
+    # Each control character in a string takes some 0.5 us.
     assert sum(1 for _ in steps) >= len(text) // rosout._STEP_LETTERS
     assert lines == [
         f"0.000000000 INFO /a\\nb [f.py:7(g)] [topics: ] {text.replace(chr(27), chr(92) + 'x1b')}"
@@ -89,7 +89,7 @@ def test_message_that_is_left_out_is_one_warning_with_the_node(caplog: pytest.Lo
     first, *others = caplog.records
     assert first.levelname == "WARNING"
     assert first.message == "a log message of /talk\\ner was left out: it is longer than 256 KiB"
-    # Whether ten seconds have passed between two of them or not, each is counted.
+    # Each is counted, also if ten seconds have passed between two of them.
     assert others
 
 
@@ -130,5 +130,5 @@ def test_publishers_are_read_in_turns() -> None:
     assert sorted(left_out) == [0, 1]
     assert found.count(b"last") == 2
     assert len(found) == 42
-    # Neither waits for the other one's end.
+    # Neither waits until the other is done.
     assert set(found[:4]) == {b"0", b"1"}

@@ -1,7 +1,8 @@
-"""A simulated microcontroller on a pseudo-terminal, and a node that talks to it: what each of the two sees, line by line.
+"""A simulated microcontroller on a pseudo-terminal and a node that communicate; prints the messages on both sides.
 
-`drive.py PROGRAM...` starts serial_node of either stack on the terminal; drive.txt is what the real one (rosserial 0.9.2, which
-Debian does not have) printed.
+`drive.py PROGRAM...` starts serial_node of either stack on the terminal; drive.txt is the output for the real one
+(rosserial 0.9.2,
+which Debian does not have).
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ CHATTER, LAMP, SERVER_OUT, SERVER_IN, CLIENT_OUT, CLIENT_IN = range(100, 106)
 
 
 class Device:
-    """The microcontroller's end of the line."""
+    """The microcontroller's side of the serial line."""
 
     def __init__(self) -> None:
         self.master, self.slave = pty.openpty()
@@ -69,7 +70,7 @@ class Device:
         self.send(endpoint, TopicInfo(topic, name, kind or cls._type, cls._md5sum, size))
 
     def receive(self, what: str, cls: object = None) -> None:
-        """Show the next packet."""
+        """Print the next packet."""
         try:
             topic, data = self.packets.get(timeout=SECONDS)
         except queue.Empty:
@@ -125,7 +126,7 @@ def services(device: Device) -> None:
     proxy = rospy.ServiceProxy("switch", SetBool)
 
     def call() -> None:
-        # The node knows the id of the requests a moment after it offers the service, and refuses calls until then.
+        # serial_node learns the request id shortly after it offers the service, and refuses calls until then.
         rospy.sleep(0.5)
         while True:
             try:
@@ -182,7 +183,7 @@ def faults(device: Device, chatter: queue.Queue[str], lamp: rospy.Publisher) -> 
         rospy.sleep(0.02)
     words.publish("short")
     device.receive("words", String)
-    # In pieces.
+    # Send the packet in two pieces.
     for at in range(len(good)):
         device.raw(good[at : at + 1])
     print("node: chatter", chatter.get(timeout=SECONDS), flush=True)
@@ -220,7 +221,7 @@ def main(program: list[str]) -> None:
         stderr=subprocess.DEVNULL,
     )
     try:
-        # Answer once /rosout is connected. It is latched: of the lines before, the last one is certain to come.
+        # Answer once /rosout is connected. It is latched: only the last of the earlier lines is certain to arrive.
         while not lines:
             rospy.sleep(0.02)
         topics(device, subscriber, chatter, lamp)
@@ -230,7 +231,7 @@ def main(program: list[str]) -> None:
         process.send_signal(signal.SIGINT)
         device.receive("is asked to stop")
         process.wait(SECONDS)
-        # Its last lines may still be on their way.
+        # Its last lines may not have arrived yet.
         end = time.monotonic() + SECONDS
         while not any("shutdown hook" in line for line in lines) and time.monotonic() < end:
             time.sleep(0.02)

@@ -1,4 +1,4 @@
-"""The tests that come with rostest, run by it on the package `tested`."""
+"""The test programs of rostest, run by rostest on the package `tested`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""rostest.runner: programs that run the tests of a launch file by unittest. The package `tested` lies beside this file."""
+"""rostest.runner: programs that run a launch file's tests by unittest. The package `tested` is in this folder."""
 
 from __future__ import annotations
 

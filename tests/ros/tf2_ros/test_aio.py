@@ -26,7 +26,7 @@ LONG = 40.0
 
 
 def run(main: Callable[[Node, Buffer], Coroutine[Any, Any, None]]) -> None:
-    """Run a test's coroutine with a node and its buffer, in a loop that it leaves without a task."""
+    """Run a test's coroutine with a node and its buffer; assert that no task remains in the loop."""
 
     async def bounded() -> None:
         async with Node("frames") as node, Buffer(node) as buffer:

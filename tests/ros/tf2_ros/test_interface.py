@@ -1,4 +1,4 @@
-"""Transforming whole objects, and conversions between types: what is registered, and what is not."""
+"""Transforms of whole objects and conversions between types, registered and not registered."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ class Thing:
 
 
 class Other(Thing):
-    """A type that things are converted to."""
+    """A type to which things are converted."""
 
 
 class OneTransform(BufferInterface):
-    """A buffer that knows one answer."""
+    """A buffer that returns one transform."""
 
     def lookup_transform(self, *arguments: Any, **_: Any) -> TransformStamped:
-        """Return the frames of the query."""
+        """Return a transform with the frames of the query."""
         found = TransformStamped()
         found.header.frame_id, found.child_frame_id = arguments[:2]
         found.transform.translation.x = 2.0
         return found
 
     def lookup_transform_full(self, *arguments: Any, **_: Any) -> TransformStamped:
-        """Return the frames of the query."""
+        """Return a transform with the frames of the query."""
         return self.lookup_transform(arguments[0], arguments[2])
 
 
@@ -97,7 +97,7 @@ def test_unknown_types_are_named(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_methods_that_a_subclass_lacks() -> None:
     class Half(BufferInterface):
-        """Without lookups."""
+        """A buffer interface without lookups."""
 
     with pytest.raises(NotImplementedException) as caught:
         Half().can_transform("a", "b", times.Time())

@@ -1,4 +1,4 @@
-"""PyKDL: what is refused. What works is compared with the real one in tests/referee/cases/frames_kdl.py."""
+"""PyKDL: refused arguments. tests/referee/cases/frames_kdl.py compares the rest with the real one."""
 
 from __future__ import annotations
 

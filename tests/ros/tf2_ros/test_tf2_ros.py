@@ -1,4 +1,4 @@
-"""tf2_ros in programs: listeners, waits, time that jumps, buffer servers. What tf2 itself does is in tests/core/tf2."""
+"""tf2_ros in programs: listeners, waits, time that jumps, buffer servers. tests/core/tf2 tests tf2 itself."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ print("end")
 
 
 def run(code: str, *, init: str = INIT) -> str:
-    """Run a program; return what it prints and logs."""
+    """Run a program; return its output and log."""
     done = subprocess.run(
         [sys.executable, "-c", BEGIN + init + code + END],
         capture_output=True,

@@ -1,4 +1,4 @@
-"""The programs of tf, tf2_ros and tf2_tools. That their texts are ROS's is shown in tests/interop/test_interop_robots.py."""
+"""The programs of tf, tf2_ros and tf2_tools. tests/interop/test_interop_robots.py compares their output with ROS's."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ POSE = """\
             in RPY (radian) [0.100, 0.250, 0.500]
             in RPY (degree) [5.730, 14.324, 28.648]
 """
-"""What Debian's tf_echo prints of the frames of the fixture."""
+"""Output of Debian's tf_echo for the frames of the fixture."""
 
 
 @pytest.fixture
 def frames(start: Start) -> None:
-    """Frames a -> b on /tf at 10 Hz, b -> c on /tf_static."""
+    """Publish the frames a -> b on /tf at 10 Hz, b -> c on /tf_static."""
     start(*OLD_STATIC, *words("1 2 3 0.5 0.25 0.1 /a /b 100"), "__name:=moving")
     start(*STATIC, *words("0.5 0 0 0 0 0 1 b c"), "__name:=fixed")
-    # Some programs listen for some seconds only.
+    # Some programs listen for only a few seconds.
     wait_for("b", "c")
 
 
@@ -71,7 +71,7 @@ def words(text: str) -> list[str]:
 
 
 def lines_until(process: subprocess.Popen[str], pattern: str) -> str:
-    """Return what a program prints, up to a line that matches."""
+    """Return a program's output up to a line that matches."""
     assert process.stdout
     read = ""
     for line in process.stdout:
@@ -92,7 +92,7 @@ class TestEcho:
     def test_failure_names_the_frames(self, start: Start) -> None:
         program = start("tf", "tf_echo", "a", "nothing", "20")
         read = ""
-        # Until frames have come, "a" does not exist either.
+        # Until frames have arrived, "a" does not exist either.
         while '"nothing"' not in read:
             lines_until(program, r"Failure at \d+\.\d{9}\n")
             read = lines_until(program, "The current list")
@@ -135,7 +135,7 @@ class TestMonitor:
         found = re.search(
             r"^Frame: b published by /moving Average Delay: (\S+) Max Delay: (\S+)$", read, re.M
         )
-        # Its stamps are 0.1 s ahead; a machine that stalls delays what is published.
+        # Its stamps are 0.1 s in the future; a machine that stalls delays the publication.
         assert found
         assert -0.1 <= float(found[1]) <= float(found[2])
         assert "Frame: c published by /fixed(static) Average Delay: 0 Max Delay: 0" in lines_until(
@@ -185,7 +185,7 @@ def test_frames_are_drawn(
         output, errors = program.communicate(timeout=SECONDS)
         assert program.returncode == 0, errors
         graph = Path("frames.gv").read_text(encoding="utf-8")
-        # On a machine that stalls, frames may come after the five seconds that it listens for.
+        # On a machine that stalls, frames may arrive after the five seconds for which it listens.
         if '"a" -> "b"' in graph and '"b" -> "c"' in graph:
             break
     assert re.search(r'"b" -> "c"\[label=" ?Broadcaster: /fixed\\nAverage rate: 10000.0', graph)
@@ -313,7 +313,7 @@ def test_wrong_parameters_are_one_line(
 def test_parameter_is_broadcast(start: Start) -> None:
     pose = "{translation: {x: 1, y: 2.5, z: 0}, rotation: {x: 0, y: 0, z: 0, w: 1}}"
     value = f"{{header: {{frame_id: p}}, child_frame_id: q, transform: {pose}}}"
-    # Set by the program's own words: a private parameter, by its full name.
+    # Set with the program's own arguments: a private parameter, by its full name.
     start(*STATIC, "/fixed/here", f"_here:={value}", "__name:=fixed")
     program = start("tf", "tf_echo", "p", "q", "20")
     read = lines_until(program, "- Translation: ")

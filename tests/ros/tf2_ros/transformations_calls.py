@@ -1,6 +1,7 @@
-"""Calls of tf.transformations with random arguments, and what they return: of the real module, or of ours.
+"""Calls of tf.transformations with random arguments, and their results, with the real module or minirospy's.
 
-Run as a program under the interpreter that has the real tf, it prints the results as JSON; it imports nothing of this folder.
+Run as a program under the interpreter that has the real tf, it prints the results as JSON; it imports nothing from this
+folder.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ Call = tuple[str, list[Any], dict[str, Any]]
 
 
 def calls(module: Any, seed: int) -> list[Call]:
-    """Return calls with arguments from a seed; matrices to take apart are made by the module itself."""
+    """Return calls with arguments from a seed; the module itself makes matrices for decomposition."""
     rng = random.Random(seed)
 
     def vector(n: int = 3) -> list[float]:
@@ -135,7 +136,7 @@ REMAKE: dict[str, Any] = {
     "scale_from_matrix": lambda module, found: module.scale_matrix(*found),
     "projection_from_matrix": lambda module, found: module.projection_matrix(*found),
 }
-"""Which points of a plane or an axis are found depends on the linear algebra below: what is made of them does not."""
+"""The points found on a plane or an axis depend on the linear algebra library; the values derived from them do not."""
 
 
 def _cross(a: list[float], b: list[float]) -> list[float]:
@@ -146,7 +147,7 @@ def results(module: Any, made: list[Call]) -> list[Any]:
     """Return what each call returns, arrays as lists, or the exception's type and text."""
     found = []
     for name, arguments, keywords in made:
-        # JSON has no tuples, which an encoded sequence of axes is.
+        # JSON has no tuples, as which axes are encoded.
         given = [
             tuple(each) if name == "euler_matrix" and isinstance(each, list) else each for each in arguments
         ]
@@ -159,7 +160,7 @@ def results(module: Any, made: list[Call]) -> list[Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON has it."""
+    """Return a value as JSON represents it."""
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, (tuple, list)):

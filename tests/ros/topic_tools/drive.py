@@ -1,4 +1,7 @@
-"""What a user sees of topic_tools' programs, ours or the real ones: ``sys.argv[1]`` is their folder, the rest starts one."""
+"""Print the behaviour of topic_tools' programs, minirospy's or the real ones.
+
+``sys.argv[1]`` is their folder, the rest starts one.
+"""
 
 import queue
 import re
@@ -25,8 +28,7 @@ from topic_tools.srv import (
 )
 
 FOLDER, *STARTER = sys.argv[1:]
-SECONDS = 100
-"""After which something is taken to hang."""
+SECONDS = 100  # seconds after which a program is considered hung
 rospy.init_node("drive", argv=[])
 
 
@@ -70,7 +72,7 @@ class Heard:
         wait_for(self.subscriber.get_num_connections)
 
     def next(self, after=""):
-        """Return the next message; roscpp may send a latched one twice to a subscriber that has just come."""
+        """Return the next message; roscpp may send a latched one twice to a new subscriber."""
         message = self.messages.get(timeout=SECONDS)
         while message.data == after:
             message = self.messages.get(timeout=SECONDS)
@@ -81,7 +83,7 @@ class Heard:
         )
 
     def changes(self, count):
-        """Return the texts of a latched topic, without one that comes twice."""
+        """Return the strings of a latched topic without repetitions."""
         found = []
         while len(found) < count:
             text = self.messages.get(timeout=SECONDS).data
@@ -99,7 +101,7 @@ def text(number):
 
 
 def connected(topic, latch=True, cls=String):
-    """Return a publisher of a topic that one subscriber is connected to."""
+    """Return a publisher of a topic with one connected subscriber."""
     publisher = rospy.Publisher(topic, cls, queue_size=50, latch=latch)
     wait_for(publisher.get_num_connections)
     return publisher
@@ -119,7 +121,7 @@ master = rosgraph.Master("/drive")
 
 
 def readers(topic):
-    """Return how many nodes subscribe to a topic."""
+    """Return the number of nodes that subscribe to a topic."""
     return sum(len(names) for name, names in master.getSystemState()[1] if name == topic)
 
 
@@ -136,7 +138,7 @@ for kind, parameters in (
         heard = Heard(target) if kind != "stealth" else rospy.Subscriber("/watched", String, print)
         say(kind, "comes back", wait_for(lambda source=source: readers(source)))
         if kind != "stealth":
-            # The connection that was left may still be counted, and the new one not be there yet.
+            # The old connection may still be counted, and the new one may not be there yet.
             wait_for(
                 lambda publisher=publisher, heard=heard: publisher.publish("second") or heard.messages.qsize()
             )
@@ -282,7 +284,7 @@ with Program("demux", "/apart", "/one", "/two"):
         rospy.Subscriber(topic, String, heard[topic].put)
     selected = Heard("/demux/selected")
     say("demux", selected.changes(1), sorted(names().topics))
-    # It advertises an output with the first message, and does not wait for subscribers as long as they may take.
+    # It advertises an output with the first message, and does not wait until subscribers have connected.
     wait_for(lambda: source.publish("a") or heard["/one"].qsize())
     message = heard["/one"].get(timeout=SECONDS)
     say("demux", message.data, message._connection_header.get("latching", "0"))
@@ -292,7 +294,7 @@ with Program("demux", "/apart", "/one", "/two"):
     wait_for(lambda: source.publish("b") or heard["/two"].qsize())
     message = heard["/two"].get(timeout=SECONDS)
     while message.data == "a":
-        # The choice of the other output has overtaken it.
+        # The message that selects the other output has overtaken it.
         message = heard["/two"].get(timeout=SECONDS)
     say("demux", message.data, sum(each.data == "b" for each in heard["/one"].queue))
     for call in (

@@ -1,4 +1,4 @@
-"""A lazy node, and a subscriber that comes, goes and comes again: prints what the node does. Runs under any rospy."""
+"""A lazy node, and a subscriber that joins, leaves and joins again: prints the node's actions. Runs under any rospy."""
 
 import threading
 
@@ -8,7 +8,7 @@ from topic_tools import LazyTransport
 
 
 class Relay(LazyTransport):
-    """Passes words on while another node wants them."""
+    """Forwards strings while another node subscribes to them."""
 
     def __init__(self):
         super().__init__()
@@ -34,7 +34,7 @@ relay = Relay()
 for _ in range(2):
     came = threading.Event()
     subscriber = rospy.Subscriber("words_out", String, lambda message, came=came: came.set())
-    # A word that passed before this subscriber was connected is sent again.
+    # Repeat: a string that was forwarded before this subscriber connected is lost.
     while not came.wait(0.2):
         words.publish("word")
     print("word", flush=True)

@@ -1,4 +1,4 @@
-"""The programs of topic_tools: what they pass on, and what they refuse. drive.py runs under real ROS, too (tests/interop)."""
+"""The programs of topic_tools: forwarded messages and errors. drive.py runs under real ROS, too (tests/interop)."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_programs_pass_on_what_the_real_ones_pass_on(master: str) -> None:
 def test_subscriber_that_comes_as_the_input_is_given_up_opens_it_again(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The one thread looks for subscribers, the other notices the first of them."""
+    """One thread checks for subscribers while the other is notified of the first of them."""
     comes: list[threading.Thread] = []
 
     class Input:

@@ -36,7 +36,7 @@ def run(body: Callable[[Node], Awaitable[None]]) -> None:
 
 
 async def until(node: Node, topic: str, kind: type, is_right: Callable[[object], bool]) -> object:
-    """Return the first message of a topic that is right."""
+    """Return the first message of a topic that fulfils a condition."""
     async for message in node.subscribe(topic, kind):
         if is_right(message):
             return message
@@ -46,14 +46,14 @@ async def until(node: Node, topic: str, kind: type, is_right: Callable[[object],
 async def driven(
     node: Node, commands: Publisher[Twist], twist: Twist, topic: str, is_right: Callable[[object], bool]
 ) -> object:
-    """Publish a command until a pose is right."""
+    """Publish a command until a pose fulfils a condition."""
     return await commanded(node, lambda: commands.publish(twist), topic, is_right)
 
 
 async def commanded(
     node: Node, command: Callable[[], Awaitable[None]], topic: str, is_right: Callable[[object], bool]
 ) -> object:
-    """Repeat a command until a pose is right: a turtle follows it for a second, and poses may come later."""
+    """Repeat a command until a pose fulfils a condition: a turtle follows it for a second, and poses may arrive later."""
     following = asyncio.ensure_future(until(node, topic, Pose, is_right))
     while not following.done():
         await command()
@@ -115,7 +115,7 @@ def test_turtles_come_and_go(start: Start) -> None:
         await node.call("kill", Kill, name="Fred")
         with pytest.raises(ServiceException):
             await node.call("kill", Kill, name="Fred")
-        # Its topics and services are free for another.
+        # Its topics and services are available to another turtle.
         assert (await node.call("spawn", Spawn, x=3, y=1, name="Fred")).name == "Fred"
         await until(node, "Fred/pose", Pose, lambda pose: pose.x == 3.0)
 
@@ -165,7 +165,7 @@ def test_square_is_drawn_by_draw_square(start: Start) -> None:
     async def body(node: Node) -> None:
         await node.wait_for_service("reset")
         turns = False
-        # As the tutorial's, it drives on where it has not seen a pose within 0.1 m of its goal: again then.
+        # As in the tutorial, the turtle drives on if it has not seen a pose within 0.1 m of its goal: then try again.
         while not turns:
             process = start("turtlesim", "draw_square")
             await until(node, "turtle1/pose", Pose, lambda pose: pose.x < 5.6)
@@ -195,7 +195,7 @@ def test_mimic_copies_by_remapped_namespaces(start: Start) -> None:
         await commands.wait_for_subscribers()
         twist = Twist()
         twist.linear.x, twist.angular.z = 1.5, -0.5
-        # Again until mimic is connected to both turtles.
+        # Repeat until mimic is connected to both turtles.
         copied = await driven(node, commands, twist, "turtle2/pose", lambda pose: pose.linear_velocity == 1.5)
         assert copied.angular_velocity == -0.5  # type: ignore[attr-defined]
 
@@ -213,7 +213,7 @@ def test_teleop_without_a_terminal_is_one_line(start: Start) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are Unix's")
 def test_arrow_keys_drive_a_turtle_that_is_drawn(master: str, tmp_path: Path) -> None:
-    """Both programs in terminals, as in the tutorial; parameters scale what keys do."""
+    """Both programs run in terminals, as in the tutorial; parameters scale the motions of keys."""
     turtles, teleop = Terminal("turtlesim_node"), Terminal("turtle_teleop_key")
     try:
         turtles.wait_for("Spawning turtle [turtle1]")
@@ -249,7 +249,7 @@ def test_arrow_keys_drive_a_turtle_that_is_drawn(master: str, tmp_path: Path) ->
 
 
 class Terminal:
-    """A program of turtlesim in a terminal, and all that it has written there."""
+    """A program of turtlesim in a terminal, and all of its output."""
 
     def __init__(self, program: str) -> None:
         import fcntl
@@ -288,8 +288,8 @@ class Terminal:
         return status
 
     def _read(self) -> None:
-        # All the time: a program whose terminal is full waits, and its turtle stands still.
-        # Linux raises an error at the end of a terminal.
+        # Read all the time: a program whose terminal is full blocks, and its turtle stands still. Linux raises an
+        # error if the terminal is closed.
         with contextlib.suppress(OSError):
             while data := os.read(self._master, 65536):
                 with self._changed:

@@ -1,4 +1,4 @@
-"""The beginner tutorials of the ROS wiki, and those of tf2, as they are typed there."""
+"""The beginner tutorials of the ROS wiki, and those of tf2, with the same commands."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ Launch = Callable[..., None]
 
 @pytest.fixture
 def launch(master: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Launch]:
-    """Start `roslaunch WORDS`; it is ended with the test, and may not have printed a traceback."""
+    """Start `roslaunch WORDS`; stop it after the test, and assert that it has not printed a traceback."""
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path))
     with ExitStack() as running:
 
@@ -239,7 +239,7 @@ def test_beginner_tutorials_print_what_the_wiki_shows(start: Start, tmp_path: Pa
 
 
 def typed(line: str, folder: Path) -> str:
-    """Return what a command prints."""
+    """Return a command's output."""
     program, *words = shlex.split(line)
     done = subprocess.run(
         [str(BIN / program), *words],

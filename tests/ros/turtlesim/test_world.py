@@ -22,7 +22,7 @@ def world() -> World:
 
 
 def steps(world: World, count: int, start: float = 0.0) -> Reading:
-    """Let ``count`` steps pass; return what turtle1 publishes at last."""
+    """Run ``count`` steps; return the last message of turtle1."""
     for number in range(count):
         first = next(reading for reading in world.step(start + number * 0.016) if reading.name == "turtle1")
     return first
@@ -40,7 +40,7 @@ def test_first_turtle_stands_in_the_middle(world: World) -> None:
 
 def test_command_is_obeyed_for_one_second(world: World) -> None:
     world.command("turtle1", Velocity(forward=2.0), 0.0)
-    reading = steps(world, 63)  # The last one is 0.992 s after the command.
+    reading = steps(world, 63)  # The last step is 0.992 s after the command.
     assert reading.pose.x == pytest.approx(SIZE / 2 + 63 * 0.032)
     assert reading.linear == 2.0
     stopped = steps(world, 10, start=1.001)
@@ -76,7 +76,7 @@ def test_walls_stop_a_turtle_with_a_warning(world: World) -> None:
     world.command("turtle1", Velocity(forward=1.0), 1.0)
     reading = steps(world, 1, start=1.0)
     assert reading.pose.x == SIZE
-    # Its y is that of the picture, from above.
+    # Its y is that of the picture, measured from the top.
     assert reading.warning == "Oh no! I hit the wall! (Clamping from [x=11.104889, y=6.088889])"
 
 
@@ -199,7 +199,7 @@ def test_stroke_outside_of_the_paper_changes_nothing() -> None:
 
 
 def test_square_is_drawn_with_its_goals(world: World) -> None:
-    """The lines that draw_square logs: half of its turns are left to where the turtle comes to rest."""
+    """The lines that draw_square logs: for half of its turns the goal is the point at which the turtle stops."""
     square = Square()
     lines: list[str] = []
     orders: list[Order | None] = []

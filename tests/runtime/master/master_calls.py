@@ -1,4 +1,4 @@
-"""Calls of the Master and Parameter APIs, in an order that makes sense: method, then its arguments."""
+"""Calls of the Master and Parameter APIs, in a meaningful order: method, then its arguments."""
 
 from __future__ import annotations
 
@@ -467,7 +467,7 @@ CALLS: list[tuple[Any, ...]] = [
 ]
 
 SCENE: list[tuple[Any, ...]] = [
-    # Notifications of two nodes: "{0}" and "{1}" are their Slave APIs.
+    # Calls that notify two nodes: "{0}" and "{1}" are their Slave APIs.
     ("registerSubscriber", "/sub", "/t", "a/B", "{0}"),
     ("registerPublisher", "/pub", "/t", "a/B", "{1}"),
     ("registerPublisher", "/pub", "/t", "a/B", "{1}"),
@@ -498,7 +498,7 @@ SCENE: list[tuple[Any, ...]] = [
     ("setParam", "/x", "/q", 13),
     ("unsubscribeParam", "/sub", "{0}", "/"),
     ("setParam", "/x", "/q", 15),
-    # Who sets or deletes it itself.
+    # The subscriber sets or deletes the parameter itself.
     ("setParam", "/sub", "/a", {"b": 16}),
     ("setParam", "/sub", "/a", {"z": 17}),
     ("setParam", "/sub", "/", {"a": {"b": {"c": 18}}}),
@@ -508,7 +508,7 @@ SCENE: list[tuple[Any, ...]] = [
     ("setParam", "/sub", "/", {}),
     ("unsubscribeParam", "/sub", "{0}", "/a/b"),
     ("setParam", "/x", "/a/b", 16),
-    # A node of the same name at another address: the older has to stop.
+    # A node of the same name at another address: the older one must shut down.
     ("registerPublisher", "/same", "/unheard", "a/B", "{1}"),
     ("subscribeParam", "/same", "{1}", "/p"),
     ("registerPublisher", "/same", "/u", "a/B", "http://127.0.0.1:1/"),

@@ -1,4 +1,4 @@
-"""A master whose registrations are nearly full forgets nodes that refuse connections, and no others."""
+"""A master whose registrations are nearly full unregisters nodes that refuse connections, and no others."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_a_crowded_master_forgets_nodes_that_refuse_connections(monkeypatch: pyt
                 master.dispatch("registerPublisher", [f"/dead{number}", f"/t{number}", "a/B", dead_uri])
             await until(lambda: publishers == [slow_uri, dead_uri, dead_uri])
             await asyncio.sleep(0.05)
-            # There is room: nobody is called.
+            # There is room, so no node is called.
             assert len(master.registry.nodes()) == 13
             assert "getPid" not in called
 

@@ -1,4 +1,4 @@
-"""runtime/master/journal: the file itself, with a clock that the test holds and without a master."""
+"""runtime/master/journal: the file itself, with a clock that the test controls and without a master."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Clock:
 
 
 class Disk:
-    """Refuses to write while ``error`` is set."""
+    """A disk that refuses writes while ``error`` is set."""
 
     def __init__(self, patch: pytest.MonkeyPatch) -> None:
         self.error: OSError | None = None
@@ -71,7 +71,7 @@ class Disk:
 def _no_file_is_left_open() -> Iterator[None]:
     before = open_files()
     yield
-    # Threads of earlier tests may still close theirs.
+    # Threads of earlier tests may still close their files.
     wait_until(lambda: open_files() <= before)
 
 
@@ -86,7 +86,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def state() -> list[list[Any]]:
-    """Return the records of the present state."""
+    """Return the records of the current state."""
     return [["set", "/", {"a": 1}]]
 
 
@@ -137,7 +137,7 @@ def test_start_writes_the_boot_and_the_state(journal: Journal, path: Path, state
 
 
 def test_rewrite_syncs_the_new_file_before_it_replaces_the_old_one(journal: Journal, disk: Disk) -> None:
-    """Else a power cut could leave an empty file under the journal's name."""
+    """Otherwise a power cut could leave an empty file under the journal's name."""
     journal.start()
     disk.calls.clear()
     journal.rewrite()
@@ -146,7 +146,7 @@ def test_rewrite_syncs_the_new_file_before_it_replaces_the_old_one(journal: Jour
 
 
 def test_append_does_not_sync(journal: Journal, disk: Disk) -> None:
-    """A kill -9 loses nothing that is written, and a sync for each call would make the master slow."""
+    """A kill -9 loses no written data, and a sync for each call would slow the master down."""
     journal.start()
     disk.calls.clear()
     journal.append("set", "/p", 1)
@@ -218,7 +218,7 @@ def test_journal_is_rewritten_once_it_is_larger_than_a_mebibyte(journal: Journal
     assert found[6] < MIB
     assert found[7] == small == path.stat().st_size
     assert len(records(path)) == 2
-    # And again.
+    # The size grows again in the same way.
     found = sizes(journal, lambda number: ("set", f"/{number}", text), 8)
     assert found[6] > small
     assert found[7] == small
@@ -227,7 +227,7 @@ def test_journal_is_rewritten_once_it_is_larger_than_a_mebibyte(journal: Journal
 def test_a_mebibyte_exactly_is_not_rewritten(journal: Journal) -> None:
     journal.start()
     frame = len(serialize_record(["set", "/", ""]))
-    # Texts of this length have a head of five bytes in place of one.
+    # Strings of this length have a length prefix of five bytes in place of one.
     text = "x" * (MIB - journal.size - frame - 4)
     journal.append("set", "/", text)
     assert journal.size == MIB
@@ -244,7 +244,7 @@ def test_large_journal_is_rewritten_at_four_times_what_it_holds(
     found = sizes(journal, lambda number: ("set", "/large", text), 7)
     assert found[4] > 3 * MIB
     assert found[5] > small
-    # A value in parts takes some bytes more.
+    # A value in parts takes some more bytes.
     assert small <= found[6] < small + 1000
 
 
@@ -253,13 +253,13 @@ def test_large_journal_is_rewritten_at_four_times_what_it_holds(
 
 @pytest.fixture
 def steps() -> list[Steps[None]]:
-    """Return the work that a journal hands over to be done in steps."""
+    """Return the work that a journal schedules in steps."""
     return []
 
 
 @pytest.fixture
 def stepping(path: Path, state: list[list[Any]], clock: Clock, steps: list[Steps[None]]) -> Iterator[Journal]:
-    """Return a journal that has grown so much that it is to be rewritten."""
+    """Return a journal that has grown enough to be rewritten."""
     journal = Journal(path, lambda: iter(list(state)), clock, steps.append)
     journal.start()
     journal.append("set", "/p", "x" * MIB)
@@ -278,7 +278,7 @@ def test_rewrite_in_steps_keeps_what_is_appended_meanwhile(
 
     for count, _ in enumerate(steps[0], 1):
         stepping.append("set", "/meanwhile", count)
-        # A crash now would lose nothing either.
+        # A crash at this point would lose nothing either.
         assert records(path)[-1] == ["set", "/meanwhile", count]
 
     assert path.stat().st_ino != old
@@ -308,7 +308,7 @@ def test_rewrite_in_steps_writes_two_hundred_records_at_a_time(
     stepping: Journal, state: list[list[Any]], steps: list[Steps[None]]
 ) -> None:
     state += [["set", f"/{number}", number] for number in range(399)]
-    # The head, two times two hundred, and nothing else.
+    # The header, two times two hundred records, and nothing else.
     assert [each for each in steps[0] if each is None] == [None] * 4
 
 
@@ -333,7 +333,7 @@ def test_close_while_the_new_file_is_synced_gives_it_up(
 def test_nothing_is_written_to_the_new_file_while_it_is_synced(
     stepping: Journal, path: Path, steps: list[Steps[None]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # A disk that syncs a file keeps those waiting who write to it.
+    # While a disk syncs a file, writers to it block.
     may_sync = threading.Event()
     monkeypatch.setattr(os, "fsync", lambda file: may_sync.wait(60))
     while next(steps[0]) is not PAUSE:
@@ -369,7 +369,7 @@ def test_rewrite_in_steps_that_fails_goes_on_with_the_old_file(
     assert not path.with_name("journal-1.new").exists()
     assert "could not be rewritten, it keeps growing" in caplog.text
     assert not stepping.trouble
-    # Tried again only when it has doubled.
+    # The rewrite is retried only when the journal has doubled.
     stepping.append("set", "/p", "x" * (MIB // 2))
     assert len(steps) == 1
     stepping.append("set", "/p", "x" * MIB)
@@ -401,7 +401,7 @@ def test_disk_that_fails_for_the_new_file_alone_ends_the_rewrite(
     assert not stepping.trouble
     assert records(path)[-1] == ["set", "/q", 1]
     assert stepping.size == path.stat().st_size
-    # Tried again only when the journal has doubled.
+    # The rewrite is retried only when the journal has doubled.
     stepping.append("set", "/p", "x" * (MIB // 2))
     assert len(steps) == 1
     stepping.append("set", "/p", "x" * MIB)
@@ -435,7 +435,7 @@ def test_rewrite_that_was_given_up_leaves_a_later_one_alone(
     assert path.with_name("journal-1.new").exists()
     finish(steps[1])
     assert records(path)[1:] == state
-    # Not even started.
+    # The rewrite does not even start.
     stepping.append("set", "/p", "x" * MIB)
     stepping.rewrite()
     finish(steps[2])
@@ -500,7 +500,7 @@ def test_store_on_a_full_disk_is_reported(
     finish(journal.store(list(range(1000))))
     assert journal.trouble == os.strerror(errno.ENOSPC)
     assert "cannot be written, a crash would lose the graph" in caplog.text
-    # Nothing more is tried before half a minute has passed.
+    # No retry before half a minute has passed.
     disk.error = None
     finish(journal.store([1]))
     assert "write" not in disk.calls[disk.calls.index("fsync") :][2:]
@@ -629,7 +629,7 @@ def test_lock_is_held_until_close_and_holds_the_pid(journal: Journal, path: Path
         other.lock()
     assert (busy.value.path, busy.value.pid) == busy.value.args == (path, os.getpid())
     assert str(busy.value) == f"{path} is held by another master (pid {os.getpid()})"
-    # Nothing of it is touched by one that has no lock.
+    # A journal without the lock changes nothing in the file.
     journal.start()
     other.start()
     assert other.trouble == str(busy.value)
@@ -698,7 +698,7 @@ def test_read_returns_the_changes_the_age_and_the_boot(
     assert left
     assert not left.same_boot
 
-    # A clock that was set back.
+    # As if the clock was set back.
     os.utime(path, (1, time.time() + 100))
     left = journal.read()
     assert left

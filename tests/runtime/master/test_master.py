@@ -29,7 +29,7 @@ HERE = Path(__file__).parent
 
 
 def plain(value: Any) -> Any:
-    """Return an answer as JSON can hold it."""
+    """Return an answer as JSON represents it."""
     match value:
         case Binary():
             return {"binary": value.data.hex()}
@@ -43,7 +43,7 @@ def plain(value: Any) -> Any:
 
 
 def answers(uri: str) -> list[Any]:
-    """Return the answer to each call; what differs by process is blanked."""
+    """Return the answer to each call; replace values that differ between processes."""
     found: list[Any] = []
     with ServerProxy(uri) as proxy:
         for method, *args in CALLS:
@@ -58,7 +58,7 @@ def answers(uri: str) -> list[Any]:
 
 
 def notices(uri: str, expected: list[list[Any]] | None = None) -> list[list[Any]]:
-    """Return the notifications of the nodes of SCENE after each call, sorted; waits for ``expected`` of them."""
+    """Return the notifications that the nodes of SCENE receive after each call, sorted; wait for ``expected`` of them."""
     nodes = [Slave(), Slave()]
     found: list[list[Any]] = []
 
@@ -92,7 +92,7 @@ def counted(expected: list[list[Any]] | None, at: int, node: int) -> int:
 
 
 def without_controls(value: Any) -> Any:
-    """Return an answer of rosmaster without the rows of names that ours has refused."""
+    """Return an answer of rosmaster without the rows of names that minirospy refuses."""
     if not isinstance(value, list):
         return value
     return [
@@ -108,7 +108,7 @@ def test_every_answer_is_that_of_real_rosmaster(master: str) -> None:
     assert len(golden) == len(calls) > 400
     for call, ours, real in zip(calls, answers(master), golden, strict=True):
         if ours != without_controls(real):
-            # rosmaster takes a name with a tab or a line feed; ours refuses it.
+            # rosmaster accepts a name with a tab or a line feed; minirospy refuses it.
             assert ours[0] == -1, call
             assert any(isinstance(arg, str) and has_controls(arg) for arg in call[1:]), call
 
@@ -120,7 +120,7 @@ def test_nodes_are_notified_as_by_real_rosmaster(master: str) -> None:
 
 
 class Slave:
-    """A node's Slave API that notes what it is called with."""
+    """A node's Slave API that records its calls."""
 
     def __init__(self) -> None:
         self.called: queue.SimpleQueue[tuple[Any, ...]] = queue.SimpleQueue()
@@ -142,7 +142,7 @@ class Slave:
         return self.called.get(timeout=30)
 
     def all_until_quiet(self) -> list[tuple[Any, ...]]:
-        """For recording alone: what comes within half a second."""
+        """Return the calls within half a second; only used for recording."""
         found = []
         with contextlib.suppress(queue.Empty):
             while True:
@@ -190,7 +190,7 @@ def test_the_older_node_of_a_name_is_shut_down(proxy: ServerProxy, slaves: list[
     assert "new node registered with same name" in reason
     state: Any = proxy.getSystemState("/test")
     assert state[2][0] == [["/u", ["/same"]]]
-    # Its late unregistering does not touch the newcomer.
+    # Its late unregistration does not affect the new node.
     assert proxy.unregisterPublisher("/same", "/u", old.uri)[2] == 0  # type: ignore[index]
 
 
@@ -208,7 +208,7 @@ def test_a_subscriber_that_never_answers_delays_no_other(proxy: ServerProxy, sla
 def test_an_update_does_not_meet_the_answer_to_a_registration(
     proxy: ServerProxy, slaves: list[Slave], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Real rospy that takes an update first, and then the older answer, stays without the publisher.
+    # If real rospy receives the update first and the older answer later, it stays without the publisher.
     old, fresh = slaves
     monkeypatch.setattr(notifier, "_HOLD_SECONDS", 0.0)
     proxy.registerSubscriber("/old", "/t", "std_msgs/Bool", old.uri)
@@ -248,7 +248,7 @@ def test_param_updates(proxy: ServerProxy, slaves: list[Slave]) -> None:
     assert node.next() == ("paramUpdate", "/master", "/a/b/c/", 2)
     proxy.setParam("/other", "/a", {"b": 3})
     assert node.next() == ("paramUpdate", "/master", "/a/b/", 3)
-    # The node that sets it is not notified; another one deletes it.
+    # The node that sets the parameter is not notified; another node deletes it.
     proxy.setParam("/node", "/a/b", 4)
     proxy.deleteParam("/other", "/a/b")
     assert node.next() == ("paramUpdate", "/master", "/a/b/", {})
@@ -293,7 +293,7 @@ def test_bad_requests_are_refused_and_do_no_harm(master: str, request_bytes: byt
 
 
 def test_the_kept_answer_to_get_system_state_is_never_an_old_one() -> None:
-    """Whatever happens; and what the journal would hold leads to the same graph, and the same names."""
+    """After any change, the journal leads to the same graph, and the same names."""
     rng = random.Random(1)
     nodes, uris, topics = ("/a", "/b", "/c"), ("http://h:1/", "http://h:2/"), ("/t", "/u", "/v")
 

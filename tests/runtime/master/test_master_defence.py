@@ -1,4 +1,4 @@
-"""What a client may send that it should not: the answers that docs/master.md lists, and that nothing is lost by it."""
+"""Invalid input from clients: the answers that docs/master.md lists, and no lost registrations."""
 
 from __future__ import annotations
 
@@ -169,14 +169,14 @@ BAD: dict[str, tuple[bytes, str]] = {
 
 
 def result_of(answer: Any) -> Any:
-    """Return what a call is answered, whether in one step or several."""
+    """Return the result of a call, computed in one step or several."""
     return finish(answer) if isinstance(answer, Generator) else answer
 
 
 def exchange(uri: str, data: bytes) -> bytes:
-    """Return what the master answers until it hangs up, or until the answer is whole."""
+    """Return the master's response, up to the end of the connection or of the response."""
     port = int(uri.rsplit(":", 1)[1])
-    # To read a million elements takes seconds, and on a busy machine many times as long.
+    # Reading a million elements takes seconds, and on a busy machine many times as long.
     with socket.create_connection(("127.0.0.1", port), 100) as sock:
         sock.sendall(data)
         answer = b""
@@ -261,7 +261,7 @@ def test_of_many_connections_the_longest_silent_go(loop: LoopThread) -> None:
             assert proxy.getPid("/test")[0] == 1  # type: ignore[index]
         status: Any = proxy.minirospy.status("/test")
         assert status[2]["clients"] == 20
-        # The oldest are closed, the youngest are not.
+        # The oldest connections are closed, the newest are not.
         assert crowd[0].recv(1) == b""
         crowd[-1].sendall(called("getPid", "/x"))
         assert crowd[-1].recv(12) == b"HTTP/1.1 200"
@@ -338,7 +338,7 @@ def test_the_start_up_line_warns_of_the_open_internet(monkeypatch: pytest.Monkey
 
 
 class _Stranger(Access):
-    """As if every peer came from 8.8.8.8."""
+    """Treats every peer as if it connected from 8.8.8.8."""
 
     def allows(self, peer: str, here: str = "") -> bool:
         return super().allows("8.8.8.8")

@@ -1,4 +1,4 @@
-"""runtime/master/notifier: nodes that do not answer share a few slots, and keep the others waiting no longer."""
+"""runtime/master/notifier: nodes that do not answer share a few slots, and do not delay other nodes longer."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Scene:
         monkeypatch.setattr(notifier_module, "_CALLS_TO_SUSPECTS", 1)
         self.under_way: dict[str, Callable[[bytes | RpcError], None]] = {}
         self.bodies: list[tuple[str, bytes]] = []
-        """What was called, in order: the node's URI, and the request."""
+        """The calls in order: the node's URI, and the request."""
         self.publishers: list[str] = []
         self.values: dict[str, object] = {}
         self.notifier = Notifier(self, Turns(), timeout=3.0)  # type: ignore[arg-type]
@@ -60,7 +60,7 @@ class Scene:
             self.notifier.send(PublisherUpdate(uri, topic))
 
     async def answer(self, clock: ManualLoop, uris: list[str], *, is_dead: bool) -> None:
-        """Answer all calls to ``uris``, one after the other, as they are made."""
+        """Answer all calls to ``uris``, one after the other, as they arrive."""
         left = set(uris)
         while left:
             await clock.advance(0.01)
@@ -138,7 +138,7 @@ def test_a_node_gets_the_newest_list_of_a_topic_once(monkeypatch: pytest.MonkeyP
         scene.notify([NODE], "/t")
         await clock.advance(0.01)
         for number in range(3):
-            # While the first call is under way.
+            # This happens during the first call.
             scene.publishers = [f"http://publisher{number}:1/"]
             scene.notify([NODE], "/t")
             await clock.advance(0.01)
@@ -225,7 +225,7 @@ def test_updates_of_many_publishers_are_rate_limited(monkeypatch: pytest.MonkeyP
         await clock.advance(0.02)
         await scene.answer(clock, [uri], is_dead=False)
         assert [args[1] for _, args in scene.calls] == ["/many", "/few", "/many"]
-        # A node whose pause is over takes neither memory nor time.
+        # A node whose pause is over uses neither memory nor time.
         await clock.advance(0.06)
         assert not scene.notifier._nodes
         await scene.notifier.close()

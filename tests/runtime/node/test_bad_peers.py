@@ -1,6 +1,6 @@
-"""A node in a separate process, as users write it, under attack: it answers, its memory and its log stay small.
+"""A node in a separate process under attack: it keeps answering, and its memory and log stay small.
 
-The attacks are those of benchmarks/bad_peers.py, which measures them.
+benchmarks/bad_peers.py has the same attacks, and measures them.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def bad_peers() -> ModuleType:
 
 @pytest.fixture
 def victim(master: str, bad_peers: ModuleType) -> Iterator[tuple[object, str, str]]:
-    """Return the node, and where its XML-RPC API and its services are."""
+    """Return the node, its XML-RPC address and the address of its services."""
     node = bad_peers.Victim([sys.executable, "-c", bad_peers.NODE], dict(os.environ), "ready")
     with ServerProxy(master) as proxy:
         api, service = proxy.lookupNode("/test", "/victim"), proxy.lookupService("/test", "/flag")
@@ -61,6 +61,6 @@ def test_bad_peers(victim: tuple[object, str, str], bad_peers: ModuleType, maste
         assert row.answered, row
         assert row.height - row.before < 40, row
 
-    # Ten lines of each kind in ten seconds at most; each attack opens two hundred connections.
+    # At most ten lines of each kind in ten seconds; each attack opens two hundred connections.
     most = 30 * (1 + (time.monotonic() - start_time) // 10)
     assert len(node.lines) < most, node.lines  # type: ignore[attr-defined]

@@ -16,8 +16,8 @@ from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
+# Seconds for which the other thread may run in the middle; with the lock it waits for all of them, then continues.
 MEANWHILE = 0.3
-"""Seconds that the other thread has in the middle; with the lock it uses them up, and goes on afterwards."""
 
 
 class Interrupted(Publication):
@@ -45,7 +45,7 @@ def loop() -> Iterator[LoopThread]:
 def subscriber(
     loop: LoopThread, publication: Publication
 ) -> Iterator[tuple[Callable[[], None], socket.socket]]:
-    """Return a function that has a subscriber join, and the socket that it reads."""
+    """Return a function that connects a subscriber, and the socket that it reads."""
     ours, theirs = socket.socketpair()
     ours.setblocking(False)
     fields = {"callerid": "/s", "topic": "/t", "type": STRING.name, "md5sum": STRING.md5sum}
@@ -64,7 +64,7 @@ async def _closed(publication: Publication) -> None:
 
 
 def start(function: Callable[[], None]) -> threading.Thread:
-    """Start a thread, which has a moment from now on."""
+    """Start a thread, and give it a moment to run."""
     thread = threading.Thread(target=function)
     thread.start()
     thread.join(MEANWHILE)
@@ -72,7 +72,7 @@ def start(function: Callable[[], None]) -> threading.Thread:
 
 
 def frames(sock: socket.socket, last: bytes) -> list[bytes]:
-    """Return the bodies that have come behind the header, up to ``last``."""
+    """Return the message bodies after the header, up to ``last``."""
     file = sock.makefile("rb")
     file.read(int.from_bytes(file.read(4), "little"))
     found: list[bytes] = []

@@ -1,4 +1,4 @@
-"""runtime/node/node and runtime/node/slave: the answers of a node to its peers, and the address that it advertises."""
+"""runtime/node/node and runtime/node/slave: a node's responses to its peers, and the address that it advertises."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def test_parameter_updates_are_delivered_in_order() -> None:
 
     def on_parameter(key: str, value: int) -> None:
         if value == 1:
-            # Two workers would tell of the second meanwhile.
+            # A second worker would report the second change meanwhile.
             later.wait(0.1)
         values.append(value)
         if value == 2:

@@ -1,4 +1,4 @@
-"""runtime/node/node: a node registers and unregisters everything, however slow its master is, and waits for no dead one."""
+"""runtime/node/node: a node registers and unregisters everything with a slow master, and does not wait for a dead one."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TOPICS = 5
 
 
 class FakeMaster:
-    """Records calls and answers them after a pause; ``multicall`` says whether it has system.multicall."""
+    """Records calls and answers them after a pause; ``multicall``: whether it supports system.multicall."""
 
     def __init__(self, *, multicall: bool, seconds: float = 0.0) -> None:
         self.calls: list[tuple[str, Sequence[Any]]] = []
@@ -159,7 +159,7 @@ def test_registration_waits_for_a_master_that_is_busy_for_20_seconds() -> None:
             registering = asyncio.ensure_future(node.advertise(Publication("/late", STRING)))
             await arrived.wait()
             passed = 20.0
-            # What is due by now runs in this turn.
+            # Everything that is due runs in this iteration.
             await asyncio.sleep(0.01)
             master.release.set()
             await registering
@@ -201,7 +201,7 @@ def test_close_unregisters_a_name_after_the_call_under_way() -> None:
 
 
 def test_close_waits_for_a_master_that_is_busy_for_minutes() -> None:
-    """It has other nodes to unregister, and answers short calls meanwhile."""
+    """The master has other nodes to unregister, and answers short calls meanwhile."""
 
     async def scene(clock: ManualLoop) -> None:
         async with FakeMaster(multicall=True) as master:
@@ -231,7 +231,7 @@ def _count(master: FakeMaster, method: str) -> int:
 
 
 def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As by asyncio.wait_for before Python 3.12, where the answer comes in the same moment."""
+    """asyncio.wait_for before Python 3.12 loses it if the answer arrives at the same moment."""
 
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:
@@ -284,7 +284,7 @@ def test_close_returns_when_the_unregistration_is_stopped(caplog: pytest.LogCapt
             master.release.clear()
             closing = asyncio.ensure_future(node.close(announces=False))
             await asyncio.sleep(0)
-            # The limit for a silent master would fail the scene's.
+            # The limit for a silent master would exceed the scene's.
             node.stop_unregistering()
             await closing
             assert not master.unregistered
@@ -298,7 +298,7 @@ def test_close_does_not_wait_for_a_master_that_refuses_connections() -> None:
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:
             node = await publishing_node(master.uri)
-        # The limit for a silent one would fail the scene's.
+        # The limit for a silent master would exceed the scene's.
         await node.close()
 
     run(scene)

@@ -1,4 +1,4 @@
-"""A service and its clients in memory of one process: bytes in, bytes out, and who hangs up when."""
+"""A service and its clients in the memory of one process: bytes in, bytes out, and which side closes when."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ class Unprintable(Exception):
 
 FAULTS: dict[bytes, tuple[Exception, bytes]] = {
     b"value": (ValueError("no such joint"), b"error processing request: no such joint"),
-    # As of a file that the handler reads: not the connection's.
+    # An error of a file that the handler reads, not of the connection.
     b"os": (FileNotFoundError("no map"), b"error processing request: no map"),
     b"wire": (WireError("short"), b"error processing request: short"),
     b"bytes": (ValueError("name \udcff"), b"error processing request: name \\udcff"),
     b"sent": (ServiceException("name \udcff"), b"name \\udcff"),
     b"text": (Unprintable(), b"error processing request: Unprintable"),
 }
-"""Requests, what the handler raises, and what the client gets."""
+"""Request -> the handler's exception, and the client's response."""
 
 EXITS: dict[bytes, tuple[BaseException, bytes]] = {
     b"exit": (SystemExit(3), b"error processing request: SystemExit: 3"),
@@ -46,11 +46,11 @@ EXITS: dict[bytes, tuple[BaseException, bytes]] = {
     b"generator": (GeneratorExit(), b"error processing request: GeneratorExit"),
     b"interrupt": (KeyboardInterrupt(), b"error processing request: KeyboardInterrupt"),
 }
-"""The same for exceptions that are not an Exception; asyncio itself handles those of a coroutine, except SystemExit."""
+"""The same for exceptions that do not derive from Exception: in a coroutine, asyncio handles them."""
 
 
 class Scene(NamedTuple):
-    """A node, its loop, and its services /worker and /loop, which do the same."""
+    """A node, its loop, and its services /worker and /loop, which behave equally."""
 
     node: Node
     loop: LoopThread
@@ -268,7 +268,7 @@ Serve = Callable[[bytes], str]
 
 @pytest.fixture
 def liar() -> Iterator[Serve]:
-    """Return a server that answers a connection with given bytes and hangs up; its URI."""
+    """Return a function that serves fixed bytes to a connection and closes it; the function returns the URI."""
     threads: list[threading.Thread] = []
 
     def serve(answer: bytes) -> str:

@@ -1,4 +1,4 @@
-"""runtime/node/topics and runtime/node/node: links between nodes of one loop, with real sockets, and what ends them."""
+"""runtime/node/topics and runtime/node/node: links between nodes of one loop, with real sockets, and how links are closed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ FOREIGN = {"md5sum": ANY, "type": STRING.name, "callerid": "/foreign"}
 
 @pytest.fixture(params=["auto", "tcp"])
 def transport(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nodes of this machine talk by any transport, or by TCP alone."""
+    """Let nodes of this machine use any transport, or only TCP."""
     monkeypatch.setenv("MINIROSPY_TRANSPORT", request.param)
 
 
@@ -71,7 +71,10 @@ def environment(master: Master) -> Environment:
 async def graph(
     *names: str, watch_seconds: float = 60.0, port: int = 0
 ) -> AsyncIterator[tuple[Master, list[Node]]]:
-    """Run a master and some nodes on this loop; one that restarts needs a ``port`` which the system gives nobody."""
+    """Run a master and some nodes on this loop.
+
+    A master that restarts needs a ``port`` that the system assigns to no other socket.
+    """
     master = Master(host="127.0.0.1", port=port)
     await master.start()
     nodes = [Node(name, environment(master), watch_seconds=watch_seconds) for name in names]
@@ -86,7 +89,7 @@ async def graph(
 
 
 class Box:
-    """What was delivered."""
+    """Records the delivered messages."""
 
     def __init__(self) -> None:
         self.bodies: list[bytes] = []
@@ -110,7 +113,7 @@ async def publish(node: Node, topic: str, **options: Any) -> Publication:
 
 
 class Foreign:
-    """A publisher by hand: ``serve(connection)`` plays what comes after the subscriber's header."""
+    """A publisher on raw sockets: ``serve(connection)`` runs after the subscriber's header."""
 
     def __init__(self, serve: Callable[[socket.socket], Coroutine[Any, Any, None]]) -> None:
         self.connections = 0
@@ -140,7 +143,7 @@ async def subscribe_to(
     *,
     on_loop: bool = False,
 ) -> Subscription:
-    """Return a subscription that was notified of one publisher, which ``foreign`` plays."""
+    """Return a subscription that was notified of one publisher, played by ``foreign``."""
     subscription = node.make_subscription("/t", STRING, deliver, on_loop=on_loop)
     monkeypatch.setattr(subscription._rpc, "call", foreign.answer)
     subscription.publishers_changed(["http://127.0.0.1:1/"])
@@ -191,7 +194,7 @@ def test_a_refused_subscriber_logs_why_and_retries_only_after_a_change(
             subscription = await listen(b, "/t", Box())
             await until(lambda: "refused the connection" in caplog.text)
             assert not publication.links
-            # Its task has logged that; it has ended a turn of the loop later.
+            # Its task has logged that; it finishes one loop iteration later.
             await until(lambda: not subscription._connecting)
             await a.unadvertise(publication)
             right = await publish(a, "/t")
@@ -296,7 +299,7 @@ def test_a_publisher_of_many_topics_that_cannot_be_reached_is_one_line(
     uri = "http://127.0.0.1:1/"
 
     async def scene() -> None:
-        # Until the node closes.
+        # The delay lasts until the node closes.
         monkeypatch.setattr("minirospy.runtime.node.topics.TOGETHER_SECONDS", 1e6)
         async with graph("/b") as (_, (b,)):
             for number in range(count):
@@ -351,7 +354,7 @@ def test_newest_keeps_the_newest_however_slow_the_receiver() -> None:
             await asyncio.get_running_loop().run_in_executor(None, started.wait, 30)
             for number in range(1, 101):
                 publication.publish(serialize_frame(b"%04d" % number + bytes(1_000_000)))
-            # 100 MB were published; what waits is bounded by the queue.
+            # 100 MB were published; the queue bounds the waiting data.
             assert publication.links[0].waiting <= 3
             go_on.set()
             await until(lambda: bodies[-1] == b"0100")
@@ -393,7 +396,7 @@ def test_without_a_queue_publish_waits_for_the_reader() -> None:
             while received < len(whole):
                 received += len(await loop.sock_recv(sock, 1 << 20))
             await done
-            # A reader that goes away ends the wait too.
+            # A reader that disconnects ends the wait too.
             done = loop.run_in_executor(None, publication.publish, whole)
             await until(lambda: publication.links[0].waiting)
             sock.close()
@@ -403,7 +406,7 @@ def test_without_a_queue_publish_waits_for_the_reader() -> None:
 
 
 async def raw_subscriber(node: Node, **changes: str) -> socket.socket:
-    """Return a connection that has sent a subscriber's header for /t and received the answer, and reads no more."""
+    """Return a connection that has sent a subscriber's header for /t and received the response, and does not read any more."""
     sock = await tcp.connect("127.0.0.1", node.tcpros_port)
     fields = {"topic": "/t", "md5sum": STRING.md5sum, "type": STRING.name, "callerid": "/raw", **changes}
     await tcp.send_header(sock, fields)
@@ -436,7 +439,7 @@ def test_who_has_the_header_misses_nothing_that_is_published_from_then_on(*, lat
                 (length,) = struct.unpack("<I", stream.read(4))
                 stream.read(length)
                 publication.publish(serialize_frame(b"%d" % number))
-                # A latched topic's last message comes first.
+                # A latched topic's last message arrives first.
                 wanted = [number] if not latch or not number else [number - 1, number]
                 for each in wanted:
                     (length,) = struct.unpack("<I", stream.read(4))
@@ -488,7 +491,7 @@ def test_a_publisher_update_that_overtakes_the_answer_is_not_undone(monkeypatch:
 
 
 def test_a_refusal_that_a_new_list_overtakes_is_not_the_last_word(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The publisher unregistered and registered again; that update came during the handshake."""
+    """The publisher unregistered and registered again; that update arrived during the handshake."""
 
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -509,7 +512,7 @@ def test_a_refusal_that_a_new_list_overtakes_is_not_the_last_word(monkeypatch: p
 
 
 def test_publisher_list_of_an_earlier_subscription_is_queried_again() -> None:
-    """rosmaster's lists wait in a queue, and may come after the answer to a later registration."""
+    """rosmaster's lists wait in a queue, and may arrive after the answer to a later registration."""
 
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -557,7 +560,7 @@ def test_who_is_named_again_while_it_is_being_connected_is_connected_once(
 
 
 def slow(node: Node, monkeypatch: pytest.MonkeyPatch, slow_calls: str) -> None:
-    """Delay the calls of a node to its master whose method has this prefix; they are not cancelled."""
+    """Delay a node's calls to its master whose method has this prefix; they are not cancelled."""
     ask = node._registrations.call
 
     async def ask_late(method: str, *args: Any) -> Any:
@@ -573,7 +576,7 @@ def slow(node: Node, monkeypatch: pytest.MonkeyPatch, slow_calls: str) -> None:
 
 
 async def offer(node: Node, kind: str) -> Callable[[], Coroutine[Any, Any, None]]:
-    """Register something of a kind; what ends it."""
+    """Register something of a kind; return a function that unregisters it."""
     if kind == "publisher":
         publication = await publish(node, "/x")
         return lambda: node.unadvertise(publication)
@@ -586,7 +589,7 @@ async def offer(node: Node, kind: str) -> Callable[[], Coroutine[Any, Any, None]
 
 
 def known(master: Master) -> dict[str, list[str]]:
-    """Return who is registered for /x, by kind."""
+    """Return kind -> the nodes that are registered for /x."""
     registry = master.registry
     tables = {
         "publisher": registry.publishers(),
@@ -629,7 +632,7 @@ def test_the_shutdown_of_the_node_does_not_overtake_a_registration(
             await a.close()
             with contextlib.suppress(asyncio.CancelledError, MasterUnreachableError):
                 await offering
-            # Where it was overtaken, it comes by then.
+            # If it was overtaken, it has arrived by then.
             await asyncio.sleep(0.1)
             assert not known(master)
 
@@ -639,7 +642,7 @@ def test_the_shutdown_of_the_node_does_not_overtake_a_registration(
 def test_close_gives_up_registrations_with_a_silent_master(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """What is on its way, and what waits for its turn behind it: within the documented ten seconds."""
+    """Calls in progress and queued calls are given up within the documented ten seconds."""
 
     async def scene(clock: ManualLoop) -> None:
         async with graph("/a") as (_, (a,)):
@@ -666,7 +669,7 @@ def test_close_gives_up_registrations_with_a_silent_master(
 def test_a_master_that_was_away_gets_the_registrations_it_missed(
     monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    """It kept its tables, so it knows the node."""
+    """The master kept its tables, so it knows the node."""
 
     async def scene() -> None:
         async with graph("/a", watch_seconds=0.05) as (master, (a,)):
@@ -739,7 +742,7 @@ def test_closing_the_last_topic_is_not_taken_for_a_new_master(
 def test_a_node_of_an_illegal_name_is_not_taken_for_forgotten(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The master refuses to look such a name up, each time; rospy lets the node run."""
+    """The master refuses to look up such a name, each time; rospy lets the node run."""
 
     async def scene() -> None:
         async with graph("/led actuator", watch_seconds=0.02) as (_, (a,)):
@@ -768,7 +771,7 @@ def test_a_master_that_forgot_everything_gets_all_registrations_again(
             subscription = await listen(b, "/t", box)
             again = threading.Event()
             b.when_registered_again.append(again.set)
-            # The publisher's end is open a moment before the subscriber's.
+            # The publisher's endpoint opens a moment before the subscriber's.
             await until(lambda: publication.links and subscription.links)
             link = subscription.links[0]
             port = master.port
@@ -808,7 +811,7 @@ def test_node_at_the_limit_of_threads_registers_with_restarted_masters(
         await master.start()
         try:
             await until(lambda: set(master.registry.publishers()) == {"/t"})
-            # The watch has looked once more.
+            # The watch has checked once more.
             await asyncio.sleep(0.2)
         finally:
             await master.close()
@@ -834,14 +837,14 @@ def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: 
         async with graph("/a", "/b") as (_, (a, b)):
             publication = await publish(a, "/t")
             subscription = await listen(b, "/t", Box())
-            # The publisher's end is open a moment before the subscriber's.
+            # The publisher's endpoint opens a moment before the subscriber's.
             await until(lambda: publication.links and subscription.links)
             subscription.registered_again([])
             subscription.publishers_changed(["http://127.0.0.1:1/"])
             await until(lambda: subscription._settling is None)
             assert [link.uri for link in subscription.links] == [a.uri]
             assert tuple(subscription._plan._failures) == ("http://127.0.0.1:1/",)
-            # A node that the master names again is connected already.
+            # The node that the master lists again is already connected.
             subscription.publishers_changed([a.uri])
             assert not subscription._connecting.get(a.uri)
             publication.links[0].close()
@@ -943,7 +946,7 @@ def test_subscription_closed_while_connecting_leaves_no_link() -> None:
 
 
 def test_a_closed_node_connects_to_nothing_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What was being connected has ended by then: its task would be left to the program's loop."""
+    """Pending connections are closed by then: their tasks would otherwise be left in the program's loop."""
     ended: list[str] = []
 
     async def connect(_: Subscription, uri: str) -> None:
@@ -1042,7 +1045,7 @@ def test_a_publisher_that_unregistered_and_stays_is_disconnected(monkeypatch: py
 def test_a_publisher_that_registers_again_is_connected_once(
     monkeypatch: pytest.MonkeyPatch, is_kept: bool
 ) -> None:
-    """``is_kept``: whether the publisher keeps the connection that it has."""
+    """``is_kept``: whether the publisher keeps its existing connection."""
 
     async def scene(clock: ManualLoop) -> None:
         is_back = asyncio.Event()
@@ -1073,7 +1076,7 @@ def test_a_publisher_that_registers_again_is_connected_once(
 def test_subscriber_whose_listener_fails_is_not_counted_and_the_fault_is_logged(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """The fault is in the publisher's own function: the connection ends, and the node still closes."""
+    """The publisher's own function fails: the connection is closed, and the node can still be closed."""
 
     async def scene() -> None:
         async with graph("/talker") as (_, (talker,)):

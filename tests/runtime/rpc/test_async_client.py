@@ -1,4 +1,4 @@
-"""runtime/rpc/async_client and runtime/master/notifier: connections that are kept, lost, refused or late; lists that are long."""
+"""runtime/rpc/async_client and runtime/master/notifier: connections that are kept, lost, refused or late; long lists."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CALL = serialize_call("getPid", ["/x"])
 
 
 class Publishers:
-    """A graph in which topics have publishers, and which has no parameters."""
+    """A graph in which topics have publishers, without parameters."""
 
     def __init__(self, uris_of: Callable[[str], list[str]]) -> None:
         self.publisher_uris = uris_of
@@ -113,7 +113,7 @@ def test_a_call_under_way_ends_with_its_client_or_its_time_limit() -> None:
         with socket.create_server(("127.0.0.1", 0)) as silent:
             uri = f"http://127.0.0.1:{silent.getsockname()[1]}/"
             client = AsyncRpcClient()
-            # It took the connection: not its address, but its process is at fault.
+            # It accepted the connection: the fault is in its process, not its address.
             with pytest.raises(RpcTimeout, match=r"timed out after 0\.05 s"):
                 await client.call(uri, "a", timeout=0.05)
             waiting = asyncio.ensure_future(client.call(uri, "a"))
@@ -194,7 +194,7 @@ def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
 
 
 def test_a_kept_connection_ends_with_its_server(monkeypatch: pytest.MonkeyPatch) -> None:
-    # It ends with its server, not because it was idle for long.
+    # The connection is closed with its server, not because it was idle.
     monkeypatch.setattr("minirospy.runtime.rpc.async_client._KEEP_SECONDS", 1000.0)
 
     async def test() -> None:
@@ -215,7 +215,7 @@ def test_unrequested_bytes_of_a_server_are_not_an_answer() -> None:
 
     async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         nonlocal calls, ended
-        # It goes on until the client has gone.
+        # It continues until the client has disconnected.
         with contextlib.suppress(asyncio.IncompleteReadError, OSError):
             while await reader.readuntil(b"</methodCall>\n"):
                 calls += 1

@@ -1,4 +1,4 @@
-"""What waits for a socket that takes no more: sent in order, counted, and forgotten."""
+"""Data that waits for a socket without room: sent in order, counted, and discarded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""runtime/rpc/server: clients take turns, and a time limit is for those that stand still."""
+"""runtime/rpc/server: clients take turns, and a time limit applies only to clients that make no progress."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_a_client_that_is_disconnected_amid_its_requests_gets_no_answers() -> No
         await server.start()
         with connect(server) as greedy:
             greedy.sendall(call("more") * 50)
-            while not called:  # turn by turn: a pause would see all fifty carried out
+            while not called:  # poll on every loop iteration: after a pause, all fifty calls would be done
                 await asyncio.sleep(0)
             for each in list(server.connections):
                 each.end()
@@ -103,7 +103,7 @@ def test_the_time_limit_restarts_for_a_client_that_makes_progress(monkeypatch: p
             await until(lambda: limit() > first)
             client.sendall(request[30_000:])
             await until(lambda: held._out)
-            # The answer is under way.
+            # The response is being sent.
             first = limit()
             client.setblocking(False)
             while limit() == first:
@@ -137,12 +137,12 @@ def test_a_client_is_not_read_from_while_its_method_waits(last_closes: bool) -> 
             await until(lambda: connection._message)
             for _ in range(100):
                 await asyncio.sleep(0)
-            # What it took out of the socket is not taken apart, either.
+            # Data that it has read from the socket is not parsed, either.
             assert connection._reader.held < 500 * len(requests[0])
             go_on.set()
             greedy.setblocking(False)
             answers = b""
-            # A reset, where it has said that it goes and has said more behind that.
+            # The peer resets the connection if data arrives after its final response.
             with contextlib.suppress(ConnectionResetError):
                 while b"greedy999<" not in answers:
                     answers += await asyncio.get_running_loop().sock_recv(greedy, 65536) or b"greedy999<"
@@ -170,7 +170,7 @@ def test_a_client_that_does_not_read_its_answers_is_not_read_from() -> None:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 65536)
         await loop.sock_connect(client, ("127.0.0.1", server.port))
 
-        # More than the system's buffers take; a server that reads on would take it all.
+        # More than the system's buffers hold; a server that continued to read would read all of it.
         asked = [call("m", number, "x" * 10_000) for number in range(4000)]
         left = memoryview(b"".join(asked))
         blocked = 0
@@ -215,7 +215,7 @@ def test_clients_do_not_wait_for_a_crowd_that_disconnects(is_known: bool) -> Non
             await until(lambda: len(server.connections) == crowd + 1)
             for sock in silent:
                 sock.close()
-            # Its request comes after all of theirs have ended.
+            # Its request arrives after all of theirs are finished.
             if not is_known:
                 good = stack.enter_context(connect(server))
             good.sendall(call("getPid"))
@@ -228,7 +228,7 @@ def test_clients_do_not_wait_for_a_crowd_that_disconnects(is_known: bool) -> Non
 
 
 class Late:
-    """A connection that waits to be read from."""
+    """A connection that waits to be read."""
 
     def __init__(self, name: str, log: list[str]) -> None:
         self.name = name
@@ -239,7 +239,7 @@ class Late:
 
 
 def admit(server: RpcServer, late: Late, *, is_new: bool = False) -> bool:
-    """Do what the loop does where a connection has data."""
+    """Do as the loop does if a connection has data."""
     is_admitted = server.admit(late, is_new=is_new)  # type: ignore[arg-type]
     if is_admitted:
         late.read()
@@ -279,7 +279,7 @@ def test_new_connections_are_read_from_both_ends_of_the_queue() -> None:
         await server.close()
         return log
 
-    # Who disconnects after it has said nothing for long is at one end, who has just connected at the other one.
+    # The client that has been idle longest before it disconnects is at one end, the newest at the other.
     assert set(asyncio.run(scene())[:4]) == {"7", "0", "6", "1"}
 
 

@@ -1,4 +1,4 @@
-"""runtime/rpc/turns: long work in short slices, on a clock that the test holds."""
+"""runtime/rpc/turns: long work in short slices, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.waiting import until
 
 
 class Clock:
-    """A clock that goes on by one whenever a step is made."""
+    """A clock that advances by one at each step."""
 
     def __init__(self) -> None:
         self.now = 0.0

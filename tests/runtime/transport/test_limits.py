@@ -1,4 +1,4 @@
-"""A process at its limit of threads or open files: one clear line, no busy loop, and it goes on when there is room."""
+"""A process at its limit of threads or open files: one clear line, no busy loop, and it continues when there is room."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def test_callbacks_in_order_go_on_after_the_thread_limit(
 
 def test_other_runtime_errors_keep_their_type() -> None:
     class PythonFinalizationError(RuntimeError):
-        """That of Python 3.13."""
+        """Stands in for the exception of Python 3.13."""
 
     def finalize() -> None:
         with naming_thread_limit():

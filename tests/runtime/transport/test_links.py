@@ -1,4 +1,4 @@
-"""runtime/transport/links and readers: frames over TCP and over a Unix socket, and peers that stall, end and lie."""
+"""runtime/transport/links and readers: frames over TCP and Unix sockets; peers that stall, disconnect or send bad data."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ KINDS = ["tcp", "unix"] if hasattr(socket, "AF_UNIX") else ["tcp"]
 
 @pytest.fixture(params=KINDS)
 def pair(request: pytest.FixtureRequest) -> Iterator[tuple[socket.socket, socket.socket]]:
-    """Two ends of a connection within this machine."""
+    """Return both sockets of a connection within this machine."""
     if request.param == "unix":
         one, other = socket.socketpair(socket.AF_UNIX)
     else:
@@ -46,7 +46,7 @@ def loop() -> Iterator[LoopThread]:
 
 @dataclass
 class QueueSize:
-    """How many frames a slow receiver is to get."""
+    """The number of frames that a slow receiver gets."""
 
     newest: int
 
@@ -88,7 +88,7 @@ def test_frames_of_several_threads_stay_whole(
     data = receive_all(pair[1], sum(map(len, frames)) * 5)
     for thread in threads:
         thread.join()
-    # What the peer has may not be counted yet.
+    # Data that the peer has received may not be counted yet.
     loop.run(link.drain(30))
     seen = []
 
@@ -183,7 +183,7 @@ def test_newest(pair: tuple[socket.socket, socket.socket], newest: int, expected
 def test_a_reader_stays_awake_where_messages_come_quickly(
     monkeypatch: pytest.MonkeyPatch, seconds: float, is_alone: bool, looks: int
 ) -> None:
-    """``seconds``: how long a wait may last to be a short one. The first one is never waited for awake.
+    """``seconds``: the longest wait that counts as short. The reader never busy-polls for the first message.
 
     ``is_alone``: whether no other reader of the node has read meanwhile.
     """
@@ -233,7 +233,7 @@ def test_a_reader_stays_awake_where_messages_come_quickly(
 def test_reader_blocks_after_busy_polling_without_success(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A gap is as long as the look and the sleep together; bytes that were there late are no quick ones either."""
+    """A gap is as long as the busy-poll and the block together; bytes that were late do not count as quick ones."""
     one, other = socket.socketpair()
     looks: list[str] = []
     clock = SimpleNamespace(now=0.0)
@@ -266,7 +266,7 @@ def test_reader_blocks_after_busy_polling_without_success(
 
 
 def image(array: bytes) -> LargeFrame:
-    """Return a message that ends with a byte array, as its class writes it."""
+    """Return a message that ends with a byte array, as its class serializes it."""
     pieces = Pieces()
     pieces.write(b"head")
     pieces.write(struct.pack("<BI", 7, len(array)))
@@ -442,7 +442,7 @@ def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> 
 def test_slow_reader_gets_every_frame_while_it_reads(
     pair: tuple[socket.socket, socket.socket], loop: LoopThread, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The sender's wait for room is never over here, however long another program has the reader's processor."""
+    """The sender's wait for room never expires here, however long another program occupies the reader's processor."""
     monkeypatch.setattr(links, "time", SimpleNamespace(monotonic=lambda: 0.0, perf_counter=time.perf_counter))
     monkeypatch.setattr(links, "is_writable", lambda sock, _: is_writable(sock, 30_000))
     link = open_link(loop, pair[0], 10, lambda _: None)
@@ -474,7 +474,7 @@ def test_peer_that_does_not_read_is_not_waited_for(
         link.send(frame)
     for _ in range(1000):
         link.send(frame)
-    # TCP finds a little more room for a while, and each time the peer is given another chance.
+    # TCP makes a little more room for a while, and each time the peer gets another chance.
     assert 1 <= len(waits) < 20
     assert link.waiting <= 3
 

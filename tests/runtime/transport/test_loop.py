@@ -1,4 +1,4 @@
-"""runtime/transport/loop: the bridge between threads and the loop, at the loop's end."""
+"""runtime/transport/loop: calls from threads to the loop while the loop is closing."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_a_call_while_the_loop_closes_gets_an_error() -> None:
     assert stopping.wait(30)
     waits = [thread.start(asyncio.sleep(0)), thread.start(asyncio.sleep(60))]
     started.set()
-    # This one may just come to its end.
+    # The loop may be closing.
     with contextlib.suppress(LoopClosedError):
         waits[0](10)
     with pytest.raises(LoopClosedError):
@@ -75,17 +75,18 @@ def test_calls_start_in_their_order() -> None:
 
 
 def test_a_handler_at_any_step_of_a_call_may_call_the_loop() -> None:
-    """A signal's handler runs between any two steps of the main thread, and shuts the node down, which waits for the loop."""
+    """A signal handler runs between any two steps of the main thread, and shuts the node down, which waits for the loop."""
     thread = LoopThread("test-loop")
     at = 0
-    # Not a number that is rebound: before Python 3.12, what a profile function does to its caller's variables may be undone.
+    # A list, not a counter that is rebound: before Python 3.12, a profile function's changes to its caller's
+    # variables may be undone.
     steps: list[str] = []
     is_at_step = threading.Event()
     inner: list[int] = []
 
     async def outer() -> int:
-        # Its end, for which the loop needs the lock of the caller's future, comes while the caller is at the step; or
-        # while it waits, where that is before the step.
+        # The call finishes, for which the loop needs the lock of the caller's future, while the caller is at the
+        # step; or while it waits, if that is before the step.
         is_at_step.wait(0.05)
         return 1
 
@@ -112,7 +113,7 @@ def test_a_handler_at_any_step_of_a_call_may_call_the_loop() -> None:
 
 
 def test_a_thread_that_is_interrupted_as_it_starts_closes_its_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The thread runs by then: a loop that is closed under it would raise RuntimeError there."""
+    """The thread is running by then: closing its loop from outside would raise RuntimeError in it."""
     threads: list[threading.Thread] = []
     faults: list[threading.ExceptHookArgs] = []
     start = threading.Thread.start

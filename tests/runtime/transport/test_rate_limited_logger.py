@@ -1,4 +1,4 @@
-"""runtime/transport/rate_limited_logger: the first of a flood of lines is logged, then how many there were."""
+"""runtime/transport/rate_limited_logger: logs the first of many equal lines, then their number."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""runtime/transport/tcp: links, listeners and handshakes with real sockets, and with peers that mean no good."""
+"""runtime/transport/tcp: links, listeners and handshakes with real sockets, and with malicious peers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
 
 @pytest.fixture
 def pair() -> Iterator[tuple[socket.socket, socket.socket]]:
-    """Two ends of a TCP connection on loopback."""
+    """Return both sockets of a TCP connection on loopback."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         one = socket.create_connection(server.getsockname())
         other, _ = server.accept()
@@ -97,7 +97,7 @@ def test_localhost_is_ipv4_or_ipv6() -> None:
 
 
 async def serve(received: list[dict[str, str]]) -> tcp.Listener:
-    """Return a listener that keeps the headers that it receives, and answers each."""
+    """Return a listener that records the headers that it receives, and answers each."""
 
     async def accept(sock: socket.socket, _address: str) -> None:
         received.append(await tcp.receive_header(sock))
@@ -110,7 +110,7 @@ async def serve(received: list[dict[str, str]]) -> tcp.Listener:
 
 
 async def greet(port: int) -> dict[str, str]:
-    """Return what a good client is answered."""
+    """Return the response to a correct client."""
     sock = await tcp.connect("127.0.0.1", port)
     try:
         await tcp.send_header(sock, {"callerid": "/good"})
@@ -174,7 +174,8 @@ def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
         listener = await serve(received)
         silent: list[socket.socket] = []
         try:
-            # As many as this process may open: it holds both ends, unless the listener lets go of them.
+            # As many as this process may open: it has both sockets of each connection open, unless the listener
+            # closes its own.
             for number in range(1000):
                 silent.append(await tcp.connect("127.0.0.1", listener.port))
                 if number % 100 == 99:
@@ -196,7 +197,7 @@ def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
 
 
 def test_long_headers_share_a_limited_memory() -> None:
-    """Who sends the start of a long header keeps memory; a header of ordinary length is accepted all the same."""
+    """A client that sends the start of a long header occupies memory; a header of ordinary length is accepted nevertheless."""
 
     async def scene() -> None:
         loop, memory = asyncio.get_running_loop(), tcp.HeaderMemory(300_000)

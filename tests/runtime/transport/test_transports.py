@@ -1,4 +1,4 @@
-"""How two nodes of one machine come to a Unix socket, and that TCP is there for everybody else."""
+"""How two nodes of one machine connect by a Unix socket, and use TCP otherwise."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def test_both_sides_have_to_want_it(
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
             for node, name in ((a, of_a), (b, of_b)):
-                # As if the node had been started so.
+                # As if the node had been started with this setting.
                 if name == "tcp":
                     node.this_host = ""
             box = Box()
@@ -126,7 +126,7 @@ def test_both_sides_have_to_want_it(
 
 
 def test_who_cannot_reach_the_socket_takes_tcp(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in a sandbox that keeps processes apart."""
+    """As in a sandbox that isolates processes."""
 
     def refuse(name: str) -> Any:
         raise PermissionError(name)
@@ -204,13 +204,13 @@ def test_an_answer_is_expected_awake_and_not_for_long(monkeypatch: pytest.Monkey
     monkeypatch.setattr(sockets, "BUSY_POLL_SECONDS", 60.0)
     one, other = socket.socketpair()
     with one, other:
-        sockets.busy_poll(one)  # of this process
+        sockets.busy_poll(one)  # a socket of this process
         assert turns == 0
         monkeypatch.setattr(sockets, "peer", lambda _: sockets.Peer(process=0, user=0, group=0))
         sockets.busy_poll(one)
         assert (turns, one.recv(1)) == (3, b"x")
         monkeypatch.setattr(sockets, "BUSY_POLL_SECONDS", 0.0)
-        sockets.busy_poll(one)  # nobody answers
+        sockets.busy_poll(one)  # no response
         assert turns == 4
         with pytest.raises(BlockingIOError):
             sockets.busy_receive(one, memoryview(bytearray(1)))
@@ -236,7 +236,7 @@ def test_a_master_is_reached_by_each_of_its_names(uri: str) -> None:
 
 def test_a_socket_name_of_another_user_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
-    # As if this process, which took the name, were another user's and not root's.
+    # As if this process, which took the name, belonged to a user who is neither this one nor root.
     monkeypatch.setattr(local, "_TRUSTED", frozenset())
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
@@ -248,12 +248,11 @@ def test_a_socket_name_of_another_user_is_not_trusted(monkeypatch: pytest.Monkey
             assert local.bind("localhost", port) is None
 
 
-OWN = f"test-{os.getpid()}"
-"""A host that no other test has."""
+OWN = f"test-{os.getpid()}"  # a host name that no other test uses
 
 
 def program(text: str, **environment: str) -> str:
-    """Return what a program prints."""
+    """Return a program's output."""
     return subprocess.run(
         [sys.executable, "-c", text],
         env={**os.environ, **environment},
@@ -289,7 +288,7 @@ def test_publisher_chooses_no_other_socket_of_this_machine(name: str) -> None:
 
 
 def test_without_unix_sockets_there_is_tcp(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where systemd's RestrictAddressFamilies leaves them out, or no file descriptor is left."""
+    """As if systemd's RestrictAddressFamilies excludes them, or no file descriptor is left."""
 
     def restricted(*_: object) -> None:
         raise OSError(errno.EAFNOSUPPORT, "Address family not supported by protocol")
@@ -380,14 +379,14 @@ def test_large_request_is_not_copied_for_each_partial_send() -> None:
                 tracemalloc.stop()
                 call.cancel()
                 await client.close()
-        # The request itself is one.
+        # The request itself is one copy.
         assert peak < 1.5 * size
 
     run(scene)
 
 
 def test_a_node_that_ends_gives_its_name_free_before_its_port(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Or the next server of that port would have none."""
+    """Otherwise the next server of that port would have no Unix socket."""
     order: list[str] = []
     close = Listener.close
 
@@ -506,7 +505,7 @@ def test_a_subscriber_that_is_killed_in_the_middle_of_a_message(
                 await loop.run_in_executor(None, publication.publish, frame)
                 assert process.stdout
                 await loop.run_in_executor(None, process.stdout.readline)
-                # Its callback sleeps: this one stays in the middle.
+                # Its callback sleeps: this thread stays in the middle.
                 await loop.run_in_executor(None, publication.publish, frame)
                 link = publication.links[0]
                 assert link.waiting == 1
@@ -517,7 +516,7 @@ def test_a_subscriber_that_is_killed_in_the_middle_of_a_message(
                 process.communicate()
 
             assert link.waiting == 0
-            # Nobody else is the worse for it.
+            # Other subscribers are not affected.
             subscription = b.make_subscription("/t", publication.type, box)
             await b.subscribe(subscription)
             await until(lambda: publication.links)
@@ -546,7 +545,7 @@ def test_the_environment_names_a_transport_that_there_is() -> None:
 
 
 def _received_before_the_header(sock: socket.socket, ahead: bytes) -> bytes:
-    """Return what a client of "/s" sends behind its header before it gets one: ``ahead``, or what comes within a moment."""
+    """Return what a client of "/s" sends after its header before it receives one: ``ahead``, or data within a moment."""
     header = serialize_header(service_client_header("/s", "*", "/c"))
     got = b""
     sock.settimeout(30)
@@ -562,7 +561,7 @@ def _received_before_the_header(sock: socket.socket, ahead: bytes) -> bytes:
 
 @pytest.mark.parametrize(("family", "ahead"), [(socket.AF_UNIX, b"\5\0\0\0hello"), (socket.AF_INET, b"")])
 def test_a_request_goes_ahead_of_the_servers_header_by_a_unix_socket_alone(family: int, ahead: bytes) -> None:
-    """A server of rospy may lose what comes with the header."""
+    """A rospy server may lose data that arrives with the header."""
     with socket.create_server(("127.0.0.1", 0)) as server, contextlib.ExitStack() as closing:
         listening, port = server, server.getsockname()[1]
         if family == socket.AF_UNIX:
@@ -578,7 +577,7 @@ def test_a_request_goes_ahead_of_the_servers_header_by_a_unix_socket_alone(famil
                 sock.sendall(serialize_header({"callerid": "/s", "md5sum": "*", "type": "a/B"}))
                 sock.settimeout(10)
                 request = before or sock.recv(1000)
-                # An answer that comes with the header, or right behind it, is found.
+                # A response that arrives with the header, or directly after it, is found.
                 sock.sendall(serialize_response(request))
             return before
 

@@ -1,4 +1,4 @@
-"""Workers: whatever a function raises is logged, and the next one runs."""
+"""Workers: exceptions of a function are logged, and the next function runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bags for tests of the dashboard: texts, a latched map of text, images."""
+"""Bags for tests of the dashboard: strings, a latched map of text, images."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def text_body(text: str) -> bytes:
 
 
 def image_body(level: int) -> bytes:
-    """Return an image of 40 x 30 pixels, whose color goes from green to red with ``level`` from 0 to 255."""
+    """Return an image of 40 x 30 pixels, whose color changes from green to red with ``level`` from 0 to 255."""
     buffer = BytesIO()
     Image(
         width=40, height=30, encoding="rgb8", step=120, data=bytes([level, 255 - level, 60]) * 1200
@@ -30,7 +30,7 @@ def image_body(level: int) -> bytes:
 
 
 def make_bag(path: Path, seconds: int = 20, *, hostile: str = "") -> Path:
-    """Write ten texts a second on /chatter, two images a second on /camera, one latched text on /map."""
+    """Write ten strings a second on /chatter, two images a second on /camera, one latched string on /map."""
     with path.open("wb") as stream:
         writer = BagWriter(stream)
         described = {"type": String._type, "md5sum": String._md5sum, "message_definition": String._full_text}

@@ -19,7 +19,7 @@ TOKEN = "owner-token-0"
 
 
 class Served:
-    """A running dashboard, and nodes of the same graph."""
+    """A running dashboard, and other nodes of the same graph."""
 
     def __init__(self, options: BridgeOptions) -> None:
         self._loop = LoopThread("test-dashboard")
@@ -85,7 +85,7 @@ class Served:
 
 @pytest.fixture
 def serve(master: str) -> Iterator[Callable[..., Served]]:
-    """Return a function that starts a dashboard with these options at a free port."""
+    """Return a function that starts a dashboard with these options on a free port."""
     started: list[Served] = []
 
     def start(**options: Any) -> Served:

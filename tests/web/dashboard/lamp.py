@@ -1,4 +1,4 @@
-"""A package with a launch file for tests of the dashboard: a node that runs, one that fails, one that fails again and again."""
+"""A package with a launch file for tests of the dashboard: a node that runs, one that fails, one that fails repeatedly."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ sys.exit(3)
 
 
 def make_lamp(folder: Path) -> Path:
-    """Make the package ``lamp`` in a folder; return its folder."""
+    """Create the package ``lamp`` in a folder; return its folder."""
     package = folder / "lamp"
     for name in ("launch", "scripts"):
         (package / name).mkdir(parents=True)

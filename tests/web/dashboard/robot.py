@@ -1,4 +1,4 @@
-"""A robot for tests of the dashboard: joints with limits, continuous, prismatic, fixed, and one that mimics another."""
+"""A robot for tests of the dashboard: joints with limits, continuous, prismatic, fixed, and a mimic joint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bags over WebSocket: opened, moved through, published, recorded."""
+"""Bags over WebSocket: opening, seeking, publishing, recording."""
 
 from __future__ import annotations
 
@@ -161,8 +161,7 @@ def test_mcap_is_shown_like_a_bag(client: Callable[..., Client], folder: Path, k
     page.binary(1, text_body("message 12"))
 
 
-subscriptions: list[object] = []
-"""They end where nobody refers to them."""
+subscriptions: list[object] = []  # a subscription ends if nothing refers to it
 
 
 def listened(served: Served, topic: str) -> list[str]:
@@ -191,9 +190,9 @@ def test_nothing_is_published_until_that_is_switched_on(
     assert (chatter, map_) == ([], [])
     page.send("publish", topics=["/chatter", "/map"], clock=True)
     page.next("state", lambda state: state["published"] == ["/chatter", "/map"] and state["clock"])
-    # The latched one is long past, and late subscribers need it.
+    # The latched message is from long before, and late subscribers need it.
     wait_until(lambda: map_ == ["the map"])
-    # Slowly, until the other one is connected.
+    # Play slowly until the other subscriber is connected.
     page.send("play", seek=0, paused=False, rate=0.1)
     wait_until(lambda: chatter)
     page.send("play", paused=False, rate=4)
@@ -299,7 +298,7 @@ def test_recording_is_completed_when_the_dashboard_ends(
 
 
 class Gate:
-    """Keeps a thread of the dashboard at a step until it is opened."""
+    """Blocks a thread of the dashboard at a step until it is opened."""
 
     def __init__(self) -> None:
         self.reached = threading.Event()
@@ -312,7 +311,7 @@ class Gate:
 
 @pytest.fixture
 def starting(monkeypatch: pytest.MonkeyPatch) -> Gate:
-    """Return the gate at which recordings wait as they start."""
+    """Return the gate at which starting recordings block."""
     gate = Gate()
 
     class Slow(Recording):
@@ -482,7 +481,7 @@ def test_page_that_shows_a_paused_bag_looks_only_when_something_changes(
         return await follow(session)
 
     monkeypatch.setattr(BagSession, "follow", counted)
-    # Nothing happens: what is measured is that nothing is done.
+    # The test measures that nothing happens in this time.
     time.sleep(1.0)
     assert len(looks) <= 2
     # The player reaches the end by itself.

@@ -1,4 +1,4 @@
-"""The board over WebSocket: what the page sees and does."""
+"""The board over WebSocket: states and commands of the page."""
 
 from __future__ import annotations
 
@@ -130,6 +130,6 @@ def test_board_that_cannot_be_shown_has_its_error(
 
     monkeypatch.setattr(board_endpoint, "state_of", fail)
     with opened(serve()) as socket:
-        # Closed as soon as it comes: the board is left nevertheless, which a fixture checks.
+        # Closed as soon as it arrives: the connection to the board is closed nevertheless, which a fixture checks.
         found = state(socket, lambda each: "error" in each)
     assert found["error"] == "the dashboard failed to show the board: ZeroDivisionError"

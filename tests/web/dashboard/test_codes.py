@@ -1,4 +1,4 @@
-"""Codes that a browser exchanges for the token, and the users of sockets."""
+"""Codes that a browser exchanges for the token, and the owners of sockets."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_code_is_exchanged_by_this_user_alone(
         assert (status, text.count("\n")) == (403, 1)
         assert text == "this code is for the user who started the dashboard, on this machine\n"
     monkeypatch.undo()
-    # A refused try has not used the code up.
+    # A refused attempt has not used up the code.
     assert exchanged(served.port, code, half_closes=half_closes) == (200, "token-1")
     assert exchanged(served.port, code, half_closes=half_closes)[0] == 403
 
@@ -99,7 +99,7 @@ def test_code_is_exchanged_by_this_user_alone(
 def test_another_user_does_not_get_the_token(
     half_closes: bool, serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The dashboard believes to be run by another user: the table shows the client as a stranger."""
+    """The dashboard pretends to run as another user: the socket table shows the client as a stranger."""
     served = serve()
     assert served.dashboard
     monkeypatch.setattr(codes, "_ROOT", -1)

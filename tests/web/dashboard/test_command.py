@@ -24,7 +24,7 @@ from minirospy.workspace.packages import Packages
 
 @pytest.fixture
 def started(master: str) -> Iterator[list[subprocess.Popen[str]]]:
-    """Return a list of processes that are ended with the test."""
+    """Return a list of processes that are stopped after the test."""
     processes: list[subprocess.Popen[str]] = []
     yield processes
     for each in processes:
@@ -122,7 +122,7 @@ def test_usage_error_has_status_2(
 
 
 class Opened(Exception):
-    """Ends the command when the browser has been opened."""
+    """Makes the command exit when the browser has been opened."""
 
 
 def test_browser_is_started_with_a_file_without_code_or_token(
@@ -153,7 +153,7 @@ def test_browser_is_started_with_a_file_without_code_or_token(
     assert re.search(f'url={link}"', pages[0])
     assert re.search(f'href="{link}"', pages[0])
     assert "token" not in pages[0]
-    # The dashboard has ended.
+    # The dashboard has exited.
     assert not list(tmp_path.iterdir())
 
 

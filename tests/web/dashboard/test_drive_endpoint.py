@@ -1,4 +1,4 @@
-"""Driving by the server's endpoint: the last message is zero, whatever happens to the client."""
+"""Driving by the server's endpoint: the last message is zero for any failure of the client."""
 
 from __future__ import annotations
 
@@ -87,13 +87,13 @@ def test_text_that_is_not_a_command_is_refused(text: str, why: str) -> None:
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a topic wait for its subscribers as long as a busy machine needs to connect them."""
+    """Let a topic wait for its subscribers for as long as a busy machine needs."""
     monkeypatch.setattr("minirospy.aio.topics._JOIN_SECONDS", 60.0)
 
 
 @pytest.fixture
 def robot(serve: Callable[..., Served]) -> tuple[Served, Callable[..., Any]]:
-    """Return a dashboard, and a function that returns the next message of /cmd_vel that is right."""
+    """Return a dashboard, and a function that returns the next message of /cmd_vel that fulfils a condition."""
     served = serve()
     return served, listen(served)
 
@@ -128,7 +128,7 @@ def is_zero(twist: Twist) -> bool:
 
 
 class RawClient:
-    """A client that can be cut off: a plain socket, without the closing of a WebSocket."""
+    """A client that can be cut off: a plain socket, without a WebSocket close."""
 
     def __init__(self, port: int) -> None:
         self.socket = socket.create_connection(("127.0.0.1", port), 60)
@@ -193,7 +193,7 @@ def test_robot_stops_when_the_client_is_silent_and_moves_again(robot: Any) -> No
         for _ in range(2):
             client.send(json.dumps(FORWARD))
             until(moves)
-            # The connection is open, and nothing comes any more: as of a page that hangs, or a cable that is pulled.
+            # The connection is open, but no data arrives: as from a page that hangs, or through a pulled cable.
             until(is_zero)
             assert json.loads(client.recv(timeout=60)) == {"stopped": "/cmd_vel"}
 
@@ -232,7 +232,7 @@ def test_robot_stops_when_the_dashboard_is_closed(serve: Callable[..., Served]) 
 
 
 class RawSubscriber:
-    """A robot with a thread of its own: a subscriber of the dashboard's node, by XML-RPC and TCPROS."""
+    """A robot with a separate thread: a subscriber of the dashboard's node, by XML-RPC and TCPROS."""
 
     def __init__(self, served: Served, topic: str) -> None:
         with ServerProxy(served.node_of_dashboard._node.uri) as node:

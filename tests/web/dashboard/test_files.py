@@ -1,4 +1,4 @@
-"""The files of the page: what is loaded is there, nothing is inline, the libraries are those that are named, the size."""
+"""The files of the page: loaded files exist, nothing is inline, libraries match their digests, the size is limited."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_vendored_files_are_those_that_are_named() -> None:
         for name, digest in package["files"].items():
             path = Path(folder, "LICENSE.txt" if name == "LICENSE" else PurePosixPath(name).name)
             found.remove(path)
-            # Git may have changed the ends of the lines (Windows).
+            # Git may have changed the line endings (Windows).
             body = (VENDOR / path).read_bytes().replace(b"\r\n", b"\n")
             assert hashlib.sha256(body).hexdigest() == digest, path
         if bundle := package.get("bundle"):
@@ -89,5 +89,5 @@ def test_page_is_small() -> None:
     sizes = {path: len(file.packed) for path, file in FILES.items() if path != "/"}
     on_demand = sum(size for path, size in sizes.items() if path.startswith(("/vendor/three/", "/js/scene/")))
     assert sum(sizes.values()) - on_demand < 300_000
-    # Loaded when the 3D view is opened first.
+    # Loaded when the 3D view is first opened.
     assert on_demand < 300_000

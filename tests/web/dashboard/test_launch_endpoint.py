@@ -1,4 +1,4 @@
-"""Launch files over WebSocket: found, described, started, stopped; none of their processes outlives the dashboard."""
+"""Launch files over WebSocket: found, described, started, stopped; no process outlives the dashboard."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Client:
         return launch
 
     def log(self, text: str) -> str:
-        """Return what is followed, once it has this text."""
+        """Return the followed log once it contains this text."""
         found = ""
         while text not in found:
             message = self.next(lambda each: "log" in each)
@@ -223,7 +223,7 @@ def test_who_has_no_token_starts_nothing(client: Callable[..., Client]) -> None:
 
 
 class Run:
-    """A launch that has ended, or is requested to."""
+    """A launch that has stopped, or is requested to."""
 
     def __init__(self, number: int) -> None:
         self.id = number
@@ -281,7 +281,7 @@ def test_restart_is_completed_where_its_page_closes(
 
 
 def test_launch_that_has_been_restarted_is_not_started_twice() -> None:
-    """The request of a second client may begin as that of the first one ends."""
+    """A second client's request may start as the first client's is finished."""
     started: list[LaunchFile] = []
 
     async def work() -> None:
@@ -361,7 +361,7 @@ def test_page_that_shows_launches_looks_at_them_only_when_they_change(
     page.run(lambda run: run["state"] == "running" and node(run, "/talker")["pid"])
     looks: list[object] = []
     monkeypatch.setattr(LaunchSession, "follow", counted(LaunchSession.follow, looks))
-    # Nothing happens: what is measured is that nothing is done.
+    # The test measures that nothing happens in this time.
     time.sleep(1.0)
     assert len(looks) <= 2
 

@@ -1,4 +1,4 @@
-"""The page over HTTP: headers, compression, tags, and who gets what without a token."""
+"""The page over HTTP: headers, compression, ETags, and the files that are served without a token."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def test_file_of_rviz_is_written_as_it_was_read() -> None:
     again = format_rviz(found)
     assert parse_rviz(again) == found
     lines = set(FILE.splitlines())
-    # A text of digits is quoted, so that every reader takes it as one.
+    # A string of digits is quoted, so that every reader takes it for a string.
     assert [line for line in again.splitlines() if line not in lines] == ["  Odd State: '00000012'"]
 
 
@@ -99,7 +99,7 @@ def test_text_that_is_not_a_file_of_rviz_is_refused(text: str, error: str) -> No
 
 @pytest.fixture
 def opened(serve: Callable[..., Served]) -> Iterator[Callable[..., Callable[[object], Any]]]:
-    """Return a function that opens the endpoint of a dashboard with this file; what it returns sends an operation."""
+    """Return a function that opens a dashboard's endpoint with this file; its result sends an operation."""
     sockets = ExitStack()
 
     def opening(file: Path | None, token: str = TOKEN, **options: Any) -> Callable[[object], Any]:
@@ -250,7 +250,7 @@ def test_saving_is_completed_where_the_dashboard_closes(tmp_path: Path) -> None:
     async def work() -> None:
         endpoint = RvizEndpoint(file)
         endpoint.open(client).received_text(json.dumps({"save": parse_rviz(FILE)}))
-        # At each turn of the loop: with a pause between two looks it may be saved already.
+        # Poll on each loop iteration: after a pause, the file may already be saved.
         await manual_loop.until(lambda: endpoint._tasks)
         await endpoint.close()
 
@@ -305,7 +305,7 @@ def test_texts_and_names_are_read_as_they_were_written(text: str) -> None:
     config: dict[str, object] = {"Visualization Manager": {text: text, "in a list": [text, {text: [text]}]}}
     written = format_rviz(config)
     assert parse_rviz(written) == config
-    # Another reader of YAML 1.1, as Python's, takes it for the same text.
+    # Another YAML 1.1 reader, such as Python's, reads the same string.
     assert yaml.safe_load(written) == config
 
 

@@ -1,4 +1,4 @@
-"""The texts of the page in two languages: each has its translation, with the same values in it, and none is left over."""
+"""The texts of the page in two languages: each has a translation with the same values, and no translation is unused."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SOURCES = {
 
 
 def german() -> dict[str, str]:
-    """Return the table; its strings have escapes that Python has, too."""
+    """Return the table; its strings have only escapes that Python has, too."""
     text = (JS / "german.js").read_text(encoding="utf-8")
     pairs = re.findall(rf"({STRING}):\s*({STRING})", text)
     return {ast.literal_eval(key): ast.literal_eval(value) for key, value in pairs}
@@ -45,7 +45,9 @@ def test_every_text_is_in_the_table() -> None:
 
 def test_every_translation_is_used_and_has_the_same_values() -> None:
     known = set().union(*(literals(text) for text in SOURCES.values()))
-    known |= literals(inspect.getsource(joint_parameters))  # the view Joints shows why it has none
+    known |= literals(
+        inspect.getsource(joint_parameters)
+    )  # the view Joints shows the reason if there are no joints
     for text, translation in german().items():
         assert text in known, text
         assert sorted(re.findall(r"\{\w+\}", text)) == sorted(re.findall(r"\{\w+\}", translation)), text

@@ -1,4 +1,4 @@
-"""The tools' endpoint over WebSocket: requests of the page that the Foxglove protocol has no message for."""
+"""The tools' endpoint over WebSocket: page requests for which the Foxglove protocol has no message."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def node_in(found: dict[str, Any], name: str) -> dict[str, Any]:
 def test_nodes_are_reported_until_nobody_watches(
     serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # On a busy machine an answer may come late.
+    # On a busy machine an answer may arrive late.
     monkeypatch.setattr("minirospy.introspect.doctor.graph.CONNECT_SECONDS", 30.0)
     served = serve()
     talker = served.node("talker")

@@ -1,4 +1,7 @@
-"""What diagnostic_aggregator's programs publish, ours or the real ones: the arguments are a command that starts one of a name."""
+"""Print the messages of diagnostic_aggregator's programs, minirospy's or the real ones.
+
+The arguments are a command that starts one of its programs by name.
+"""
 
 import queue
 import subprocess
@@ -13,8 +16,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from diagnostic_msgs.srv import AddDiagnostics
 
 FOLDER, *STARTER = sys.argv[1:]
-SECONDS = 100
-"""After which something is taken to hang."""
+SECONDS = 100  # seconds after which a program is considered hung
 rospy.init_node("drive", argv=[])
 pause = threading.Event()
 
@@ -73,7 +75,7 @@ def line(each):
 
 
 class Tree:
-    """What comes on /diagnostics_agg."""
+    """Collects the messages of /diagnostics_agg."""
 
     def __init__(self):
         self.arrays, self.levels = queue.Queue(), queue.Queue()
@@ -95,14 +97,14 @@ class Tree:
         return [line(each) for each in self.arrays.get(timeout=SECONDS).status]
 
     def show(self, label, is_it=lambda lines: True, again=None):
-        """Show the first tree with a property, and the level of the whole; ``again`` is called before each look."""
+        """Print the first tree that fulfils a condition, and the top level; call ``again`` before each attempt."""
         for _ in range(400):
             if again:
                 again()
             lines = self.next_lines()
             if not is_it(lines):
                 continue
-            # The two topics come by two connections: let the level of an earlier tree arrive, if it is late.
+            # The two topics use two connections: let the late level of an earlier tree arrive.
             for _ in range(10):
                 if again:
                     again()
@@ -110,7 +112,7 @@ class Tree:
             while not self.levels.empty():
                 self.levels.get()
             level = self.levels.get(timeout=SECONDS)
-            # The level is that of the same tree only if the tree is still the same after it.
+            # The level belongs to the same tree only if the tree is unchanged after it.
             while not self.arrays.empty():
                 self.arrays.get()
             if is_it(self.next_lines()):
@@ -189,7 +191,7 @@ with Program("aggregator_node", node="basic", **BASIC), Tree() as tree:
         status("imu 12"), status("imu x"), status("a battery of them", 1, "low"), status("exact"), status("exact too"),
         status("servo: one"), status("motor/two"), status("noise: a", 2, "loud"), status("my laser", 7, "odd level"),
     )  # fmt: skip
-    # Again and again: what no analyzer takes is left out after five seconds.
+    # Repeat: an item that matches no analyzer is omitted after five seconds.
     tree.show("one of each", has("my laser", "exact too"), lambda: report(*first))
     rest = status("/a/b: c", 0, "there"), status("plain", 0, "yes"), status("another tilt"), status("tilt")
     tree.show("all expected", has("a b: c | there", "another tilt"), lambda: report(*first, *rest))
@@ -275,7 +277,7 @@ with Program("aggregator_node", node="open", pub_rate=20, base_path="Top"), Tree
     heartbeats = rospy.Subscriber("/diagnostics_agg/bond/adder", Status, beats.put)
     with Program("add_analyzers", node="adder", **rospy.get_param("/added")):
         tree.show("by the program", has("/Top/Added/Mine"))
-        # The real aggregator never notices the end of a program that has sent one heartbeat alone.
+        # The real aggregator never notices the exit of a program that has sent only one heartbeat.
         seen = 0
         while seen < 3:
             seen += beats.get(timeout=SECONDS)._connection_header["callerid"] == "/adder"

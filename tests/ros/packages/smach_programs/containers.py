@@ -1,4 +1,4 @@
-"""What containers of smach do and log, without ROS. It runs under the real package, too; containers.txt is what that prints."""
+"""Outcomes and log lines of smach's containers, without ROS. Runs under the real package, too; its output is containers.txt."""
 
 import re
 import threading
@@ -16,7 +16,7 @@ def logger(level):
             line for line in str(text).splitlines() if not line.startswith(("  File", "    ", "Traceback"))
         ]
         text = re.sub(r"<[\w.]+\.(\w+ object) at 0x\w+>", r"<\1>", " / ".join(lines))
-        # The order of sets is any.
+        # Sets have no order.
         text = re.sub(r"'[^\[\]()]*'(?=,?[\])])", lambda names: ", ".join(sorted(names[0].split(", "))), text)
         say(f"[{level}]", text.replace("\t", " "))
 
@@ -59,7 +59,7 @@ def machine(outcomes=("done", "failed", "preempted"), **kwargs):
     return made
 
 
-# A machine, with a loop and an outcome that falls through.
+# A state machine with a loop and an outcome that is passed through.
 sm = machine()
 with sm:
     smach.StateMachine.add("A", Step("a", "next", "next", "next"), {"next": "B", "preempted": "preempted"})
@@ -160,7 +160,7 @@ with sm:
 say(sm.execute(), sm.userdata.y)
 
 
-# What is not right.
+# Invalid containers.
 def construct(build, outcomes=("done",)):
     def call():
         made = machine(outcomes)
@@ -206,7 +206,7 @@ with sm:
     )
 say(sm.execute())
 
-# Iterators, in a machine.
+# Iterators in a state machine.
 it = smach.Iterator(["broken", "exhausted"], ["limit"], ["seen"], lambda: range(1, 5), "number", "exhausted")
 it.userdata.seen = []
 
@@ -241,9 +241,9 @@ attempt("other state", lambda: it["NONE"])
 attempt("other start", lambda: it.set_initial_state(["NONE"], smach.UserData()))
 
 
-# Concurrences. The states wait for each other by events, so that their order is certain.
+# Concurrences. The states wait for each other by events, so that their order is deterministic.
 def concurrence(results, **kwargs):
-    """Return a container whose states end in order."""
+    """Return a container whose states finish in order."""
     cc = smach.Concurrence(["done", "both", "left", "preempted"], "done", **kwargs)
     turns = [threading.Event() for _ in range(len(results) + 1)]
     turns[0].set()
@@ -317,7 +317,7 @@ attempt("no states", smach.Concurrence(["a"], "a").execute)
 attempt("no policy", lambda: smach.Concurrence(["a"], None))
 attempt("wrong policy", lambda: smach.Concurrence(["a"], "b", outcome_map={"c": {}}, outcome_cb=5))
 
-# Preemption: of a machine in a machine, while its state executes.
+# Preempt a nested state machine while its state executes.
 inner, outer = smach.StateMachine(["stopped", "late"]), smach.StateMachine(["stopped", "late"])
 slow = waiting()
 with inner:
@@ -333,14 +333,14 @@ outer.request_preempt()
 thread.join(20)
 say(results, outer.preempt_requested(), inner.preempt_requested(), slow.preempt_requested())
 
-# A request before the start reaches the first state.
+# A preempt request before the start reaches the first state.
 sm = machine(["done", "preempted"])
 with sm:
     smach.StateMachine.add("A", Step("a", "done"))
 sm.request_preempt()
 say(sm.execute(), sm.preempt_requested())
 
-# Starting elsewhere.
+# Start at another state.
 sm = machine(["done", "preempted"])
 with sm:
     smach.StateMachine.add("A", Step("a", "done"))

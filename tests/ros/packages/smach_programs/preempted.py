@@ -1,4 +1,4 @@
-"""A machine that ends with its node: in the thread that shuts down, or (with an argument) in another one."""
+"""A state machine that stops with its node: in the thread that shuts down, or (with an argument) in another one."""
 
 import sys
 import threading

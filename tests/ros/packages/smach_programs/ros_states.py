@@ -1,4 +1,4 @@
-"""What the states and servers of smach_ros do. It runs under the real package, too; ros_states.txt is what that prints."""
+"""States and servers of smach_ros. Runs under the real package, too; its output is ros_states.txt."""
 
 import re
 import threading
@@ -47,7 +47,7 @@ smach.set_loggers(logger("info"), logger("warn"), lambda text: None, logger("err
 
 
 def run(state, **values):
-    """Return the outcome of a state in a machine, and the userdata."""
+    """Run a state in a state machine; return its outcome, and the userdata."""
     sm = smach.StateMachine(state.get_registered_outcomes())
     for key, value in values.items():
         sm.userdata[key] = value
@@ -252,7 +252,7 @@ works = threading.Event()
 
 def work(ud):
     say("goal", ud.action_goal.order, ud.order)
-    # The client must know its goal before the result comes.
+    # The client must know its goal before the result arrives.
     while client.gh is None:
         threading.Event().wait(0.01)
     if ud.order > 50:
@@ -294,13 +294,13 @@ for order in (5, -1, -9):
     say("wrapped", order, state, client.get_result().sequence)
 client.send_goal(FibonacciGoal(70))
 works.wait(30)
-# A goal that is canceled before it is acknowledged is lost to a list of statuses that was sent before it came.
+# A goal that is canceled before it is acknowledged is lost if a list of statuses was sent before the goal arrived.
 while client.get_state() != GoalStatus.ACTIVE:
     pause.wait(0.01)
 client.cancel_goal()
 say("wrapped", client.wait_for_result(rospy.Duration(20)), client.get_state(), client.get_result().sequence)
 
-# Introspection: what is published, and a container that is started elsewhere.
+# Introspection: the published messages, and a container that is started at another state.
 inner = smach.Concurrence(["both"], "both", outcome_map={"both": {"L": "ok"}})
 with inner:
     smach.Concurrence.add("L", smach.CBState(lambda ud: "ok", outcomes=["ok"]))
@@ -333,7 +333,7 @@ viewed.start()
 
 def wait_for(*keys):
     for _ in range(1000):
-        # Whole words: "/SM_ROOT" is not "/SM_ROOT/INNER".
+        # Compare whole words: "/SM_ROOT" is not "/SM_ROOT/INNER".
         if all(any(f"{each} ".startswith(f"{key} ") for each in found) for key in keys):
             return True
         pause.wait(0.02)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A test that is a node: it subscribes to the talker, and reads what rostest.py reports of it."""
+"""A test that is a node: it subscribes to the talker, and reads rostest.py's report of it."""
 
 import unittest
 

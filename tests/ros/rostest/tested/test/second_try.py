@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Passes from the second time on: it leaves a note in ROS_HOME."""
+"""Passes from the second run on: it creates a file in ROS_HOME."""
 
 import os
 import unittest
