@@ -47,7 +47,7 @@ export function stampOf(seconds) {
 }
 
 /**
- * Return the share that a feedback names, from 0 to 1, by a field such as percent_complete; null where there is none.
+ * Return the share that a feedback names, from 0 to 1, by a field such as percent_complete; null if there is none.
  */
 export function progressOf(feedback) {
   for (const [name, value] of Object.entries(feedback ?? {})) {

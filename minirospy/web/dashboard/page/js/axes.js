@@ -16,16 +16,16 @@ function numbered(text) {
   return found && Number(found[1]) <= MAX_AXES ? [Number(found[1]), found[2]] : null;
 }
 
-/** Return a limit of a range: a number, or null where it follows the values. */
+/** Return a limit of a range: a number, or null if it follows the values. */
 const limitOf = (text) => (text.trim() && Number.isFinite(Number(text)) ? Number(text) : null);
 
 export class Axes {
-  /** ``words`` are those of the address; ``changed`` is called with true where the chart is to be built again. */
+  /** ``words`` are those of the address; ``changed`` is called with true if the chart is to be built again. */
   constructor(words, changed) {
     this.changed = changed;
     const all = (name) => words.getAll(name).map(numbered).filter(Boolean);
     this.labels = new Map(all("label")); // axis -> text
-    this.ranges = new Map(); // axis -> [low, high], null where it follows the values
+    this.ranges = new Map(); // axis -> [low, high], null if it follows the values
     for (const [axis, text] of all("range")) this.setRange(axis, ...text.split(" ", 2).map(limitOf));
     // label of a series -> axis, but the first
     this.chosen = new Map(all("axis").map(([axis, label]) => [label, axis]));

@@ -8,7 +8,7 @@ export const KINDS = [
 ];
 
 /**
- * Return what computes a kind of KINDS, {append(times, values, stamps)}: the values of new points, NaN where there is
+ * Return what computes a kind of KINDS, {append(times, values, stamps)}: the values of new points, NaN if there is
  * none yet; null for "".
  */
 export function derivedOf(kind) {
@@ -29,7 +29,7 @@ class Derivative {
     const found = new Float64Array(moments.length);
     for (let index = 0; index < moments.length; index++) {
       const span = moments[index] - this.time;
-      // Messages of the same time have no slope between them. Stamps go back where a bag starts again.
+      // Messages of the same time have no slope between them. Stamps go back if a bag starts again.
       found[index] = span > 0 ? (values[index] - this.value) / span : NaN;
       if (span !== 0) [this.time, this.value] = [moments[index], values[index]];
     }

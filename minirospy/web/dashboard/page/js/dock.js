@@ -6,7 +6,7 @@ import { sideAt } from "./layout.js";
 import { t } from "./texts.js";
 
 const DRAG_PIXELS = 6; // less is a click
-const EDGE_PIXELS = 18; // of the whole layout, where a pane is docked beside all others
+const EDGE_PIXELS = 18; // of the whole layout, if a pane is docked beside all others
 const LEAST_REM = 14; // height of a pane, so that it shows something: with many of them the page scrolls
 const ICONS = {
   right: "M2 3h12v10H2zM8 3v10",

@@ -57,7 +57,7 @@ let press = null; // {element, x, y} of the last one, until its click
 
 export const SLOP = 5; // pixels that a pointer may move in a click
 
-/** Draw the contents of an element again for new data; where something in it is pressed, after its release. */
+/** Draw the contents of an element again for new data; if something in it is pressed, after its release. */
 export function redraw(element, draw) {
   if (pressed && element.contains(pressed)) {
     waiting.set(element, draw);
@@ -123,7 +123,7 @@ export function watchPresses(window) {
 }
 
 /**
- * Give a click to what was pressed: where that has moved away since, what is around it and the place of the release has
+ * Give a click to what was pressed: if that has moved away since, what is around it and the place of the release has
  * got it.
  */
 function resend(event) {
@@ -158,12 +158,12 @@ function resend(event) {
 
 let uniqueIds = 0;
 
-/** Return an id that no element has: the name itself where it is free, as a layout may show a view twice. */
+/** Return an id that no element has: the name itself if it is free, as a layout may show a view twice. */
 export function uniqueId(name) {
   return document.getElementById(name) ? `${name}-${++uniqueIds}` : name;
 }
 
-/** Set an element's text where it differs. */
+/** Set an element's text if it differs. */
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }

@@ -1,4 +1,4 @@
-// Driving through the server's own endpoint: it publishes what is held, and zero where this page lets go, is lost, or
+// Driving through the server's own endpoint: it publishes what is held, and zero if this page lets go, is lost, or
 // is silent for half a second.
 
 const AGAIN_MS = 500;

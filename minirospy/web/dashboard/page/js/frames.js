@@ -48,14 +48,14 @@ export class Frames {
     return this.names().filter((name) => !this.frames.has(name));
   }
 
-  /** Return what is known of a frame at a time: {hz, age}, hz null where it is not known; static ones have neither. */
+  /** Return what is known of a frame at a time: {hz, age}, hz null if it is not known; static ones have neither. */
   measured(name, now) {
     const frame = this.frames.get(name);
     if (!frame || frame.isStatic) return { hz: null, age: null };
     return { hz: frame.rate.at(now)?.hz ?? null, age: now - frame.at };
   }
 
-  /** Return what is wrong with a frame and what to do, "" where nothing is. */
+  /** Return what is wrong with a frame and what to do, "" if nothing is. */
   problem(name, now) {
     const frame = this.frames.get(name);
     if (!frame) return "";

@@ -11,7 +11,7 @@ const pressed = (button) => (button?.pressed ? 1 : 0);
 /** Return {axes, buttons} of a gamepad. */
 export function joyOf({ mapping, axes, buttons }) {
   if (mapping !== "standard") return { axes: axes.map(axis), buttons: buttons.map(pressed) };
-  // A trigger is 1 where it is released and -1 where it is pulled, as the driver of Linux has it.
+  // A trigger is 1 if it is released and -1 if it is pulled, as the driver of Linux has it.
   const trigger = (button) => 1 - 2 * (button?.value ?? 0);
   const pair = (plus, minus) => pressed(buttons[plus]) - pressed(buttons[minus]);
   return {

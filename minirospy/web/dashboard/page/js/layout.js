@@ -85,7 +85,7 @@ export class Layout {
   }
 
   /**
-   * Add a view at a side of a pane, or of the whole layout where that is null; return its pane, null where there are
+   * Add a view at a side of a pane, or of the whole layout if that is null; return its pane, null if there are
    * too many.
    */
   add(view, words, side = "right", target = null) {

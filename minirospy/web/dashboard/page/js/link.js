@@ -14,7 +14,7 @@ export class Link extends EventTarget {
     this.services = new Map(); // name -> {name, type, request}
     this.graph = { published: new Map(), subscribed: new Map(), services: new Map() };
     this.parameters = new Map();
-    this.parameterTypes = new Map(); // "float64" and "float64_array" where the numbers are doubles
+    this.parameterTypes = new Map(); // "float64" and "float64_array" if the numbers are doubles
     this.time = null; // seconds of /clock, where time is simulated
     this.token = token;
     this.entries = new Map();
@@ -175,7 +175,7 @@ export class Link extends EventTarget {
     this.worker.postMessage({ command: "setParameter", name, value });
   }
 
-  /** Return the description of a type, null where its text cannot be parsed. */
+  /** Return the description of a type, null if its text cannot be parsed. */
   definition(type, text) {
     const key = `${type}\n${text}`;
     if (!this.definitions.has(key)) {

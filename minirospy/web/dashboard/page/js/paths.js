@@ -18,7 +18,7 @@ const TESTS = {
   ">=": (one, other) => one >= other,
 };
 
-/** Return the topic of a path among those that are known, the longest that fits; null where none does. */
+/** Return the topic of a path among those that are known, the longest that fits; null if none does. */
 export function topicOf(path, topics) {
   let found = null;
   for (const topic of topics) {
@@ -101,7 +101,7 @@ export function select(value, steps, found, label = "", depth = 0) {
   }
 }
 
-/** Return a value as a number, null where it is none. */
+/** Return a value as a number, null if it is none. */
 export function numberOf(value) {
   if (typeof value === "number") return value;
   if (typeof value === "boolean") return value ? 1 : 0;

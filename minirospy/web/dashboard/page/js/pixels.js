@@ -5,7 +5,7 @@ const BAYER = { rggb: [0, 1, 1, 2], bggr: [2, 1, 1, 0], gbrg: [1, 2, 0, 1], grbg
 /**
  * Return {width, height, rgba, range, at(x, y) -> text} of a message; range: [low, high] of what is no color.
  * Throws Error.
- * Numbers such as depths are black to white from `low` to `high`; where one is null, from the lowest or to the
+ * Numbers such as depths are black to white from `low` to `high`; if one is null, from the lowest or to the
  * highest. */
 export function pixelsOf({ width, height, encoding, is_bigendian: isBig, step, data }, low = null, high = null) {
   const kind = kindOf(encoding);

@@ -86,7 +86,7 @@ function string(reader, [start, quote]) {
   return found;
 }
 
-/** Return the constants of an enum, [{name, value, description}]; none where the text is not one. */
+/** Return the constants of an enum, [{name, value, description}]; none if the text is not one. */
 export function constantsOf(editMethod) {
   if (!editMethod) return [];
   try {
@@ -176,7 +176,7 @@ export function converted({ name, type, constants }, given) {
   return number;
 }
 
-/** Return the step of a parameter's slider, null where its limits are none that a slider can show. */
+/** Return the step of a parameter's slider, null if its limits are none that a slider can show. */
 export function sliderStep({ type, min, max }) {
   if (!Number.isFinite(min) || !Number.isFinite(max) || min >= max) return null;
   if (type === "int") return min <= -INT_LIMIT && max >= INT_LIMIT ? null : 1;

@@ -308,7 +308,7 @@ export function encode(definition, value) {
 
 const INTEGER = /^(u?)int(\d+)$/;
 
-/** Throw MessageError where a number is not one of a type: what does not fit would become another number. */
+/** Throw MessageError if a number is not one of a type: what does not fit would become another number. */
 function checkNumber(name, type, value) {
   const text = String(value);
   const integer = INTEGER.exec({ byte: "int8", char: "uint8" }[type] ?? type);

@@ -12,7 +12,7 @@ export function roots(structures) {
   return [...structures.keys()].filter((path) => !inside.has(path)).sort();
 }
 
-/** Return the active states of a status; smach publishes "None" where a container has ended. */
+/** Return the active states of a status; smach publishes "None" if a container has ended. */
 export function activeOf({ active_states: names }) {
   return names.filter((name) => name !== "None" && name !== "");
 }
@@ -34,7 +34,7 @@ export function activeStates(structures, statuses) {
 
 /**
  * Return {path, width, height, states, outcomes, edges} of a container; states have x, y (centers), width, height, and
- * `inner` where they are containers that are open.
+ * `inner` if they are containers that are open.
  */
 export function layoutContainer(
   path,

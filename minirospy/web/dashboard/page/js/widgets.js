@@ -26,7 +26,7 @@ export const TYPES = {
   "std_msgs/Empty": "",
 };
 
-/** Return the settings of a panel's text, with the usual ones; null where it has no kind or no path. */
+/** Return the settings of a panel's text, with the usual ones; null if it has no kind or no path. */
 export function parsePanel(text) {
   const words = new URLSearchParams(text);
   const kind = words.get("kind");
@@ -51,7 +51,7 @@ export function panelText({ kind, path, label, isService, ...settings }) {
   ]).toString();
 }
 
-/** Return the value that steps lead to; of a message with one field that field's. undefined where there is none. */
+/** Return the value that steps lead to; of a message with one field that field's. undefined if there is none. */
 export function valueAt(message, steps) {
   let value = message;
   for (const step of steps) {
@@ -103,7 +103,7 @@ export function messageWith(definition, steps, text) {
 
 const namesOf = (definition) => definition.fields.map((field) => field.name).join(", ");
 
-/** Return whether a value is that of a text: as a number where it is one. */
+/** Return whether a value is that of a text: as a number if it is one. */
 export function isSame(value, text) {
   const number = numberOf(value);
   if (number === null) return String(value) === text;
@@ -122,7 +122,7 @@ function valueOf(type, text) {
 }
 
 /**
- * Return the path split at a topic or service that is known: [name, steps]; null where none fits. Throws Error on a bad
+ * Return the path split at a topic or service that is known: [name, steps]; null if none fits. Throws Error on a bad
  * path.
  */
 export function splitPath(path, names) {

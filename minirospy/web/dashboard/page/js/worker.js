@@ -1,5 +1,5 @@
 // The worker: the WebSocket of the bridge, and the decoding of messages. The page sends it commands and gets batches.
-// Nothing waits here without a bound: where the page is slow, a topic's older messages give way to newer ones.
+// Nothing waits here without a bound: if the page is slow, a topic's older messages give way to newer ones.
 // Protocol: https://github.com/foxglove/ws-protocol (docs/spec.md); its schemas are the texts of the definitions.
 
 import { TextError, decode, encode, parseDefinition } from "./ros1.js";

@@ -1,6 +1,6 @@
 // Colors as RViz has them: "255; 85; 0" in its files, the rainbow of intensities, the palettes of maps. Pure.
 
-/** Return [r, g, b] from 0 to 255 of "r; g; b"; white where it is none. */
+/** Return [r, g, b] from 0 to 255 of "r; g; b"; white if it is none. */
 export function rgbOf(text) {
   const found = String(text ?? "")
     .split(";")

@@ -95,7 +95,7 @@ export class Config {
     return found;
   }
 
-  /** Return the names and classes of what cannot be shown: displays, and the view where it is of another kind. */
+  /** Return the names and classes of what cannot be shown: displays, and the view if it is of another kind. */
   unknown() {
     const found = this.displays()
       .filter(({ settings }) => !CLASSES[classOf(settings)] && classOf(settings) !== "Group")

@@ -51,7 +51,7 @@ export class Context {
     this.lastTime = time;
   }
 
-  /** Return the time in ROS's form: that of /clock where it is simulated. */
+  /** Return the time in ROS's form: that of /clock if it is simulated. */
   stamp() {
     const seconds = this.link.time ?? Date.now() / 1000;
     const secs = Math.floor(seconds);
@@ -87,7 +87,7 @@ export class Context {
 
   // --- placing
 
-  /** Return the newest transform from a frame to the fixed frame, null where there is none. */
+  /** Return the newest transform from a frame to the fixed frame, null if there is none. */
   transformNow(frame) {
     if (plainName(frame) === this.fixedFrame) return IDENTITY;
     try {
@@ -97,7 +97,7 @@ export class Context {
     }
   }
 
-  /** Put an item where its frame was at its time, or is; hide it and set its error where there is no transform. */
+  /** Put an item where its frame was at its time, or is; hide it and set its error if there is no transform. */
   place(item) {
     if (item.settled === this.fixedVersion && !item.isLocked) return;
     let found = IDENTITY;
@@ -151,7 +151,7 @@ export class Context {
     this.isFresh = true;
   }
 
-  /** Update the displays where something may have changed. */
+  /** Update the displays if something may have changed. */
   tick(displays) {
     const now = performance.now();
     if (!this.isFresh && this.frames.version === this.seen && now - this.lastLook < LOOK_MS) return;

@@ -14,7 +14,7 @@ const STILL = 8; // pixels
 export class Grips {
   constructor(view, hint) {
     this.view = view;
-    this.hint = hint; // where there is no control
+    this.hint = hint; // if there is no control
     this.menu = new Menu(view.frame);
     this.held = null; // {control, button, at: [x, y], point, drag, isChanged, reported, timer}
     this.over = null; // the control under the mouse
@@ -206,7 +206,7 @@ export class Grips {
     if (!control.shown.isClosed) control.shown.display.report(control, event, more);
   }
 
-  /** Report the pose while a control is held: where it has changed, and now and then where it has not. */
+  /** Report the pose while a control is held: if it has changed, and now and then if it has not. */
   reportPose() {
     const { held } = this;
     const now = performance.now();

@@ -189,7 +189,7 @@ const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a
 const plus = (a, b, factor = 1) => a.map((part, index) => part + b[index] * factor);
 const minus = (a, b) => plus(a, b, -1);
 
-/** Return how far along a line (a point, a unit direction) it is closest to a ray, null where they are parallel. */
+/** Return how far along a line (a point, a unit direction) it is closest to a ray, null if they are parallel. */
 function along(start, direction, ray) {
   const slope = dot(direction, ray.direction);
   const square = 1 - slope * slope;
@@ -198,7 +198,7 @@ function along(start, direction, ray) {
   return (dot(between, direction) - dot(between, ray.direction) * slope) / square;
 }
 
-/** Return where a ray meets the plane through a point, null where it does not. */
+/** Return where a ray meets the plane through a point, null if it does not. */
 function onPlane(through, normal, { origin, direction }) {
   const slope = dot(direction, normal);
   if (Math.abs(slope) < 0.02) return null;
@@ -229,7 +229,7 @@ export class Drag {
 
   /**
    * Take over where the mouse is; `by` is {right, up, forward, metres (of a pixel), dx, dy, isFar, isTurn}. Return the
-   * marker's pose, null where it stays.
+   * marker's pose, null if it stays.
    */
   move(ray, by) {
     const found = MOVES[this.mode]?.(this, ray, by) ?? null;

@@ -77,7 +77,7 @@ export class MarkerUpdates {
       : [{ server: known.id, isAll: false, markers: message.markers, poses: message.poses, erases: message.erases }];
   }
 
-  /** Start from all markers, where the updates that came before and after join them without a gap. */
+  /** Start from all markers, if the updates that came before and after join them without a gap. */
   settle(known) {
     const { full, waiting } = known;
     if (!full || !waiting.length || waiting.at(-1).seq_num < full.seq_num) return [];

@@ -207,7 +207,7 @@ export class Stage {
     return true;
   }
 
-  /** Draw fewer pixels where pictures take long, then fewer points; and again more pixels where they do not. */
+  /** Draw fewer pixels where pictures take long, then fewer points; and again more pixels if they do not. */
   adapt() {
     if (this.milliseconds > SLOW_MS) this.coarser += 1;
     else if (this.milliseconds < FAST_MS) this.coarser -= 0.25;

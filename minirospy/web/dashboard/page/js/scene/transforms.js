@@ -181,7 +181,7 @@ export class Frames {
     return this.edges.get(frame)?.parent ?? null;
   }
 
-  /** Return the frame at the top of this one's tree. Throws FrameError where the tree has a loop. */
+  /** Return the frame at the top of this one's tree. Throws FrameError if the tree has a loop. */
   root(frame) {
     return this.chain(frame).at(-1);
   }

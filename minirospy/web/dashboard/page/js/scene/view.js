@@ -205,7 +205,7 @@ export class SceneView {
     this.saving = setTimeout(() => this.save(), 500);
   }
 
-  /** Show another configuration. Throws Error where it is none. */
+  /** Show another configuration. Throws Error if it is none. */
   open(raw) {
     this.config = new Config(raw);
     this.state = { config: this.config, isAutomatic: false, isOpened: true };
@@ -245,7 +245,7 @@ export class SceneView {
     this.panel.fill();
   }
 
-  /** Add displays of topics that are new, where that is wished. */
+  /** Add displays of topics that are new, if that is wished. */
   addNew() {
     if (!this.state.isAutomatic) return;
     const shown = this.config.displays();

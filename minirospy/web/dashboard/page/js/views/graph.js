@@ -190,7 +190,7 @@ export class Graph {
 
   draw(found) {
     const layouts = [this.lay(found, "LR")];
-    // A chain of nodes is easier to read from top to bottom where the view is not as wide as it.
+    // A chain of nodes is easier to read from top to bottom if the view is not as wide as it.
     if (found.nodes.size + found.topics.size < MAX_TRIED) layouts.push(this.lay(found, "TB"));
     const [{ width, height, boxes, edges }] = layouts.sort((one, other) => this.fitOf(other) - this.fitOf(one));
     const groups = [...boxes].filter(([key]) => key[0] === "g").map(([key, box]) => this.makeGroup(key.slice(1), box));

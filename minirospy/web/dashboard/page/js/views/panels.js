@@ -351,7 +351,7 @@ class Panel {
     return null;
   }
 
-  /** Show a line below the panel, in red where something is wrong. */
+  /** Show a line below the panel, in red if something is wrong. */
   say(text, isWrong = false) {
     this.note.classList.toggle("error", isWrong);
     setText(this.note, text);

@@ -178,7 +178,7 @@ export class Parameters {
   }
 }
 
-/** Return a value as text of which the server reads the same value; the type says where numbers are doubles. */
+/** Return a value as text of which the server reads the same value; the type says which numbers are doubles. */
 export function textOf(value, type) {
   if (type === "float64_array") return `[${value.map((each) => textOf(each, "float64")).join(",")}]`;
   if (type === "float64" && Number.isInteger(value) && Math.abs(value) < 1e21) return `${value}.0`;

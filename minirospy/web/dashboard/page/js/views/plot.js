@@ -46,15 +46,15 @@ export class Plot {
     this.pausedAt = null;
     this.chart = null;
     this.isDirty = true;
-    this.ranges = new Map(); // scale -> range of its values, where one series is over another
+    this.ranges = new Map(); // scale -> range of its values, if one series is over another
     this.axes = new Axes(words, (isBuilt) => {
       if (isBuilt) this.rebuild();
       this.isDirty = true;
       clearTimeout(this.unsaved);
       this.unsaved = setTimeout(() => this.remember(), QUIET_MS);
     });
-    this.over = words.get("x") ?? ""; // label of the series on the x axis; time where it is empty
-    // label -> kind, where it is not as it comes
+    this.over = words.get("x") ?? ""; // label of the series on the x axis; time if it is empty
+    // label -> kind, if it is not as it comes
     this.kinds = new Map(words.getAll("show").map((each) => each.split(" ", 2).reverse()));
 
     this.known = h("datalist", { id: uniqueId("paths") });

@@ -133,7 +133,7 @@ export class Publish {
   }
 
   /**
-   * Make the form of a topic that nobody publishes, of this type; where it is empty, of the one that subscribers have.
+   * Make the form of a topic that nobody publishes, of this type; if it is empty, of the one that subscribers have.
    */
   async describe(type) {
     const { topic } = this;

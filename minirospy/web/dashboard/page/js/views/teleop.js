@@ -1,6 +1,6 @@
 // Driving: a stick on the screen, keys, a gamepad -> geometry_msgs/Twist, and a gamepad -> sensor_msgs/Joy. The server
 // publishes them,
-// and zero where nothing is held any more, or the page is lost.
+// and zero if nothing is held any more, or the page is lost.
 
 import { fill, h, setText, svg, uniqueId } from "../dom.js";
 import { Drive } from "../drive.js";

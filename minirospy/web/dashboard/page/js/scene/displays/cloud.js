@@ -99,7 +99,7 @@ export class Cloud extends TopicDisplay {
     return { size: this.number("Size (m)", 0.01), grows: false };
   }
 
-  /** Return the settings with a transformer, where none is set that which suits the message's fields. */
+  /** Return the settings with a transformer, if none is set that which suits the message's fields. */
   colored(message) {
     const names = this.namesOf(message);
     if (!this.get("Color Transformer")) this.settings["Color Transformer"] = suitableTransformer(names);

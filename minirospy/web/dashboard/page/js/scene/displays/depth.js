@@ -1,4 +1,4 @@
-// A depth image as points, in the colors of another image where one is set.
+// A depth image as points, in the colors of another image if one is set.
 
 import { pixelsOf } from "../../pixels.js";
 import { lensOf, pointsOfDepth } from "../depth.js";

@@ -111,7 +111,7 @@ export class Display {
 
 /** A display of one topic; `received(message)` shows a message. */
 export class TopicDisplay extends Display {
-  /** How messages come: "latest" where only the newest counts, "all" where each does. */
+  /** How messages come: "latest" if only the newest counts, "all" if each does. */
   get mode() {
     return "latest";
   }

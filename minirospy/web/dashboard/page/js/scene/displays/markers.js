@@ -146,7 +146,7 @@ export class Markers extends TopicDisplay {
     for (const { item, label, space } of this.markers.values()) {
       const isShown = this.isShown(space);
       item.object.visible &&= isShown;
-      // Shown again where its frame still has a transform.
+      // Shown again if its frame still has a transform.
       if (isShown && !item.object.visible && !item.error) item.object.visible = true;
       if (label) label.isShown = item.object.visible;
     }
@@ -228,7 +228,7 @@ function makeLines(isStrip) {
   };
 }
 
-/** Return the colors of a marker's points as bytes, null where it has none for each. */
+/** Return the colors of a marker's points as bytes, null if it has none for each. */
 const ownColors = ({ points, colors }) =>
   colors.length === points.length && colors.length
     ? Uint8Array.from(colors.flatMap(({ r, g, b }) => [r, g, b].map((part) => Math.min(Math.max(part, 0), 1) * 255)))

@@ -38,7 +38,7 @@ export class RobotModel extends Display {
     this.context.received(this);
   }
 
-  /** Read the description's parameter, where it has changed. */
+  /** Read the description's parameter, if it has changed. */
   read() {
     const name = String(this.get("Robot Description") || "robot_description");
     const key = name.startsWith("/") ? name : `/${name}`;
