@@ -1,7 +1,7 @@
 """catkin_find, catkin_find_pkg and catkin_topological_order: find catkin's folders, files and packages.
 
-Source: http://docs.ros.org/api/catkin/html. The output is that of catkin; packages without dependencies on each other are
-sorted by name.
+Source: http://docs.ros.org/api/catkin/html. The output is identical to catkin's; packages that do not depend on each other
+are sorted by name.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _WITH_PROJECT = ("etc", "include", "libexec", "share")
 
 
 def catkin_find(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command."""
+    """Run the command; return an exit status as defined in minirospy.command.command."""
     return FIND.main(argv)
 
 
@@ -53,7 +53,7 @@ def catkin_find_pkg(argv: Sequence[str] | None = None) -> int:
 
 
 def catkin_topological_order(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command."""
+    """Run the command; return an exit status as defined in minirospy.command.command."""
     return TOPOLOGICAL_ORDER.main(argv)
 
 
