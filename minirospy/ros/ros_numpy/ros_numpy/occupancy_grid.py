@@ -24,7 +24,7 @@ def occupancygrid_to_numpy(msg: OccupancyGrid) -> np.ma.MaskedArray[tuple[int, i
 
 @converts_from_numpy(OccupancyGrid)
 def numpy_to_occupancy_grid(arr: Array, info: MapMetaData | None = None) -> OccupancyGrid:
-    """Return an int8 array as a map; masked cells become unknown. Raise TypeError."""
+    """Return an int8 array as a map; masked cells become unknown. Raise TypeError if the array is not 2D or not int8."""
     if arr.ndim != 2:
         raise TypeError("Array must be 2D")
     if arr.dtype != np.int8:
