@@ -21,8 +21,7 @@ _FF_GAIN = 0x60
 _MAX_MAGNITUDE = 0xFFFF
 _MILLISECONDS = 1000  # milliseconds that an effect lasts; joy_node restarts an effect before it ends
 
-# Fields: type, ID, direction, trigger (2), replay (length, delay); the union with the two magnitudes starts at byte
-# 16.
+# Fields: type, ID, direction, trigger (2), replay (length, delay); at byte 16, the union with the two magnitudes.
 _EFFECT = struct.Struct("=HhHHHHHxxHH")
 _EFFECT_SIZE = 48 if struct.calcsize("P") == 8 else 44
 _EVIOCSFF = 0x40004580 | _EFFECT_SIZE << 16

@@ -183,8 +183,7 @@ class CommStateMachine:
             elif self.state == CommState.LOST:
                 rospy.logerr("In a funny state: %i", self.state)
             else:
-                # The matching status list may arrive later or never: first make the transitions that the list would
-                # cause.
+                # The matching status list may arrive later or never: first make its transitions.
                 self._follow(action_result.status.status)
                 self.transition_to(_DONE)
 

@@ -166,7 +166,7 @@ class SimpleActionServer:
                         self.preempt_callback()
                 if self.goal_callback:
                     self.goal_callback()
-            except BaseException as error:  # noqa: BLE001 - the user's function: the goal has come all the same
+            except BaseException as error:  # noqa: BLE001 - user code failed, but the goal has arrived
                 rospy.logerr("SimpleActionServer.internal_goal_callback - exception %s", error)
 
             self.execute_condition.notify_all()
@@ -204,7 +204,7 @@ class SimpleActionServer:
         assert self.execute_callback
         try:
             self.execute_callback(goal)
-        except BaseException as error:  # noqa: BLE001 - the user's function: the goals after this one are to be served
+        except BaseException as error:  # noqa: BLE001 - user code failed; serve the next goals
             # During a shutdown exceptions are expected: Ctrl-C interrupts sleeps, and a hook may have closed the
             # callback's resources.
             if not rospy.is_shutdown_requested():

@@ -36,7 +36,7 @@ class Rotation:
                 "a Rotation is made of nothing, of nine numbers, of three Vectors, or of another Rotation"
             )
 
-    # --- made of angles
+    # --- created from angles
 
     @staticmethod
     def Identity() -> Rotation:
@@ -105,7 +105,7 @@ class Rotation:
             2 * x * z - 2 * w * y, 2 * y * z + 2 * w * x, ww - xx - yy + zz,
         )  # fmt: skip
 
-    # --- taken apart
+    # --- returned as angles and axes
 
     def GetRPY(self) -> tuple[float, float, float]:
         """Return roll, pitch and yaw."""
@@ -180,7 +180,7 @@ class Rotation:
         """Get or set the z axis, the third column."""
         return self._column(2, value)
 
-    # --- changed
+    # --- modified and inverted
 
     def DoRotX(self, angle: float) -> None:
         """Rotate about the local x axis."""

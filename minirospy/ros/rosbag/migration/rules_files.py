@@ -265,7 +265,7 @@ class MessageMigrator:
         scope: dict[str, object] = {"MessageUpdateRule": MessageUpdateRule}
         try:
             exec(compile(path.read_text(encoding="utf-8"), name, "exec"), scope)
-        except Exception as error:  # noqa: BLE001 the program of a user: what it raises concerns this file alone
+        except Exception as error:  # noqa: BLE001 - a user's program: its error affects only this file
             print(f"Cannot load rule file [{name}] in local package: {error}", file=sys.stderr)
             return
         for each, value in list(scope.items()):

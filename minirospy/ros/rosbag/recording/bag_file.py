@@ -109,7 +109,7 @@ class BagFile:
             self._writer.write(number, time, body, tail)
         except BagFormatError:
             raise
-        except Exception as error:  # noqa: BLE001 - whatever ended a compression
+        except Exception as error:  # noqa: BLE001 - a compression may fail with any exception
             self._give_up(error)
 
     def write_ready(self) -> None:
@@ -145,7 +145,7 @@ class BagFile:
             self._writer.close()
             self._stream.close_file()
             private_files.replace_file(self._active, self._path)
-        except Exception as error:  # noqa: BLE001 - also of a chunk's compression: MemoryError, for example
+        except Exception as error:  # noqa: BLE001 - compressing a chunk may fail too, e.g. with MemoryError
             self._salvage(error)
 
     def _give_up(self, error: Exception) -> None:

@@ -57,7 +57,7 @@ class DiskThread:
             function, size = item
             try:
                 function()
-            except Exception as error:  # noqa: BLE001 - the files behind the call have to be completed
+            except Exception as error:  # noqa: BLE001 - later calls must still complete their files
                 self._on_error(error)
             self._done += size
 
@@ -77,8 +77,7 @@ class QueuedFile:
         self._on_error = on_error
         self._position = 0
         self.failed = False
-        # The name contains the time, so an attacker can guess it: open_file does not follow a symbolic link created
-        # there.
+        # The name contains the time, so an attacker can guess it: open_file follows no symbolic link.
         opened = open_file(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         self._file = os.fdopen(opened, "r+b", buffering=0)
 
@@ -136,7 +135,7 @@ class QueuedFile:
             return
         try:
             call()
-        except Exception as error:  # noqa: BLE001 - reported, and the next file is written
+        except Exception as error:  # noqa: BLE001 - reported; the next file is still written
             self.failed = True
             self._on_error(error)
 

@@ -93,8 +93,7 @@ class Recorder:
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
         self._disk = DiskThread(self._disk_thread_failed)
         self._splits = Splits(self.options, self._clock())
-        # Complete the file in a thread, which Ctrl-C does not interrupt. The process waits for the thread before it
-        # exits.
+        # Complete the file in a thread: Ctrl-C does not interrupt it, and the process exits only after it.
         finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
         finisher.start()
         is_interrupted = False
@@ -111,7 +110,7 @@ class Recorder:
             self._wait_until_complete(is_interrupted)
         return self.status
 
-    # --- the main thread
+    # --- called in the main thread
 
     def _wait_for_time(self) -> bool:
         """Wait until ROS time is valid; return False at shutdown."""
@@ -234,8 +233,7 @@ class Recorder:
         # Do not join() the thread: on Python 3.10 and 3.11 an interrupted join() marks the thread as finished.
         while not self._finished.is_set():
             try:
-                # Calling is_shutdown() marks this wait as the thread's clean-up, so that the shutdown does not
-                # interrupt it.
+                # Calling is_shutdown() marks this wait as clean-up, which the shutdown does not interrupt.
                 client.is_shutdown()
                 if is_interrupted or time.monotonic() > patience:
                     is_interrupted, patience = False, math.inf
@@ -244,7 +242,7 @@ class Recorder:
             except KeyboardInterrupt:
                 is_interrupted = True
 
-    # --- the finisher's thread
+    # --- called in the finisher thread
 
     def _finish(self) -> None:
         """Wait for the recording to stop, and complete the file."""
@@ -265,7 +263,7 @@ class Recorder:
         if self.dropped:
             client.logwarn("The bag lacks messages that were dropped: %s", _counts(self.dropped))
 
-    # --- with the lock
+    # --- called with the lock held
 
     def _open(self, now: int) -> None:
         if self._is_complete:
@@ -284,8 +282,7 @@ class Recorder:
             return
 
         client.loginfo("Recording to '%s'.", name)
-        # Stamp latched messages with the time of this file's first message, because they are written before that
-        # message.
+        # Stamp latched messages with the time of this file's first message, because they are written first.
         for (topic, _), (header, body, tail) in self._latched.items():
             self._file.write(topic, header, now, body, tail)
         if self._announcement:
@@ -316,7 +313,7 @@ class Recorder:
                 self._disk.submit(partial(_remove, surplus))
             self._open(now)
 
-    # --- the workers that receive
+    # --- called in the workers that receive messages
 
     def _receive(self, message: ReceivedFrame, topic: _Topic) -> None:
         now = self._clock()
@@ -348,7 +345,7 @@ class Recorder:
                 self.dropped[topic.name] += 1
                 client.logerr("%s", error)
 
-    # --- the disk's thread
+    # --- called in the disk thread
 
     def _disk_thread_failed(self, error: Exception) -> None:
         client.logerr("Error writing: %s. Recording ends", _reason(error))

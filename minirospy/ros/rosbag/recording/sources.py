@@ -155,7 +155,7 @@ class ReadAhead:
                         return
             self._put(batch)
             self._put(None)
-        except Exception as error:  # noqa: BLE001 - raised again in the reading thread
+        except Exception as error:  # noqa: BLE001 - re-raised by __iter__
             self._put(batch)
             self._put(error)
 

@@ -142,8 +142,7 @@ def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> 
 def become(command: list[str]) -> int:
     """Replace this process by the program, which then receives its signals and determines its exit status."""
     if sys.platform == "win32":
-        # On Windows, exec detaches the program from the console: wait for the program instead, and leave Ctrl-C to
-        # it.
+        # On Windows, exec detaches the program from the console: wait for it instead, and leave Ctrl-C to it.
         try:
             with guard_children(), subprocess.Popen(command) as popen:
                 while True:

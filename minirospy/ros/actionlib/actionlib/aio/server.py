@@ -246,7 +246,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             if returned is not None:
                 result = to_response(self._types.result, returned)
                 result.serialize(BytesIO())
-        except Exception as error:  # noqa: BLE001 - the edge to user code: any exception
+        except Exception as error:  # noqa: BLE001 - user code may raise any exception
             event, result, goal.text = GoalEvent.ABORT, None, f"the result does not fit: {error}"
             self._node.log.error("the result of your execute callback does not fit: %s", error)
 
