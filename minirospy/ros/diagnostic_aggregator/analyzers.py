@@ -35,7 +35,7 @@ class Log(Protocol):
 
 @dataclass
 class Item:
-    """A received status, and when it was received."""
+    """A received status, and the time at which it was received."""
 
     name: str
     time: float
@@ -56,7 +56,7 @@ class Item:
         return cls(status.name, now, level, status.message, status.hardware_id, list(status.values))
 
     def status(self, path: str, is_stale: bool) -> DiagnosticStatus:
-        """Return the status for the tree, named with its path."""
+        """Return the status for the tree; its name is the path."""
         return DiagnosticStatus(
             level=STALE if is_stale else self.level,
             name=f"{path.rstrip('/')}/{_shown(self.name)}",
@@ -67,7 +67,7 @@ class Item:
 
 
 class Analyzer(Protocol):
-    """A node of the tree."""
+    """A node in the analyzer tree."""
 
     path: str
     name: str
@@ -306,7 +306,7 @@ class AnalyzerGroup:
         self._analyzers.append(analyzer)
 
     def remove(self, analyzer: Analyzer) -> bool:
-        """Remove an analyzer; return whether it was there."""
+        """Remove an analyzer; return whether the group contained it."""
         if analyzer not in self._analyzers:
             return False
         self._analyzers.remove(analyzer)

@@ -53,7 +53,7 @@ def _flag(name: str) -> bool:
 
 
 class JoyNode:
-    """Opens the device, reopens it after it is lost, and publishes its state."""
+    """Opens the device, reopens it after a disconnection, and publishes its state."""
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher("joy", Joy, queue_size=1)

@@ -28,7 +28,7 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class JoystickOptions:
-    """The node's parameters: ``deadzone`` as a fraction of an axis's range, the rate in Hz (0: none), the interval in seconds."""
+    """The node's parameters: ``deadzone`` is a fraction of an axis's range, rates are in Hz (0: none), intervals in seconds."""
 
     deadzone: float = 0.05
     autorepeat_rate: float = 0.0

@@ -64,7 +64,7 @@ class StatusTracker:
         self._bytes = None
 
     def serialize(self) -> bytes:
-        """Return the serialized status. It is cached once the goal has ended, because it no longer changes."""
+        """Return the serialized status. The bytes are cached once the goal has ended, because the status no longer changes."""
         if self._bytes is not None:
             return self._bytes
         encoded = status_bytes(self.status)
@@ -87,7 +87,7 @@ class HandleTrackerDeleter:
 
 
 class ServerGoalHandle:
-    """A goal received by a server. Without arguments it has no goal, and its methods log an error."""
+    """A goal received by a server. A handle created without arguments has no goal, and its methods log an error."""
 
     def __init__(
         self,
@@ -124,7 +124,7 @@ class ServerGoalHandle:
             self.action_server.publish_status()
 
     def set_canceled(self, result: Message | None = None, text: str = "") -> None:
-        """End the goal after a cancel request: RECALLED if it had not been accepted, else PREEMPTED."""
+        """End the goal after a cancel request, as RECALLED if it had not been accepted, otherwise as PREEMPTED."""
         self._log("Setting status to canceled on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.CANCEL, result, text)
 

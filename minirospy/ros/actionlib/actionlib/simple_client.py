@@ -132,11 +132,11 @@ class SimpleActionClient:
         return self.gh.get_goal_status_text()
 
     def cancel_all_goals(self) -> None:
-        """Request the server to cancel all its goals, including those of other clients."""
+        """Request the server to cancel all its goals, including those from other clients."""
         self.action_client.cancel_all_goals()
 
     def cancel_goals_at_and_before_time(self, time: times.Time) -> None:
-        """Request the server to cancel all goals stamped at or before ``time``, including those of other clients."""
+        """Request the server to cancel all goals stamped at or before ``time``, including those from other clients."""
         self.action_client.cancel_goals_at_and_before_time(time)
 
     def cancel_goal(self) -> None:

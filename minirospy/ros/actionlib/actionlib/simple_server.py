@@ -96,7 +96,7 @@ class SimpleActionServer:
         return self.new_goal
 
     def is_preempt_requested(self) -> bool:
-        """Return whether the active goal should be preempted: it was cancelled, or another goal is pending."""
+        """Return whether the active goal should be preempted, because it was cancelled or another goal is pending."""
         return self.preempt_request
 
     def is_active(self) -> bool:

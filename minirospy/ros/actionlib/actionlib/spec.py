@@ -1,4 +1,4 @@
-"""The message classes of an action, from its class: `TestAction` -> goal, result and feedback, with and without header."""
+"""An action's message classes, found from its class: `TestAction` -> goal, result and feedback, with and without header."""
 
 from __future__ import annotations
 

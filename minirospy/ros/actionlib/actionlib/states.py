@@ -48,7 +48,7 @@ class CommState:
 
     @classmethod
     def to_string(cls, n: int) -> str:
-        """Return the name of a state."""
+        """Return a state's name."""
         return get_name_of_constant(cls, n)
 
 
@@ -64,7 +64,7 @@ class TerminalState:
 
     @classmethod
     def to_string(cls, n: int) -> str:
-        """Return the name of a state."""
+        """Return a state's name."""
         return get_name_of_constant(cls, n)
 
 
@@ -77,7 +77,7 @@ class SimpleGoalState:
 
     @classmethod
     def to_string(cls, n: int) -> str:
-        """Return the name of a state."""
+        """Return a state's name."""
         return get_name_of_constant(cls, n)
 
 

@@ -50,7 +50,7 @@ class StatusList(GoalStatusArray):
 
     @status_list.setter
     def status_list(self, statuses: list[GoalStatus]) -> None:
-        # The base class's constructor sets an empty list.
+        # The base class's constructor sets an empty list: keep None, so that the bytes are still parsed on access.
         self._read = statuses or None
 
     def find(self, id: str) -> GoalStatus | None:

@@ -71,7 +71,7 @@ _NAMES = {"!": "boldon", "/": "italicson", "_": "ulon", "|": "reset"}
 
 
 def sanitize(msg: str) -> str:
-    """Escape a string so that :func:`fmt` returns it unchanged, except that braces are doubled."""
+    """Escape a string so that :func:`fmt` returns the original string, except that braces are doubled."""
     msg = msg.replace("@", "@@").replace("{", "{{").replace("}", "}}")
     for mark, name in _MARKS.items():
         msg = msg.replace(f"@@{mark}", f"@{{{name}}}")

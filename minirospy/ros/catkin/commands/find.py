@@ -36,7 +36,7 @@ _PLACES: dict[str, Callable[[str], str]] = {
     "libexec": lambda project: f"lib/{project}",
     "share": lambda project: f"share/{project}",
 }
-"""For each search folder, its path below a workspace's devel or install folder."""
+"""Search folder -> its path below a workspace's devel or install folder."""
 
 _WITHOUT_PROJECT = ("bin", "etc", "include", "lib", "share")
 _WITH_PROJECT = ("etc", "include", "libexec", "share")
@@ -97,7 +97,7 @@ def _find(
 
 
 def _workspaces() -> Iterator[Path | None]:
-    """Yield the prefixes of the sourced workspaces, topmost overlay first; then None for minirospy's own packages."""
+    """Yield the prefixes of the sourced workspaces, topmost overlay first; then None, for minirospy's own packages."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
         if prefix and Path(prefix, ".catkin").is_file():
             yield Path(prefix)

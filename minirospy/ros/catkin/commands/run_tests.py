@@ -117,7 +117,7 @@ def _targets(plan: Plan, test: Test | None) -> list[str]:
 
 
 def _flat(name: str) -> str:
-    """Return a name with underscores in place of other separators: CMake target names have no slashes."""
+    """Return a name with underscores in place of other separators, because CMake target names contain no slashes."""
     return re.sub(r"\W", "_", name)
 
 

@@ -65,7 +65,7 @@ class _Settings(NamedTuple):
         return cls(**{name: found[name] for name in cls._fields if name in found})
 
     def updated(self, new: _Settings) -> _Settings:
-        """Return these settings, overridden by those set in ``new``."""
+        """Return a copy in which the settings in ``new`` override these."""
         return _Settings(
             self.install if new.install is None else new.install,
             self.blacklist if new.blacklist is None else new.blacklist,

@@ -158,7 +158,7 @@ class Client:
         return self._description_callback
 
     def set_description_callback(self, value: DescriptionCallback | None) -> None:
-        """Set the callback for parameter descriptions, and call it with the current ones."""
+        """Set the callback for parameter descriptions, and call it with the current descriptions."""
         self._description_callback = value
         if value is not None:
             value(self.param_description)

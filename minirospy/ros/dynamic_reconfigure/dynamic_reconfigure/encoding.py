@@ -147,7 +147,7 @@ def group_dict(group: Group | GroupState) -> Config:
 
 
 def decode_description(msg: ConfigDescription) -> Config:
-    """Return the tree of a type's groups; each parameter is a dict with ``name``, ``min``, ``max``, ``default``, ..."""
+    """Return a type's groups as a tree; each parameter is a dict with ``name``, ``min``, ``max``, ``default``, ..."""
     least, greatest, defaults = (decode_config(each) for each in (msg.min, msg.max, msg.dflt))
 
     def described(group: Group) -> Config:

@@ -205,14 +205,14 @@ class ParameterGenerator:
         return _PYTHON_TYPES[drtype]
 
     def check_type(self, param: Entry, field: _ValueKey) -> None:
-        """Convert a parameter's value to its type. Raise TypeError if that is not possible."""
+        """Convert a parameter's value to its type. Raise TypeError if the value cannot be converted."""
         value, wanted = param[field], self.pytype(param["type"])
         if type(value) is not wanted and (wanted is not float or type(value) is not int):
             raise TypeError(f"'{param['name']}' has type {param['type']}, but {field} is {value!r}")
         param[field] = float(value) if type(value) is int and wanted is float else value
 
     def fill_type(self, param: Entry) -> None:
-        """Add the C++ types of a parameter or constant. Raise TypeError if its type is unknown."""
+        """Add the C++ types to a parameter or constant. Raise TypeError if its type is unknown."""
         if param["type"] not in _CPP_TYPES:
             raise TypeError(
                 f"'{param['name']}' has type {param['type']!r}: a type is {', '.join(_CPP_TYPES)}"

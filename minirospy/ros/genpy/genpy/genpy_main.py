@@ -19,7 +19,7 @@ __all__ = ["genmain", "usage"]
 
 
 def usage(progname: str) -> None:
-    """Print the usage of a generator."""
+    """Print a generator's usage."""
     print(f"{progname} file(s)")
 
 

@@ -200,9 +200,9 @@ class InteractiveMarkerServer:
     # --- messages from and to viewers
 
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        """Move a marker as requested by a viewer, and call the program's callback.
+        """Move a marker as a viewer has requested, and call the program's callback.
 
-        For one second, feedback for the marker from other viewers is ignored.
+        For one second, ignore feedback for the marker from other viewers.
         """
         with self.mutex:
             context = self.marker_contexts.get(feedback.marker_name)

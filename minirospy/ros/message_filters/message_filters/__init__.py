@@ -37,7 +37,7 @@ class Input(Protocol):
 
 
 class SimpleFilter:
-    """The base class of filters: stores callbacks, and calls them with the messages that pass."""
+    """The base class for filters: stores callbacks, and calls them with the messages that pass."""
 
     def __init__(self) -> None:
         self.callbacks: dict[int, tuple[Callback, tuple[object, ...]]] = {}
@@ -236,7 +236,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         super().__init__(fs, queue_size, reset)
 
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
-        """Store a message from an input; pass on the set that it completes."""
+        """Store a message from an input; if it completes a set, pass the set on."""
         try:
             stamp: Time = msg.header.stamp  # type: ignore[attr-defined]
         except AttributeError:

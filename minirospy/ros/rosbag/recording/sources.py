@@ -111,7 +111,7 @@ def open_reader(path: Path, opened: ExitStack) -> BagReader:
 
 
 class ReadAhead:
-    """Iterates over messages that a thread reads some thousands ahead. Iterate once, then close."""
+    """Iterates over messages that a thread reads ahead, some thousands at most. Iterate once, then close."""
 
     def __init__(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
         self._ready: queue.Queue[list[tuple[int, StoredMessage]] | Exception | None] = queue.Queue(_BATCHES)

@@ -37,7 +37,7 @@ Usage:
 
 
 class _RosgraphParser(Parser):
-    """Prints ROS's help before its own, and also on a usage error, as ROS does."""
+    """Prints ROS's help before this command's own, and also on a usage error, as ROS does."""
 
     def format_help(self) -> str:
         return _ROS_HELP + super().format_help()

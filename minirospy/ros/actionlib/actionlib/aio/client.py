@@ -157,7 +157,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         return sent
 
     def cancel_all(self) -> None:
-        """Request the server to cancel all its goals, including those of other clients."""
+        """Request the server to cancel all its goals, including those from other clients."""
         self._start(self._cancel.publish(GoalID()))
 
     async def close(self) -> None:

@@ -38,7 +38,7 @@ class _WithFeedback(Protocol[_F_co]):
 
 
 class ActionClass(Protocol[_G_co, _R_co, _F_co]):
-    """The attributes of an action class such as ``runningLedAction``: the classes of its goal, result and feedback."""
+    """The attributes of an action class such as ``runningLedAction``: its goal, result and feedback classes."""
 
     @property
     def action_goal(self) -> _WithGoal[_G_co]: ...
