@@ -21,9 +21,9 @@ from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES
 __all__ = ["Origin", "exported", "modules", "overlay_files", "write_overlay"]
 
 PACKAGE = Path(__file__).parents[1]
-_PROGRAMS = {"commands", "nodes", "scripts"}  # folders in a ROS package that are not Python modules
+_PROGRAMS = {"commands", "nodes", "scripts"}  # folders of a ROS package that are no Python module
 _ALSO = {"RPi": PACKAGE / "board" / "pins"}
-"""Python modules that belong to no ROS package -> the folder that contains them."""
+"""Python modules of no ROS package -> the folder that has them."""
 _INTERNAL = {
     "PyKDL": "frames functions vectors",
     "actionlib": "aio client goal_id handle machine server simple_client simple_server spec states statuses waiting",
@@ -44,9 +44,9 @@ _INTERNAL = {
     "topic_tools": "expressions",
     "urdf_parser_py": "joints links",
 }
-"""Python module -> its submodules that ROS's module does not have. Put new ones next to the module's folder, not here."""
-_GENERATED = "generated from minirospy/"  # text in each module's docstring
-_METADATA = "rospy-1.17.0.egg-info"  # Programs query importlib.metadata for rospy's version.
+"""Python module -> its modules that ROS's does not have. New ones do not belong here but next to the module's folder."""
+_GENERATED = "generated from minirospy/"  # in the docstring of each module
+_METADATA = "rospy-1.17.0.egg-info"  # programs ask importlib.metadata for rospy's version
 _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: rospy as minirospy has it\n"
 _WIDTH = 118  # characters in a line of __all__
 
@@ -131,7 +131,7 @@ _NAMED_OTHERWISE = {
     "python_orocos_kdl": ("PyKDL",),
     "urdfdom_py": ("urdf_parser_py",),
 }
-"""ROS package -> its Python modules, if their names differ from the package's."""
+"""ROS package -> the Python modules that have another name."""
 
 
 def exported(source: Path) -> dict[str, Origin]:
@@ -238,7 +238,7 @@ def _read(source: Path) -> _Source:
 
 
 _HOOKS = {"__getattr__", "__dir__"}
-"""Functions that a module defines to look up names dynamically (PEP 562)."""
+"""Functions by which a module answers for names that it does not have (PEP 562)."""
 
 
 if __name__ == "__main__":
