@@ -1,8 +1,9 @@
 """Write `overlay/`: the modules that programs import (`rospy`, `rosbag`, `RPi`, ...), from the modules of the same names here.
 
-What `import rosgraph.masterapi` offers is in `ros/rosgraph/rosgraph/masterapi.py`, and its module in `overlay/` re-exports that:
-the names in `__all__`, and those that the module imports in the form `from x import y as y`. The build writes `overlay/`
-(hatch_build.py), and `python -m minirospy.ros.overlay_modules` writes it again. Reads the sources; imports none of them.
+The names that `import rosgraph.masterapi` provides are in `ros/rosgraph/rosgraph/masterapi.py`; the module in `overlay/`
+re-exports the names in `__all__`, and those that the module imports in the form `from x import y as y`. The build writes
+`overlay/` (hatch_build.py), and `python -m minirospy.ros.overlay_modules` writes it again. This module reads the sources
+without importing them.
 """
 
 from __future__ import annotations
@@ -59,25 +60,28 @@ _HOOKS = {"__getattr__", "__dir__"}
 
 
 class Origin(NamedTuple):
-    """Where a name comes from: ``from module import name``; ``import module`` if ``name`` is empty."""
+    """The place a name is imported from: ``from module import name``, or ``import module`` if ``name`` is empty."""
 
     module: str
     name: str
 
 
 class _Source(NamedTuple):
-    """What the top level of a module says, read from its text."""
+    """The names that a module's top level defines, read from its source."""
 
     public: tuple[str, ...] | None
-    """``__all__``; None without one."""
+    """``__all__``, or None if the module has none."""
     imported: dict[str, Origin]
-    """Names that are bound by an import, blocks for type checkers included."""
+    """Names that an import binds, including those in blocks for type checkers."""
     passed_on: frozenset[str]
-    """Names that an import binds in the form ``as`` the same name, and a module's ``__getattr__`` and ``__dir__``."""
+    """Names that an import binds in the form ``x as x``, and a module's ``__getattr__`` and ``__dir__``."""
 
 
 def write_overlay(folder: Path) -> list[str]:
-    """Write the modules below a folder; return their paths in it. Remove those that an earlier build wrote, and this does not."""
+    """Write the modules below a folder and return their paths in it.
+
+    Remove modules from an earlier build that are not written.
+    """
     from minirospy.core.idl.load import write_if_changed
 
     files = overlay_files()
@@ -91,7 +95,7 @@ def write_overlay(folder: Path) -> list[str]:
 
 
 def overlay_files() -> dict[str, str]:
-    """Return the files of `overlay/` except for those of messages: path -> text."""
+    """Return the files in `overlay/`, except message modules: path -> text."""
     files = {_METADATA: _METADATA_TEXT}
     for name, source in modules().items():
         path = name.replace(".", "/")
@@ -106,7 +110,7 @@ def overlay_files() -> dict[str, str]:
 
 @functools.cache
 def modules() -> dict[str, Path]:
-    """Return the modules that programs import, and the file that says what each offers: ``rosgraph.names`` -> its path."""
+    """Return the modules that programs import, and the file that defines each one's names: ``rosgraph.names`` -> its path."""
     roots = dict(_ALSO)
     for folder in sorted((PACKAGE / "ros").iterdir()):
         if folder.is_dir():
@@ -123,7 +127,7 @@ def modules() -> dict[str, Path]:
 
 
 def _python_modules(package: Path) -> Iterator[str]:
-    """Yield the Python modules of a ROS package: its folders with an ``__init__.py`` that have the module's name."""
+    """Yield a ROS package's Python modules: its folders that contain an ``__init__.py`` and are named as the module."""
     named = {package.name, *_NAMED_OTHERWISE.get(package.name, ())}
     for folder in package.iterdir():
         if folder.name in named and (folder / "__init__.py").exists():
@@ -131,14 +135,14 @@ def _python_modules(package: Path) -> Iterator[str]:
 
 
 def exported(source: Path) -> dict[str, Origin]:
-    """Return what the module in `overlay/` re-exports: name -> where it is imported from."""
+    """Return the names that the module in `overlay/` re-exports: name -> where it is imported from."""
     read = _read(source)
     names = dict.fromkeys([*(read.public or ()), *sorted(read.passed_on)])
     return {name: _origin(Origin(_dotted(source), name)) for name in names}
 
 
 def _origin(asked: Origin) -> Origin:
-    """Follow a name through the modules that only pass it on."""
+    """Follow a name through modules that only re-export it."""
     source = _source_of(asked.module)
     if source is None:
         return asked
@@ -147,7 +151,8 @@ def _origin(asked: Origin) -> Origin:
         return asked
     module = _by_source().get(f"{inner.module}.{inner.name}")
     if module is not None:
-        # A module: the overlay's if it keeps its name, so that `rosgraph.names` is what `import rosgraph.names` gives.
+        # If the name is a module that has the same name in the overlay, use the overlay's, so that `rosgraph.names`
+        # is the module that `import rosgraph.names` returns.
         parent, _, name = module[0].rpartition(".")
         is_kept = asked.name == name or asked.module == inner.module
         return Origin(parent or name, name if parent else "") if is_kept else inner
@@ -198,7 +203,7 @@ def _dotted(source: Path) -> str:
 
 @functools.cache
 def _by_source() -> dict[str, tuple[str, Path]]:
-    """Return for each module of this package that the overlay offers: its dotted name -> the overlay's, and its file."""
+    """Map each module that the overlay offers, by its dotted name here, to its name in the overlay and its file."""
     return {_dotted(source): (name, source) for name, source in modules().items()}
 
 

@@ -1,4 +1,4 @@
-"""The functions shared by rosgraph.names and rospy.names.
+"""Functions shared by rosgraph.names and rospy.names.
 
 Source: http://wiki.ros.org/Names and the behaviour of rosgraph.names, also for None and other types.
 """
@@ -27,17 +27,17 @@ def isstring(s: object) -> bool:
 
 
 def is_global(name: str | None) -> bool | str | None:
-    """Return whether a name is global (starts with ``/``); return None and an empty name unchanged."""
+    """Return whether a name is global (starts with ``/``); return None or an empty name unchanged."""
     return name and name[0] == SEP
 
 
 def is_private(name: str | None) -> bool | str | None:
-    """Return whether a name is private (starts with ``~``); return None and an empty name unchanged."""
+    """Return whether a name is private (starts with ``~``); return None or an empty name unchanged."""
     return name and name[0] == PRIV_NAME
 
 
 def namespace(name: str) -> str:
-    """Return the namespace of a name, with a trailing slash. Raise ValueError for None, TypeError for another type."""
+    """Return a name's namespace, with a trailing slash. Raise ValueError for None, TypeError for another type."""
     if name is None:
         raise ValueError("name")
     if not isinstance(name, str):
@@ -53,7 +53,7 @@ def ns_join(ns: str | None, name: str) -> str:
 
 
 def canonicalize_name(name: str) -> str:
-    """Return a name without doubled or trailing slashes; return None and an empty name unchanged."""
+    """Return a name without doubled or trailing slashes; return None or an empty name unchanged."""
     return names.canonicalize(name)
 
 
@@ -64,7 +64,7 @@ def load_mappings(argv: Sequence[str]) -> dict[str, str]:
 
 
 def get_ros_namespace(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
-    """Return the namespace from the command line (``__ns:=``), else from the environment, with slashes at both ends."""
+    """Return the namespace from the command line (``__ns:=``), or from the environment, with slashes at both ends."""
     named = names.parse_arguments(sys.argv if argv is None else argv).special.get("__ns")
     return make_global_ns(named or (os.environ if env is None else env).get("ROS_NAMESPACE") or GLOBALNS)
 

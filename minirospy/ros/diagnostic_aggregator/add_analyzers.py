@@ -1,4 +1,4 @@
-"""The program add_analyzers: adds analyzers to the aggregator while it runs.
+"""The program add_analyzers: adds analyzers to a running aggregator.
 
 Source: http://wiki.ros.org/diagnostic_aggregator/Tutorials/Adding%20analyzers%20at%20runtime.
 """

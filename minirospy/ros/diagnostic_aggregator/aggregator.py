@@ -21,7 +21,7 @@ __all__ = ["Aggregator", "RosLog", "analyzer_loader", "load_group", "main", "top
 
 
 class RosLog:
-    """Logs the analyzers' warnings and errors as messages of the node."""
+    """Logs the analyzers' warnings and errors under the node's name."""
 
     def warn(self, text: str) -> None:
         """Log a warning."""
@@ -81,7 +81,7 @@ def load_group(base_path: str, namespace: str) -> AnalyzerGroup:
 
 
 def toplevel_level(levels: Iterable[int]) -> int:
-    """Return the level of the whole tree: stale only if all levels are; -1 if there are none."""
+    """Return the level of the whole tree: stale only if all levels are stale; -1 if there are none."""
     found = list(levels)
     highest = max(found, default=-1)
     return 2 if highest > 2 and min(found) <= 2 else highest
@@ -139,7 +139,7 @@ class Aggregator:
             self._warned.add(names)
 
     def _add(self, request: AddDiagnosticsRequest) -> AddDiagnosticsResponse:
-        """Create analyzers from another namespace; they are used until the bond with the requesting node breaks."""
+        """Create analyzers from another namespace; use them until the bond with the requesting node breaks."""
         namespace: str = request.load_namespace
         if not namespace.startswith("/"):
             return AddDiagnosticsResponse(
@@ -151,7 +151,7 @@ class Aggregator:
                 return AddDiagnosticsResponse(
                     False, f"Requested load from namespace {namespace} which is already in use"
                 )
-            # One topic per bond: with a shared topic, heartbeats of different bonds would overwrite each other.
+            # Use one topic per bond: on a shared topic, heartbeats from different bonds would overwrite each other.
             bond = self._bonds[namespace] = Bond(f"/diagnostics_agg/bond{namespace}", namespace)
 
         group = load_group(self._base_path, namespace)

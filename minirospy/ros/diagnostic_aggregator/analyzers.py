@@ -1,6 +1,7 @@
-"""Analyzers: which statuses they accept, and what they report. Pure: times are arguments, in seconds.
+"""Analyzers: decide which statuses they accept, and what they report. Pure: times are arguments, in seconds.
 
-A tree of analyzers is built from parameters. Source: http://wiki.ros.org/diagnostic_aggregator, and the output of its program.
+A tree of analyzers is built from parameters. Source: http://wiki.ros.org/diagnostic_aggregator, and the output of ROS's
+aggregator_node.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Log(Protocol):
 
 @dataclass
 class Item:
-    """A received status, and when it was received."""
+    """A received status, and the time at which it was received."""
 
     name: str
     time: float
@@ -45,7 +46,7 @@ class Item:
 
     @classmethod
     def of(cls, status: DiagnosticStatus, now: float, log: Log) -> Item:
-        """Create an item from a status; an invalid level is reported and becomes ERROR."""
+        """Create an item from a status. Report an invalid level and replace it by ERROR."""
         level = status.level
         if level not in _MESSAGES:
             log.error(
@@ -55,7 +56,7 @@ class Item:
         return cls(status.name, now, level, status.message, status.hardware_id, list(status.values))
 
     def status(self, path: str, is_stale: bool) -> DiagnosticStatus:
-        """Return the status for the tree, named with its path."""
+        """Return the status for the tree; its name is the path."""
         return DiagnosticStatus(
             level=STALE if is_stale else self.level,
             name=f"{path.rstrip('/')}/{_shown(self.name)}",
@@ -66,7 +67,7 @@ class Item:
 
 
 class Analyzer(Protocol):
-    """A node of the tree."""
+    """A node in the analyzer tree."""
 
     path: str
     name: str
@@ -78,11 +79,11 @@ class Analyzer(Protocol):
         """Process a status; return whether the analyzer accepted it."""
 
     def report(self, now: float) -> list[DiagnosticStatus]:
-        """Return the statuses of this part of the tree."""
+        """Return the statuses for this part of the tree."""
 
 
 class _Items:
-    """The items of one analyzer, with a header status."""
+    """One analyzer's items, with a header status."""
 
     def __init__(
         self, path: str, name: str, timeout: float, num_items: int = -1, discard_stale: bool = False
@@ -137,7 +138,7 @@ class GenericAnalyzer(_Items):
     """Accepts statuses by name. Parameters: path, find_and_remove_prefix, startswith, name, contains, expected, regex, ..."""
 
     def __init__(self, base_path: str, params: Params, namespace: str, now: float, log: Log) -> None:
-        """Raise ValueError if the parameters do not define an analyzer; the error has then been reported."""
+        """Read the parameters. If they do not define an analyzer, report the error and raise ValueError."""
         path = params.get("path")
         if not isinstance(path, str):
             raise _fault(log, f'GenericAnalyzer was not given parameter "path". Namepspace: {namespace}')
@@ -248,7 +249,7 @@ class AnalyzerGroup:
     """A group of analyzers with a header. Parameters: path, analyzers (a namespace per analyzer, with its type)."""
 
     def __init__(self, base_path: str, params: Params, namespace: str, now: float, log: Log) -> None:
-        """Create the analyzers, reporting errors; ``is_complete`` is False if one of them cannot be created."""
+        """Create the analyzers and report errors; ``is_complete`` is False if one of them cannot be created."""
         path = params.get("path")
         self.name = path if isinstance(path, str) else ""
         full = f"{base_path}/{self.name}" if self.name and base_path not in ("", "/") else base_path
@@ -305,7 +306,7 @@ class AnalyzerGroup:
         self._analyzers.append(analyzer)
 
     def remove(self, analyzer: Analyzer) -> bool:
-        """Remove an analyzer; return whether it was there."""
+        """Remove an analyzer; return whether the group contained it."""
         if analyzer not in self._analyzers:
             return False
         self._analyzers.remove(analyzer)
@@ -351,7 +352,7 @@ _TYPES: dict[str, Callable[[str, Params, str, float, Log], Analyzer]] = {
 
 
 def strip_prefix(name: str, prefix: str) -> str:
-    """Return a name without ``prefix`` at the start of its last part, and without the colon and spaces after it."""
+    """Return a name without ``prefix`` at the start of its last part, and without the colon and spaces after the prefix."""
     if not prefix:
         return name
     at = name.rfind("/") + 1
@@ -378,7 +379,7 @@ def _number(value: object, default: float) -> float:
 
 
 def _words(value: object, log: Log) -> list[str]:
-    """Return a parameter that is a string or a list of strings as a list; otherwise report an error and return []."""
+    """Return a parameter as a list if it is a string or a list of strings; otherwise report an error and return []."""
     if isinstance(value, str):
         return [value]
     if not isinstance(value, list):

@@ -1,4 +1,4 @@
-"""Encoding and decoding of images for the transports compressed and compressedDepth. Pure.
+"""Encoding and decoding images for the transports compressed and compressedDepth. Pure.
 
 A CompressedImage's format names the original encoding: ``rgb8; jpeg compressed bgr8``. compressedDepth has 12 bytes before
 its PNG: an enum, and the two floats that convert 32-bit depths to 16 bits: inverse = A / depth + B.
@@ -34,12 +34,12 @@ _BRIDGE = CvBridge()
 
 
 class CodecError(ValueError):
-    """A transport does not support an image, or bytes are not an image."""
+    """The transport does not support the image, or the bytes are not an image."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The parameters of the transports, with ROS's defaults; ``png_level`` None means the transport's default."""
+    """The transports' parameters, with ROS's defaults; ``png_level`` None means the transport's default."""
 
     format: str = "jpeg"
     jpeg_quality: int = 80
@@ -51,7 +51,10 @@ class Settings:
 
 
 def compressed(image: Image, settings: Settings) -> CompressedImage:
-    """Encode an image as JPEG or PNG. Raise CodecError for another format, or an encoding without 8 or 16 bits per channel."""
+    """Encode an image as JPEG or PNG.
+
+    Raise CodecError for another format, or an encoding that does not have 8 or 16 bits per channel.
+    """
     kind = settings.format
     if kind not in ("jpeg", "png"):
         raise CodecError(f"Unknown compression type '{kind}', valid options are 'jpeg' and 'png'")
@@ -79,7 +82,7 @@ def compressed(image: Image, settings: Settings) -> CompressedImage:
 
 
 def uncompressed(message: CompressedImage) -> Image:
-    """Decode a compressed image to the encoding named in its format. Raise CodecError."""
+    """Decode a compressed image to the encoding named in its format. Raise CodecError if the bytes are not such an image."""
     pixels = _decoded(bytes(message.data))
     encoding, semicolon, rest = message.format.partition(";")
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
@@ -87,7 +90,7 @@ def uncompressed(message: CompressedImage) -> Image:
         kinds = {1: "mono8", 3: "bgr8", 4: "bgra8"}
         encoding = kinds[channels] if pixels.dtype == "uint8" else f"16UC{channels}"
     elif encoding in _COLORS and channels in (3, 4):
-        # OpenCV decodes red, green and blue to BGR; if the format lacks "bgr", the encoder had swapped red and blue.
+        # OpenCV decodes to BGR; if the format does not contain "bgr", the encoder had swapped red and blue.
         bits = "16" if pixels.dtype == "uint16" else "8"
         order = "bgr" if "compressed bgr" in rest else "rgb"
         pixels = _converted(pixels, order + ("a" if channels == 4 else "") + bits, encoding)
@@ -97,7 +100,10 @@ def uncompressed(message: CompressedImage) -> Image:
 
 
 def compressed_depth(image: Image, settings: Settings) -> CompressedImage:
-    """Encode a depth image as PNG: 16 bits losslessly, 32-bit floats as inverse depths. Raise CodecError."""
+    """Encode a depth image as PNG: 16 bits losslessly, 32-bit floats as inverse depths.
+
+    Raise CodecError if the image has another encoding.
+    """
     import numpy as np
 
     depth, channels = _type_of(image.encoding)
@@ -128,7 +134,7 @@ def compressed_depth(image: Image, settings: Settings) -> CompressedImage:
 
 
 def uncompressed_depth(message: CompressedImage) -> Image:
-    """Decode a compressed depth image; missing depths are 0 or NaN. Raise CodecError."""
+    """Decode a compressed depth image; missing depths are 0 or NaN. Raise CodecError if the bytes are not such an image."""
     import numpy as np
 
     encoding, _, rest = message.format.partition(";")

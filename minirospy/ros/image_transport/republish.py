@@ -2,8 +2,9 @@
 
     republish IN_TRANSPORT in:=IN_BASE_TOPIC [OUT_TRANSPORT] out:=OUT_BASE_TOPIC
 
-Without OUT_TRANSPORT the image is published with all transports: raw on the base topic, the others below it. Parameters are
-those of the plug-ins, below the output topic (``OUT/compressed/jpeg_quality``) or private (``~compressed/jpeg_quality``).
+If OUT_TRANSPORT is omitted, the image is published with all transports: raw on the base topic, the others below it. The
+parameters are those of ROS's plug-ins, below the output topic (``OUT/compressed/jpeg_quality``) or private
+(``~compressed/jpeg_quality``).
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ _NUMBERS = {
     "depth_max": (1, 100),
     "depth_quantization": (1, 150),
 }
-"""The limits of the plug-ins' numeric parameters."""
+"""The limits for the plug-ins' numeric parameters."""
 _KINDS = {"format": str, "jpeg_progressive": bool, "jpeg_optimize": bool}
 
 Encode: TypeAlias = Callable[[Image, Settings], CompressedImage]
@@ -78,7 +79,7 @@ def main() -> int:
 
 
 def _warn_without_library() -> None:
-    """Warn if the image library is missing: without a subscriber no image is encoded, so no other message would tell."""
+    """Warn if the image library is missing. Without a subscriber no image is encoded, so no other message would report it."""
     try:
         require_library()
     except ValueError as error:
@@ -86,7 +87,7 @@ def _warn_without_library() -> None:
 
 
 def list_main() -> int:
-    """Print the transports like the program list_transports; return its exit status."""
+    """Print the transports as the program list_transports does; return the exit status."""
     print("Declared transports:")
     for name in _TRANSPORTS:
         print(f"image_transport/{name}")
@@ -138,7 +139,7 @@ class Republisher:
         made: Image | CompressedImage = image
         if kind != "raw":
             made = _ENCODERS[kind](image, self._settings(kind))
-        # Publish serialized bytes, which keep the sequence number of the received image.
+        # Publish the serialized bytes, so that the received image's sequence number is kept.
         buffer = BytesIO()
         made.serialize(buffer)
         passed = AnyMsg()
@@ -155,7 +156,7 @@ class Republisher:
 
 
 def settings_of(values: Mapping[str, object]) -> Settings:
-    """Return the settings from parameters, clamped to their limits. Raise CodecError for a parameter of a wrong type."""
+    """Return the settings from parameters, clamped to their limits. Raise CodecError if a parameter has the wrong type."""
     chosen: dict[str, object] = {}
     for name, value in values.items():
         if name in _NUMBERS:
@@ -180,7 +181,7 @@ def _class_of(kind: str) -> type[Image] | type[CompressedImage]:
 
 
 def _bytes_of(cls: type[Image] | type[CompressedImage]) -> type[AnyMsg]:
-    """Return a message class of that type whose messages stay serialized."""
+    """Return a message class with the type of ``cls`` whose messages stay serialized."""
     fields = {"_type": cls._type, "_md5sum": cls._md5sum, "_full_text": cls._full_text, "__slots__": []}
     return type("PassedImage", (AnyMsg,), fields)
 

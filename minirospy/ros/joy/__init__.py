@@ -1,6 +1,6 @@
-"""Joysticks as messages. Source: http://wiki.ros.org/joy."""
+"""Joysticks published as messages. Source: http://wiki.ros.org/joy."""
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# These modules import ROS 1 messages; if ROS 2 is sourced, its packages of the same names come first.
+# These modules import ROS 1 messages, but in a sourced ROS 2 its packages of the same names would be found first.
 prefer_ros1()

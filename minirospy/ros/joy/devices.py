@@ -1,4 +1,4 @@
-"""Joysticks of this machine: on Linux through /dev/input/js* and its protocol, elsewhere through pygame-ce.
+"""Joysticks connected to this machine: on Linux through /dev/input/js* and its protocol, elsewhere through pygame-ce.
 
 Source of the protocol: https://www.kernel.org/doc/html/latest/input/joydev/joystick-api.html.
 """
@@ -41,7 +41,7 @@ _POLL_SECONDS = 0.002
 
 
 class DeviceError(MinirospyError):
-    """A joystick cannot be opened, or was disconnected; the message is one line with the reason."""
+    """The joystick cannot be opened, or was disconnected; the message is one line with the reason."""
 
 
 class Device(Protocol):
@@ -50,19 +50,20 @@ class Device(Protocol):
     name: str
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
+        """Return the next event, or None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError."""
+        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
 
     def close(self) -> None:
         """Close the device."""
 
 
 def open_device(path: str, feedback_path: str = "") -> Device:
-    """Open a joystick by its path; on systems other than Linux, only the number in the path is used. Raise DeviceError.
+    """Open a joystick by its path. On systems other than Linux, only the number in the path is used.
 
-    ``feedback_path``: on Linux the event device of the motors, if it is not the one that belongs to the joystick.
+    ``feedback_path``: on Linux, the motors' event device, if it is not the joystick's own. Raise DeviceError if the joystick
+    cannot be opened.
     """
     if sys.platform == "linux" or os.path.exists(path):
         return LinuxDevice(path, feedback_path)
@@ -71,13 +72,14 @@ def open_device(path: str, feedback_path: str = "") -> Device:
 
 
 class LinuxDevice:
-    """A joystick on Linux: a device file that returns eight bytes per event."""
+    """A joystick on Linux: a device file from which each event is read as eight bytes."""
 
     def __init__(self, path: str, feedback_path: str = "") -> None:
         self._feedback_path = feedback_path or event_device(path)
         self._motors: Rumble | None = None
         try:
-            # The first events report the state, but after the first open() it may be the state at the last close().
+            # The first events report the state. After the first open() they may report the state at the last close(),
+            # so open twice.
             os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
@@ -86,7 +88,7 @@ class LinuxDevice:
         self._rest = b""
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
+        """Return the next event, or None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
         end = time.monotonic() + seconds
         while len(self._rest) < _EVENT.size:
             ready, _, _ = select.select([self._file], [], [], max(end - time.monotonic(), 0))
@@ -106,7 +108,7 @@ class LinuxDevice:
         return Event(kind, number, value)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError."""
+        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
         if self._motors is None:
             if not self._feedback_path:
                 raise RumbleError(
@@ -124,7 +126,7 @@ class LinuxDevice:
 
 
 def _name_of(file: int) -> str:
-    """Return a joystick's name as reported by the kernel (JSIOCGNAME)."""
+    """Return a joystick's name as the kernel reports it (JSIOCGNAME)."""
     if sys.platform == "win32":
         return _UNKNOWN
     import fcntl
@@ -138,7 +140,7 @@ def _name_of(file: int) -> str:
 
 
 def find_by_name(folder: Path = _FOLDER) -> Iterator[tuple[str, str]]:
-    """Yield the name and path of each joystick on Linux."""
+    """Yield each joystick's name and path on Linux."""
     for path in sorted(folder.glob("js*")):
         try:
             if not stat.S_ISCHR(path.stat().st_mode):
@@ -153,7 +155,10 @@ def find_by_name(folder: Path = _FOLDER) -> Iterator[tuple[str, str]]:
 
 
 class PygameDevice:
-    """A joystick of SDL; its hats are additional axes after the others, as on Linux. Raise DeviceError."""
+    """A joystick that SDL reads; as on Linux, its hats are additional axes after the others.
+
+    Raise DeviceError if the joystick cannot be opened.
+    """
 
     def __init__(self, number: int) -> None:
         os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
@@ -167,7 +172,7 @@ class PygameDevice:
             ) from None
         self._pygame: Any = pygame
         pygame.init()
-        # Initialize again to find a joystick that was plugged in since.
+        # Initialize again to find a joystick that was plugged in after the last initialization.
         pygame.joystick.quit()
         pygame.joystick.init()
         count = pygame.joystick.get_count()
@@ -179,7 +184,7 @@ class PygameDevice:
         self._events: list[Event] = []
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event; None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
+        """Return the next event, or None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
         end = time.monotonic() + seconds
         while not self._events:
             self._pygame.event.pump()
@@ -196,7 +201,7 @@ class PygameDevice:
         return self._events.pop(0)
 
     def rumble(self, strong: float, weak: float) -> None:
-        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError."""
+        """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
         if not self._joystick.rumble(min(max(strong, 0.0), 1.0), min(max(weak, 0.0), 1.0), 1000):
             raise RumbleError("the joystick has no motors that SDL knows")
 
@@ -225,7 +230,7 @@ class PygameDevice:
 def state_events(
     before: Sequence[tuple[int, int, int]], after: Sequence[tuple[int, int, int]]
 ) -> list[Event]:
-    """Return the events that lead from one state to the next; initial events if ``before`` is empty."""
+    """Return the events that change one state to the next; initial events if ``before`` is empty."""
     if not before:
         return [Event(kind | EVENT_INIT, number, value) for kind, number, value in after]
     return [Event(*each) for old, each in zip(before, after, strict=True) if old != each]

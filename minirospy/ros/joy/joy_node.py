@@ -1,6 +1,7 @@
 """joy_node: publishes a joystick as `joy` (sensor_msgs/Joy), and its state on /diagnostics.
 
-`joy/set_feedback` (sensor_msgs/JoyFeedbackArray) runs its motors: ID 0 is the strong one, any other ID the weak one.
+`joy/set_feedback` (sensor_msgs/JoyFeedbackArray) runs the joystick's motors: ID 0 is the strong one, any other ID the weak
+one.
 
 Parameters: ~dev (/dev/input/js0), ~dev_ff (the event device that belongs to ~dev), ~dev_name, ~deadzone (0.05),
 ~autorepeat_rate (0: none), ~coalesce_interval (0.001 s), ~default_trig_val, ~sticky_buttons (false).
@@ -23,11 +24,11 @@ from minirospy.ros.joy.rumble import RumbleError
 
 __all__ = ["JoyNode", "Motors", "main"]
 
-_LOOK_SECONDS = 0.2  # maximum delay until a shutdown is noticed
+_LOOK_SECONDS = 0.2  # seconds; maximum delay until the node detects a shutdown
 
 _RETRY_SECONDS = 1.0
 _DIAGNOSTIC_SECONDS = 1.0
-_RUMBLE_SECONDS = 0.5  # interval at which motors are restarted: half of the time for which a device runs them
+_RUMBLE_SECONDS = 0.5  # interval at which motors are restarted: half the time for which a device runs them
 
 
 def main() -> int:
@@ -52,7 +53,7 @@ def _flag(name: str) -> bool:
 
 
 class JoyNode:
-    """Opens the device, reopens it after it is lost, and publishes its state."""
+    """Opens the device, reopens it after a disconnection, and publishes its state."""
 
     def __init__(self) -> None:
         self._publisher = rospy.Publisher("joy", Joy, queue_size=1)
@@ -107,7 +108,7 @@ class JoyNode:
                 device.close()
 
     def _open(self) -> Device | None:
-        """Wait until the device can be opened, and return it; None at shutdown."""
+        """Wait until the device can be opened, and return it. Return None at shutdown."""
         is_first = True
         while not rospy.is_shutdown():
             try:
@@ -128,7 +129,7 @@ class JoyNode:
         return None
 
     def _follow(self, device: Device) -> None:
-        """Publish a device's events until it is lost (raising DeviceError) or the node shuts down."""
+        """Publish a device's events until the node shuts down. Raise DeviceError if the device is lost."""
         joystick = Joystick(self._options, time.monotonic())
         while not rospy.is_shutdown():
             now = time.monotonic()
@@ -193,7 +194,10 @@ class JoyNode:
 
 
 class Motors:
-    """The motors as requested on `joy/set_feedback`; they run until a message changes that, as in the real node."""
+    """The motors, in the state requested on `joy/set_feedback`.
+
+    As in the real node, they run until a message changes that state.
+    """
 
     def __init__(self) -> None:
         self._wanted = (0.0, 0.0)

@@ -1,6 +1,6 @@
-"""The publishing rules of joy_node: events and the time in, messages out. Pure: the clock is an argument, in seconds.
+"""The publishing rules of joy_node: converts events and times to messages. Pure: the clock is an argument, in seconds.
 
-Source: http://wiki.ros.org/joy. Button events are published immediately. Axis events, and the initial events of a device, are
+Source: http://wiki.ros.org/joy. Button events are published immediately. Axis events, and a device's initial events, are
 published after ``coalesce_interval``. With ``autorepeat_rate`` the state is republished while no event occurs.
 """
 
@@ -12,14 +12,14 @@ from typing import NamedTuple
 __all__ = ["EVENT_AXIS", "EVENT_BUTTON", "EVENT_INIT", "Event", "Joystick", "JoystickOptions"]
 
 EVENT_BUTTON, EVENT_AXIS, EVENT_INIT = 0x01, 0x02, 0x80
-"""Event types of Linux's struct js_event, also used by the other backends."""
+"""Event types from Linux's struct js_event, also used by the other backends."""
 
 MAX_VALUE = 32767.0
-_FIRST_SECONDS = 1.0  # delay of the first repetition after opening, as in the real node
+_FIRST_SECONDS = 1.0  # seconds until the first repetition after opening, as in the real node
 
 
 class Event(NamedTuple):
-    """A change: ``type`` is one of EVENT_*, ``number`` that of the button or axis, ``value`` 0 or 1, or -32767 to 32767."""
+    """A change: ``type`` is one of EVENT_*, ``number`` the index of the button or axis, ``value`` 0 or 1, or -32767 to 32767."""
 
     type: int
     number: int
@@ -28,7 +28,7 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class JoystickOptions:
-    """The node's parameters: ``deadzone`` as a fraction of an axis's range, the rate in Hz (0: none), the interval in seconds."""
+    """The node's parameters: ``deadzone`` is a fraction of an axis's range, rates are in Hz (0: none), intervals in seconds."""
 
     deadzone: float = 0.05
     autorepeat_rate: float = 0.0
@@ -37,7 +37,7 @@ class JoystickOptions:
     sticky_buttons: bool = False
 
     def checked(self) -> tuple[JoystickOptions, list[str]]:
-        """Return the options clamped to their limits, with the real node's warning for each clamped option."""
+        """Return the options clamped to their limits, and the real node's warning for each clamped option."""
         warnings = []
         deadzone, rate, interval = self.deadzone, self.autorepeat_rate, self.coalesce_interval
         if interval and rate > 1 / interval:
@@ -70,7 +70,7 @@ class JoystickOptions:
 
 
 class Joystick:
-    """The state of a device since it was opened."""
+    """A device's state since it was opened."""
 
     def __init__(self, options: JoystickOptions, now: float) -> None:
         self._options = options
@@ -81,10 +81,10 @@ class Joystick:
         self._published(now + _FIRST_SECONDS)
 
     deadline: float | None
-    """The time at which to publish the state if no event occurs; None: never."""
+    """The time at which to publish the state if no event occurs, or None if it is not published then."""
 
     def handle(self, event: Event, now: float) -> bool:
-        """Process an event; return whether to publish the state immediately. Raise ValueError for an unknown type."""
+        """Process an event; return whether to publish the state immediately. Raise ValueError if the event's type is unknown."""
         is_initial = bool(event.type & EVENT_INIT)
         kind = event.type & ~EVENT_INIT
         if kind == EVENT_BUTTON:
@@ -125,7 +125,7 @@ class Joystick:
 
     def _set_axis(self, event: Event, is_initial: bool) -> None:
         self.axes += [0.0] * (event.number + 1 - len(self.axes))
-        # Before its first move a trigger reports 0, although its rest position is 1.
+        # Until it is moved, a trigger reports 0, although its rest position is 1.
         if is_initial and not self._options.default_trig_val:
             return
         unused = MAX_VALUE * self._options.deadzone

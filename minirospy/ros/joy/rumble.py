@@ -1,4 +1,4 @@
-"""The motors of a joystick on Linux: force feedback of its event device, with the kernel's structures.
+"""A joystick's motors on Linux: uses its event device's force feedback, with the kernel's structures.
 
 Source: https://www.kernel.org/doc/html/latest/input/ff.html, linux/input.h.
 """
@@ -19,9 +19,9 @@ _EV_FF = 0x15
 _FF_RUMBLE = 0x50
 _FF_GAIN = 0x60
 _MAX_MAGNITUDE = 0xFFFF
-_MILLISECONDS = 1000  # duration of an effect; joy_node restarts it before it ends
+_MILLISECONDS = 1000  # milliseconds that an effect lasts; joy_node restarts an effect before it ends
 
-# Fields: type, ID, direction, trigger (2), replay (length, delay); at byte 16 the union, with the two magnitudes.
+# Fields: type, ID, direction, trigger (2), replay (length, delay); at byte 16, the union with the two magnitudes.
 _EFFECT = struct.Struct("=HhHHHHHxxHH")
 _EFFECT_SIZE = 48 if struct.calcsize("P") == 8 else 44
 _EVIOCSFF = 0x40004580 | _EFFECT_SIZE << 16
@@ -31,11 +31,11 @@ _INPUT = Path("/sys/class/input")
 
 
 class RumbleError(MinirospyError):
-    """The motors of a joystick cannot be used; the message is one line with the reason."""
+    """The joystick's motors cannot be used; the message is one line with the reason."""
 
 
 def event_device(joystick: str, folder: Path = _INPUT) -> str:
-    """Return the event device of the joystick at a path (`/dev/input/js0`); "" if it has none."""
+    """Return the event device for the joystick at a path (`/dev/input/js0`), or "" if it has none."""
     found = sorted((folder / Path(joystick).name / "device").glob("event*"))
     return f"/dev/input/{found[0].name}" if found else ""
 
@@ -53,7 +53,7 @@ def pack_event(code: int, value: int) -> bytes:
 
 
 class Rumble:
-    """The motors of one event device. All methods may raise RumbleError."""
+    """An event device's motors. All methods raise RumbleError if the motors cannot be used."""
 
     def __init__(self, path: str) -> None:
         self._path = path
@@ -77,13 +77,13 @@ class Rumble:
             raise self._error(error) from error
 
     def close(self) -> None:
-        """Close the device, which stops its motors."""
+        """Close the device; closing it stops its motors."""
         os.close(self._file)
 
     def _upload(self, number: int, magnitudes: Sequence[float]) -> int:
         import fcntl
 
-        # The ioctl writes the ID of a new effect into this array.
+        # The ioctl writes a new effect's ID into this array.
         effect = array.array("B", pack_effect(number, *magnitudes))
         fcntl.ioctl(self._file, _EVIOCSFF, effect)
         found: int = struct.unpack_from("=h", effect, _ID_AT)[0]

@@ -1,6 +1,6 @@
 """crop_map: remove the unknown cells around a map. `crop_map MAP.yaml [CROPPED.yaml]`; writes to the current folder.
 
-Source: http://wiki.ros.org/map_server. The origin moves with the lower left corner.
+Source: http://wiki.ros.org/map_server. The origin is moved to the new lower left corner.
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ __all__ = ["crop", "main"]
 def crop(
     image: NDArray[np.uint8], resolution: float, origin: tuple[float, float, float]
 ) -> tuple[NDArray[np.uint8], tuple[float, float, float]]:
-    """Return the smallest part of an image (rows from the top) with all known cells, and its origin. Raise MapError."""
+    """Return the smallest part of an image (rows from the top) that contains all known cells, and its origin.
+
+    Raise MapError if there are no known cells.
+    """
     rows, columns = np.nonzero(image != UNKNOWN_GREY)
     if not len(rows):
         raise MapError("every cell of the map is unknown: nothing is left of it")

@@ -1,6 +1,6 @@
-"""Conversion of a map's YAML file and pixels to occupancies, and of occupancies to PGM and YAML. Pure.
+"""Converts a map's YAML file and pixels to occupancies, and occupancies to PGM and YAML. Pure.
 
-Source: http://wiki.ros.org/map_server. Row 0 is the top of an image, but the bottom of a grid.
+Source: http://wiki.ros.org/map_server. Row 0 is at the top of an image, but at the bottom of a grid.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 OCCUPIED_THRESHOLD, FREE_THRESHOLD = 0.65, 0.196
-FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = 254, 0, 205  # grey levels in map_saver's images
+FREE_GREY, OCCUPIED_GREY, UNKNOWN_GREY = 254, 0, 205  # gray levels in map_saver's images
 
 
 class MapError(MinirospyError):
@@ -44,7 +44,7 @@ class MapError(MinirospyError):
 
 
 class Mode(Enum):
-    """The conversion of grey levels to occupancies."""
+    """How gray levels are converted to occupancies."""
 
     TRINARY = "trinary"
     SCALE = "scale"
@@ -52,7 +52,7 @@ class Mode(Enum):
 
 
 class MapSettings(NamedTuple):
-    """The fields of a map's YAML file: metres per pixel; x, y (metres) and yaw (radians) of the lower left corner."""
+    """The fields in a map's YAML file: metres per pixel; the lower left corner's x, y (metres) and yaw (radians)."""
 
     image: str
     resolution: float
@@ -64,9 +64,9 @@ class MapSettings(NamedTuple):
 
 
 def read_settings(text: str) -> MapSettings:
-    """Return the settings in a map's YAML file. Raise MapError with the real program's message."""
+    """Return the settings in a map's YAML file. If they are invalid, raise MapError with the real program's message."""
     try:
-        # Load all scalars as strings: yaml-cpp accepts `1e-3` as a number (YAML 1.1 does not), but rejects `false`.
+        # Load all scalars as strings: unlike YAML 1.1, yaml-cpp accepts `1e-3` as a number; it also rejects `false`.
         found = load(text, yaml.BaseLoader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -151,15 +151,15 @@ def to_grid(pixels: Pixels, settings: MapSettings) -> NDArray[np.int8]:
 
 
 def quaternion_of_yaw(yaw: float) -> tuple[float, float]:
-    """Return z and w of a rotation about z, in 32-bit floats like the real program's library."""
+    """Return z and w of the quaternion for a rotation about z, in 32-bit floats as in the real program's library."""
     half = np.float32(yaw) * np.float32(0.5)
     return float(np.sin(half)), float(np.cos(half))
 
 
 def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
-    """Return the rotation about z in radians; 0 if the pitch is a right angle, like tf2's getEulerYPR.
+    """Return the rotation about z in radians; 0 if the pitch is a right angle, as tf2's getEulerYPR does.
 
-    Also return 0 for the unset quaternion 0, 0, 0, 0: the real program writes `-nan`, which no map_server can read.
+    Also return 0 for the unset quaternion 0, 0, 0, 0. The real program writes `-nan`, which no map_server can read.
     """
     square = x * x + y * y + z * z + w * w
     if not square:
@@ -174,7 +174,10 @@ def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
 def pgm_of_grid(
     data: Sequence[int], width: int, height: int, resolution: float, occupied: int, free: int
 ) -> bytes:
-    """Return a grid as a PGM image: cells up to ``free`` are free, from ``occupied`` occupied. Raise MapError."""
+    """Return a grid as a PGM image: cells up to ``free`` are free, cells from ``occupied`` are occupied.
+
+    Raise MapError if the grid is invalid.
+    """
     cells = np.asarray(data, np.int8)
     if len(cells) != width * height:
         raise MapError(f"the map has {len(cells)} cells, where {width} x {height} are {width * height}")
@@ -187,7 +190,7 @@ def pgm_of_grid(
 
 
 def yaml_of_map(image: str, resolution: float, origin: tuple[float, float, float]) -> str:
-    """Return the YAML file for a map saved by map_saver."""
+    """Return the text of the YAML file for a map saved by map_saver."""
     x, y, yaw = origin
     return (
         f"image: {image}\nresolution: {resolution:f}\norigin: [{x:f}, {y:f}, {yaw:f}]\nnegate: 0\n"

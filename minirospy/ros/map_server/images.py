@@ -1,4 +1,4 @@
-"""Image files to pixels, with the same results as the real map_server's library.
+"""Reads image files as pixels, with the same results as the real map_server's library.
 
 PGM, PBM and PPM are decoded here, all other formats by Pillow, if it is installed.
 """
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_CELLS", "ImageError", "Pixels", "read_image"]
 
-# Cells; a message is at most 4 GiB, which is also the size of 2**30 pixels with four channels.
+# Cells in a map: a message is at most 4 GiB, which is also the size of 2**30 pixels with four channels.
 MAX_CELLS = 2**30
 
 _HEADER_NUMBER = re.compile(rb"(?:\s|#[^\n]*\n)*(\d+)")
@@ -30,18 +30,18 @@ _REVERSED_FORMATS = ("BMP", "TGA")
 
 
 class ImageError(MinirospyError):
-    """An image cannot be read; the message is one line with the reason."""
+    """The image cannot be read; the message is one line with the reason."""
 
 
 class Pixels(NamedTuple):
-    """The bytes of an image with shape (rows from the top, columns, channels); whether the last channel is alpha."""
+    """An image's bytes with shape (rows from the top, columns, channels), and whether the last channel is alpha."""
 
     values: NDArray[np.uint8]
     has_alpha: bool
 
 
 def read_image(data: bytes) -> Pixels:
-    """Return the pixels of an image file. Raise ImageError."""
+    """Return an image file's pixels. Raise ImageError if the file cannot be decoded."""
     if not data:
         raise ImageError("Unsupported image format: the file is empty")
     if data[:2] in _CHANNELS and data[2:3].isspace():
@@ -89,7 +89,7 @@ def _exactly(data: bytes, count: int) -> NDArray[np.uint8]:
 
 
 def _plain_values(data: bytes, count: int, *, is_bits: bool) -> NDArray[np.uint8]:
-    """Parse numbers in plain text; missing ones at the end are 0, as in the real program."""
+    """Parse numbers in plain text. Missing numbers at the end are 0, as in the real program."""
     text = _COMMENT.sub(b"", data)
     words = [each for each in text if each in b"01"] if is_bits else text.split()
     try:
@@ -123,7 +123,7 @@ def _read_by_pillow(data: bytes) -> Pixels:
 
 
 def _pixels_of(image: Image.Image) -> Pixels:
-    """Return the bytes that SDL_image returns for an image: palette indices, and the upper byte of 16-bit values."""
+    """Return an image's bytes as SDL_image does: palette indices, and the upper byte of 16-bit values."""
     if image.mode.startswith("I"):
         values = np.asarray(image).astype(np.int64)
         return Pixels(np.clip(values >> 8, 0, 255).astype(np.uint8)[..., None], has_alpha=False)
@@ -142,7 +142,7 @@ def _has_alpha(image: Image.Image) -> bool:
     if image.mode in ("LA", "RGBA", "PA", "La", "RGBa"):
         return True
     transparency = image.info.get("transparency")
-    # In a palette with a single transparent color, that color stays an index.
+    # SDL_image keeps palette indices if a single color is transparent.
     return isinstance(transparency, bytes) and not (
         set(transparency) <= {0, 255} and transparency.count(0) < 2
     )

@@ -1,6 +1,7 @@
 """map_saver: saves a map from the topic `map` as NAME.pgm and NAME.yaml, byte-identical to those of ROS.
 
-`map_saver [--occ THRESHOLD] [--free THRESHOLD] [-f NAME] [map:=TOPIC]`. Source: http://wiki.ros.org/map_server#map_saver.
+Usage: `map_saver [--occ THRESHOLD] [--free THRESHOLD] [-f NAME] [map:=TOPIC]`.
+Source: http://wiki.ros.org/map_server#map_saver.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _USAGE = """Usage:
 
 
 class SaverOptions(NamedTuple):
-    """The files' name without suffix; the occupancy from which a cell is occupied, and the one up to which it is free."""
+    """The files' name without suffix; the lowest occupancy of an occupied cell, and the highest of a free cell."""
 
     name: str = "map"
     occupied: int = 65
@@ -34,7 +35,7 @@ class SaverOptions(NamedTuple):
 
 
 def parse_options(words: Sequence[str]) -> SaverOptions | None:
-    """Return the options; None for ``-h``. Raise UsageError, with a message if ROS has one."""
+    """Return the options, or None for ``-h``. Raise UsageError if they are invalid, with a message if ROS has one."""
     options = SaverOptions()
     rest = iter(words)
     for word in rest:
@@ -55,7 +56,7 @@ def parse_options(words: Sequence[str]) -> SaverOptions | None:
 
 
 def _threshold(text: str, name: str, least: int) -> int:
-    # Like C's atoi: ignore characters after the digits; without digits the value is 0.
+    # As in C's atoi, ignore characters after the digits; without digits the value is 0.
     match = re.match(r"\s*[+-]?\d+", text)
     value = int(match[0]) if match else 0
     if not least <= value <= 100:
@@ -64,14 +65,14 @@ def _threshold(text: str, name: str, least: int) -> int:
 
 
 def main() -> int:
-    """Save one map; return the exit status: 1 if that fails."""
+    """Save one map; return the exit status, 1 if saving fails."""
     try:
         options = parse_options(rospy.myargv()[1:])
     except UsageError as error:
         if not str(error):
             print(_USAGE)
             return 1
-        # Print to stderr: no node is running yet, and this needs no master.
+        # Print to stderr, because no node is running yet; this error does not need a master.
         print(f"map_saver: ERROR: {error}", file=sys.stderr)
         return 1
     if options is None:
@@ -109,7 +110,7 @@ def _save_one(options: SaverOptions) -> int:
 
 
 def save_map(grid: OccupancyGrid, options: SaverOptions) -> None:
-    """Write the two files of a map. Raise MapError."""
+    """Write a map's two files. Raise MapError if the map is invalid or a file cannot be written."""
     info = grid.info
     rospy.loginfo("Received a %d X %d map @ %.3f m/pix", info.width, info.height, info.resolution)
     image = pgm_of_grid(grid.data, info.width, info.height, info.resolution, options.occupied, options.free)

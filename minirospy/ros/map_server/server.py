@@ -1,6 +1,6 @@
-"""map_server: publishes a map's files on /map and /map_metadata (latched); services static_map and change_map.
+"""map_server: publishes a map's files on /map and /map_metadata (latched), and offers services static_map and change_map.
 
-`map_server MAP.yaml`, or, deprecated, `map_server IMAGE RESOLUTION` with ~negate, ~occupied_thresh and ~free_thresh.
+Usage: `map_server MAP.yaml`, or, deprecated, `map_server IMAGE RESOLUTION` with ~negate, ~occupied_thresh and ~free_thresh.
 Parameter: ~frame_id (map). Source: http://wiki.ros.org/map_server.
 """
 
@@ -47,7 +47,7 @@ _CLOCK_SECONDS = 0.05
 
 
 def main() -> int:
-    """Run the node until it shuts down; return the exit status: 255 without a map."""
+    """Run the node until it shuts down; return the exit status, 255 if there is no map."""
     words = rospy.myargv()[1:]
     try:
         rospy.init_node("map_server", anonymous=True)
@@ -90,7 +90,10 @@ def _number(name: str, default: float) -> float:
 
 
 def settings_of_file(name: str) -> MapSettings:
-    """Return the settings in a YAML file, with the image's path relative to the current folder. Raise MapError."""
+    """Return the settings in a YAML file, with the image's path relative to the current folder.
+
+    Raise MapError if the file cannot be read or is invalid.
+    """
     try:
         text = Path(name).read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
@@ -101,7 +104,7 @@ def settings_of_file(name: str) -> MapSettings:
 
 
 def load_map(settings: MapSettings) -> OccupancyGrid:
-    """Return a map, with frame and times unset. Raise MapError."""
+    """Return a map whose frame and times are not set. Raise MapError if it cannot be loaded."""
     rospy.loginfo('Loading map from image "%s"', settings.image)
     try:
         pixels = read_image(Path(settings.image).read_bytes())
@@ -118,13 +121,13 @@ def load_map(settings: MapSettings) -> OccupancyGrid:
     x, y, yaw = settings.origin
     info.origin.position.x, info.origin.position.y = x, y
     info.origin.orientation.z, info.origin.orientation.w = quaternion_of_yaw(yaw)
-    # The message is serialized from the array, without a list of numbers.
+    # The message is serialized directly from the array, without creating a list of numbers.
     grid.data = to_grid(pixels, settings)  # type: ignore[assignment]
     return grid
 
 
 class MapServer:
-    """Serves the map: two latched topics and two services. Raise MapError if the map cannot be loaded."""
+    """Offers the map with two latched topics and two services. Raise MapError if the map cannot be loaded."""
 
     def __init__(self, settings: MapSettings) -> None:
         self._frame_id = str(rospy.get_param("~frame_id", "map"))
@@ -139,7 +142,7 @@ class MapServer:
 
     def _show(self, settings: MapSettings) -> None:
         grid = load_map(settings)
-        # With simulated time, wait for the simulation's time instead of stamping the map with 0.
+        # In simulated time, wait for the first time from the simulation; otherwise the map would be stamped with 0.
         while not rospy.Time.now() and not rospy.is_shutdown():
             time.sleep(_CLOCK_SECONDS)
         grid.info.map_load_time = rospy.Time.now()

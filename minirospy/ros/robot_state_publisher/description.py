@@ -1,4 +1,4 @@
-"""Reading the parameter robot_description, with the search order of ROS's nodes."""
+"""Reads the parameter robot_description, in the order in which ROS's nodes search namespaces."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NAME = "robot_description"
 
 
 class DescriptionError(MinirospyError):
-    """The parameter has no valid robot; ``lines`` are the messages of ROS's parser."""
+    """The parameter contains no valid robot; ``lines`` are the messages that ROS's parser prints."""
 
     def __init__(self, *lines: str) -> None:
         super().__init__(*lines)
@@ -24,7 +24,10 @@ class DescriptionError(MinirospyError):
 
 
 def robot_of_parameter(name: str = NAME) -> Robot:
-    """Return the robot in a parameter, searching from the node's namespace upwards. Raise DescriptionError."""
+    """Return the robot in a parameter, searching from the node's namespace upwards.
+
+    Raise DescriptionError if there is none, or if it is invalid.
+    """
     key = rospy.resolve_name(name)
     if not rospy.has_param(key):
         found = rospy.search_param(name)

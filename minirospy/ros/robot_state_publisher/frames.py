@@ -24,7 +24,7 @@ class LinkPose(NamedTuple):
 
 
 class RobotFrames:
-    """The frames of a robot: moving ones and fixed ones, both ordered by joint name.
+    """A robot's frames: moving ones and fixed ones, both ordered by joint name.
 
     Planar joints are treated as fixed, as in KDL. Floating joints have no frame, because a JointState cannot contain
     their pose.
@@ -43,11 +43,11 @@ class RobotFrames:
         self._names = robot.joints.keys()
 
     def fixed(self) -> Iterator[LinkPose]:
-        """Yield the link poses of fixed joints."""
+        """Yield the poses of links attached by fixed joints."""
         return (LinkPose(each.joint.parent, each.joint.child, each.pose()) for each in self._fixed)
 
     def moving(self, positions: Mapping[str, float]) -> Iterator[LinkPose]:
-        """Yield the link poses of the joints with a given position, and of the joints that mimic them."""
+        """Yield the poses of links whose joints have a given position, or mimic such a joint."""
         known = {
             name: position if math.isfinite(position) else math.nan for name, position in positions.items()
         }
@@ -62,12 +62,12 @@ class RobotFrames:
             yield LinkPose(segment.joint.parent, segment.joint.child, segment.pose(known[name]))
 
     def unknown(self, names: Mapping[str, float]) -> list[str]:
-        """Return the names that are not joints of the robot, sorted."""
+        """Return the names that are not joints in the robot, sorted."""
         return sorted(names.keys() - self._names)
 
 
 def prefixed(prefix: str, frame: str) -> str:
-    """Return a frame's name with the tf_prefix; if it starts with a slash, only remove the slash."""
+    """Return a frame's name with the tf_prefix; if the name starts with a slash, only remove the slash."""
     if frame.startswith("/"):
         return frame[1:]
     return f"{prefix.removeprefix('/')}/{frame}" if prefix else frame

@@ -1,4 +1,4 @@
-"""The parameters of joint_state_publisher, shared by its terminal and web versions. Pure: parameter values are arguments.
+"""Parameters for joint_state_publisher, shared by its terminal and web versions. Pure: parameter values are arguments.
 
 Source: http://wiki.ros.org/joint_state_publisher.
 """
@@ -17,7 +17,7 @@ NAMES = (
     "robot_description", "rate", "dependent_joints", "use_mimic_tags", "use_smallest_joint_limits", "source_list", "zeros",
     "delta", "publish_default_positions", "publish_default_velocities", "publish_default_efforts",
 )  # fmt: skip
-"""The parameters to read: the private one, else that in the node's namespace; zeros from both."""
+"""The parameters to read: the private one, or the one in the node's namespace; both are read for zeros."""
 
 
 class JointParameters(NamedTuple):
@@ -33,7 +33,7 @@ class JointParameters(NamedTuple):
 def read_parameters(param: Callable[[str, object], object], zeros: Sequence[object]) -> JointParameters:
     """Return the parameters; ``param(name, default)`` returns a value, ``zeros`` are the trees named zeros, private one first.
 
-    Raise JointError.
+    Raise JointError if a parameter is invalid.
     """
     description = param("robot_description", None)
     if not isinstance(description, str):
@@ -59,7 +59,7 @@ def read_parameters(param: Callable[[str, object], object], zeros: Sequence[obje
 
 
 def _zero(zeros: Sequence[object], joint: str) -> float | None:
-    """Return a joint's zero position, from the first tree that has it. A slash in its name separates levels of the tree."""
+    """Return a joint's zero position, from the first tree that contains the joint. Slashes in its name separate tree levels."""
     for tree in zeros:
         value: object = tree
         for part in joint.split("/"):

@@ -23,12 +23,12 @@ _CONNECT_SECONDS = 0.5
 
 
 def main() -> int:
-    """Run the node until it shuts down; return the exit status: 1 if there are no joints to publish."""
+    """Run the node until it shuts down; return the exit status, 1 if there are no joints to publish."""
     return run_node("joint_state_publisher", lambda: JointPublisher().loop())
 
 
 def run_node(name: str, body: Callable[[], object]) -> int:
-    """Initialize a node and run ``body``; return the exit status: 1 after a JointError, which is logged."""
+    """Initialize a node and run ``body``; return the exit status. After a JointError, log the error and return 1."""
     try:
         rospy.init_node(name)
         body()
@@ -49,13 +49,13 @@ def param(name: str, default: object = None) -> object:
 
 
 class JointPublisher:
-    """Publishes the joint states, and follows the topics in source_list. Raise JointError.
+    """Publishes the joint states, and follows the topics in source_list. Raise JointError if the parameters are invalid.
 
     ``on_update`` is called after each message from a source.
     """
 
     def __init__(self, on_update: Callable[[], object] = lambda: None) -> None:
-        # Use both: a zero that is missing in the private tree may be in the other.
+        # Read both trees: a zero that is missing in the private tree may be in the other tree.
         zeros = [rospy.get_param(key, {}) for key in ("~zeros", "zeros")]
         found = read_parameters(param, zeros)
         self.lock = threading.Lock()

@@ -1,6 +1,6 @@
-"""joint_state_publisher_gui as terminal sliders: joint_state_publisher with keys that set the joints.
+"""joint_state_publisher_gui with terminal sliders: joint_state_publisher with keys that set the joints.
 
-Without a terminal, for example in roslaunch, it publishes the zeros and the joint states of its sources.
+If there is no terminal, as in roslaunch, it publishes the zeros and the joint states from its sources.
 Source: http://wiki.ros.org/joint_state_publisher_gui.
 """
 
@@ -27,7 +27,7 @@ _OTHER_LINES = 6  # screen lines without sliders: the frame, the hint and the sh
 
 
 def main() -> int:
-    """Run the node until it shuts down or `q` is pressed; return the exit status: 1 if there are no joints."""
+    """Run the node until it shuts down or `q` is pressed; return the exit status, 1 if there are no joints."""
     return run_node("joint_state_publisher_gui", _run)
 
 
@@ -53,7 +53,7 @@ def _publish(publisher: JointPublisher) -> None:
 
 
 def _show(publisher: JointPublisher) -> None:
-    """Draw the sliders, and move them by keys, until the node shuts down or `q` is pressed."""
+    """Draw the sliders and handle keys until the node shuts down or `q` is pressed."""
     from rich.console import Console
     from rich.live import Live
 

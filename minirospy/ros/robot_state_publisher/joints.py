@@ -1,4 +1,4 @@
-"""The adjustable joints of a description, and their state. Pure: converts parameters to the values of a JointState.
+"""A description's adjustable joints, and their state. Pure: converts parameters to the values in a JointState.
 
 Source: http://wiki.ros.org/joint_state_publisher. Like that node, it parses the description leniently: an incomplete
 robot, or a COLLADA file, is accepted.
@@ -70,7 +70,7 @@ class Dependent:
 
 @dataclass(frozen=True)
 class JointOptions:
-    """The parameters of joint_state_publisher that determine the joints; the names are those of the parameters."""
+    """The parameters for joint_state_publisher that determine the joints; the fields have the parameters' names."""
 
     dependent_joints: Mapping[str, Dependent] = field(default_factory=dict)
     use_mimic_tags: bool = True
@@ -83,7 +83,7 @@ class JointOptions:
 
 @dataclass
 class StateValues:
-    """The lists of a JointState."""
+    """The lists in a JointState: position, velocity and effort."""
 
     name: list[str]
     position: list[float]
@@ -92,7 +92,7 @@ class StateValues:
 
 
 class JointStates:
-    """The joints in the order of the description: adjustable ones in ``free``, the others with their dependency."""
+    """The joints in the description's order: adjustable ones in ``free``, the others with their dependency."""
 
     def __init__(
         self, names: Sequence[str], free: dict[str, FreeJoint], dependent: Mapping[str, Dependent]
@@ -103,9 +103,9 @@ class JointStates:
         self._has_dependent = bool(dependent)
 
     def _rule(self, name: str, dependent: Mapping[str, Dependent]) -> Dependent:
-        """Return a joint's dependency on an adjustable joint. Raise JointError."""
+        """Return a joint's dependency on an adjustable joint. Raise JointError if the dependencies form a cycle."""
         if name not in dependent:
-            # A joint without limits; the warning has been logged.
+            # The joint has no limits; the warning has been logged.
             return Dependent("")
 
         rule = dependent[name]
@@ -131,7 +131,7 @@ class JointStates:
         velocities: Sequence[float],
         efforts: Sequence[float],
     ) -> None:
-        """Set joints from another node's JointState; a shorter list leaves the remaining values unchanged."""
+        """Set joints from another node's JointState; if a list is shorter, the remaining values stay unchanged."""
         for number, name in enumerate(names):
             joint = self.free.get(name)
             if joint is None:
@@ -149,7 +149,7 @@ class JointStates:
             joint.advance(step)
 
     def values(self) -> StateValues:
-        """Return the lists to publish; a list is empty if no joint has such a value."""
+        """Return the lists to publish; a list is empty if no joint has a value for it."""
         joints = self.free.values()
         has_position = self._has_dependent or any(joint.position is not None for joint in joints)
         has_velocity = any(joint.velocity is not None for joint in joints)
@@ -170,7 +170,10 @@ class JointStates:
 
 
 def read_joints(text: str, options: JointOptions, warn: Callable[[str], object]) -> JointStates:
-    """Return the joints of a description; call ``warn`` with a line for each omitted joint. Raise JointError."""
+    """Return a description's joints; call ``warn`` with a line for each omitted joint.
+
+    Raise JointError if the description is invalid.
+    """
     try:
         root = parse_xml(text, "robot_description")
         if root.tag == "COLLADA":
@@ -227,7 +230,7 @@ def _free_joint(name: str, lower: float, upper: float, kind: str, options: Joint
 
 
 def _limits(element: Element, kind: str) -> tuple[float, float] | None:
-    """Return the limits of a joint; None if they are missing or not numbers."""
+    """Return a joint's limits, or None if they are missing or not numbers."""
     if kind == "continuous":
         return -math.pi, math.pi
     for limit in _below(element):
@@ -259,7 +262,7 @@ def _below(element: Element) -> Iterator[Element]:
 
 
 def _collada_joints(root: Element, warn: Callable[[str], object]) -> dict[str, FreeJoint]:
-    """Return the revolute joints of a COLLADA description, which gives limits in degrees."""
+    """Return the revolute joints in a COLLADA description, whose limits are in degrees."""
     models = [each for each in _below(root) if each.tag == "kinematics_model"]
     techniques = [each for model in models[:1] for each in _below(model) if each.tag == "technique_common"]
     found = {}

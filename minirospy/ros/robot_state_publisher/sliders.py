@@ -1,4 +1,4 @@
-"""Sliders for joints, moved by keys: the selection, the meaning of the keys, and the lines to show. Pure.
+"""Sliders for joints, moved by keys: the selection, the effect of each key, and the lines to show. Pure.
 
 Source: http://wiki.ros.org/joint_state_publisher_gui, which has the same sliders, Center and Randomize.
 """
@@ -19,7 +19,7 @@ _MOVES = {"up": -1, "down": 1, "k": -1, "j": 1}
 
 
 class Row(NamedTuple):
-    """A line for a joint: its name, its bar, its position with the limits, and whether it is selected."""
+    """A joint's line: its name, its bar, its position with the limits, and whether it is selected."""
 
     name: str
     bar: str

@@ -28,11 +28,12 @@ _AHEAD = rospy.Duration(0, 500_000_000)
 
 _OLD = rospy.Duration(30)
 _CONNECT_SECONDS = 0.5
-_PREFIX_SECONDS = 1.0  # lifetime of the cached tf_prefix; ROS queries the master for each message instead
+# seconds for which tf_prefix is cached; ROS queries the master for each message instead
+_PREFIX_SECONDS = 1.0
 
 
 def main(name: str = "robot_state_publisher") -> int:
-    """Run the node until it shuts down; return the exit status: 1 without a robot."""
+    """Run the node until it shuts down; return the exit status, 1 if there is no robot."""
     try:
         rospy.init_node(name)
         robot = robot_of_parameter()
@@ -49,7 +50,7 @@ def main(name: str = "robot_state_publisher") -> int:
 
 
 def _warn_of(robot: Robot) -> None:
-    """Log warnings, in ROS's words, for features of a robot that frames cannot represent."""
+    """Log warnings, in ROS's words, about features of a robot that frames cannot represent."""
     if robot.links[robot.root].inertial:
         rospy.logwarn(
             "The root link %s has an inertia specified in the URDF, but KDL does not support a root link with an inertia.  "
@@ -70,7 +71,7 @@ def _warn_of(robot: Robot) -> None:
 
 
 class StatePublisher:
-    """Publishes the frames of a robot on /tf and /tf_static, from the states of its joints."""
+    """Publishes a robot's frames on /tf and /tf_static, computed from its joint states."""
 
     def __init__(self, frames: RobotFrames) -> None:
         self._frames = frames
@@ -89,7 +90,7 @@ class StatePublisher:
             self._tf_static.publish(TFMessage(self._stamped(frames.fixed(), rospy.Time.now())))
         else:
             self._timer = rospy.Timer(self._period, self._publish_fixed, reset=True)
-        # Existing subscribers should receive the first frames, too.
+        # Wait so that existing subscribers also receive the first frames.
         self._tf.wait_for_subscribers(timeout=_CONNECT_SECONDS)
         self._subscriber = rospy.Subscriber(
             "joint_states", JointState, self.publish, queue_size=1, tcp_nodelay=True

@@ -1,7 +1,7 @@
 """Actions: long-running goals with feedback, a final result, and cancellation.
 
-The path of a goal: client/simple_client `send_goal` -> machine `GoalManager.init_goal` -> topic goal ==> server
-`internal_goal_callback` -> simple_server, the user's callback -> handle `set_succeeded` -> topic result ==>
+A goal passes through these functions: client/simple_client `send_goal` -> machine `GoalManager.init_goal` -> topic goal ==>
+server `internal_goal_callback` -> simple_server, the user's callback -> handle `set_succeeded` -> topic result ==>
 machine `update_result` -> simple_client `_handle_transition`, the user's callback. The state transitions are in
 `minirospy.core.graph.goals`. `import actionlib` re-exports this package. Source: http://wiki.ros.org/actionlib.
 """

@@ -1,4 +1,4 @@
-"""ActionClient: any number of concurrent goals of one action, each with a handle.
+"""ActionClient: any number of concurrent goals for one action, each with a handle.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
@@ -31,7 +31,7 @@ _M = TypeVar("_M", bound=Message)
 
 
 class ActionClient:
-    """The client of the action server in the namespace ``ns``; ``ActionSpec`` is the action's class.
+    """A client for the action server in the namespace ``ns``; ``ActionSpec`` is the action's class.
 
     The parameters ``actionlib_client_pub_queue_size`` and ``actionlib_client_sub_queue_size`` set its queue sizes. Raise
     ActionException if ``ActionSpec`` is not an action class.
@@ -52,7 +52,7 @@ class ActionClient:
         if self.pub_queue_size < 0:
             self.pub_queue_size = 10
 
-        # Disable Nagle's algorithm: a small message must not wait until the previous one is acknowledged.
+        # Disable Nagle's algorithm: it delays a small message until the previous one is acknowledged.
         self.pub_goal = rospy.Publisher(
             rospy.remap_name(ns) + "/goal",
             self.ActionGoal,
@@ -90,23 +90,23 @@ class ActionClient:
         transition_cb: TransitionCallback | None = None,
         feedback_cb: FeedbackCallback | None = None,
     ) -> ClientGoalHandle:
-        """Send a goal and return its handle. Keep the handle: without it, the callbacks are no longer called.
+        """Send a goal and return its handle. Keep a reference to the handle: without one, the callbacks are no longer called.
 
         ``transition_cb(handle)`` is called on each state change, ``feedback_cb(handle, feedback)`` with feedback. Both
-        are called in threads of the library, never concurrently.
+        are called in the library's threads, never concurrently.
         """
         return self.manager.init_goal(goal, transition_cb, feedback_cb)
 
     def cancel_all_goals(self) -> None:
-        """Request the server to cancel all its goals, including those of other clients."""
+        """Request the server to cancel all its goals, including those from other clients."""
         self.pub_cancel.publish(GoalID())
 
     def cancel_goals_at_and_before_time(self, time: times.Time) -> None:
-        """Request the server to cancel all goals stamped at or before ``time``, including those of other clients."""
+        """Request the server to cancel all goals stamped at or before ``time``, including those from other clients."""
         self.pub_cancel.publish(GoalID(stamp=time))
 
     def wait_for_action_server_to_start(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Wait as :meth:`wait_for_server` does, which is the newer name."""
+        """Wait for the server: the old name of :meth:`wait_for_server`."""
         return self.wait_for_server(timeout)
 
     def wait_for_server(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
@@ -169,5 +169,5 @@ class _Listener(rospy.SubscribeListener):
 
 
 def _peer(connection: Connection) -> str:
-    """Return the name of the peer node of a connection."""
+    """Return the name of the node at the other end of a connection."""
     return connection.callerid_pub if connection.direction == "i" else connection.endpoint_id

@@ -1,4 +1,4 @@
-"""Goal IDs: made unique by the node's name, a number and the time."""
+"""Goal IDs: the node's name, a number and the time make each one unique."""
 
 from __future__ import annotations
 
@@ -20,10 +20,13 @@ class GoalIDGenerator:
         self.name = name or rospy.get_name()
 
     def set_name(self, name: str) -> None:
-        """Set the prefix of the next IDs."""
+        """Set the prefix for later IDs."""
         self.name = name
 
     def generate_ID(self) -> GoalID:
-        """Return a GoalID that is unique in this process, stamped with the current time. Raise ROSInitException."""
+        """Return a GoalID that is unique in this process, stamped with the current time.
+
+        Raise ROSInitException if init_node has not been called.
+        """
         now = rospy.Time.now()
         return GoalID(stamp=now, id=f"{self.name}-{next(self._numbers)}-{now.secs}.{now.nsecs}")

@@ -1,4 +1,4 @@
-"""The server's state of its goals: one StatusTracker per goal, and the ServerGoalHandle with which user code changes it.
+"""The server's record of its goals: one StatusTracker per goal, and the ServerGoalHandle with which user code changes it.
 
 The transitions are a table in `minirospy.core.graph.goals`.
 """
@@ -40,7 +40,7 @@ class StatusTracker:
         self.goal = goal
         self.handle_tracker: HandleTrackerDeleter | None = None
         self.id_generator = GoalIDGenerator()
-        self.ended_at = 0  # nanoseconds of ROS time; 0 until the goal ends
+        self.ended_at = 0  # nanoseconds in ROS time; 0 until the goal ends
         self._bytes: bytes | None = None
         self.status = GoalStatus()
         if goal is None:
@@ -55,16 +55,16 @@ class StatusTracker:
 
     @property
     def handle_destruction_time(self) -> times.Time:
-        """The time at which the goal ended; zero before."""
+        """Return the time at which the goal ended; zero before that."""
         return rospy.Time(nsecs=self.ended_at)
 
     def end(self) -> None:
-        """Record that the goal has ended: its status is removed from the list after the status list timeout."""
+        """Record that the goal has ended. Its status is removed from the list after the status list timeout."""
         self.ended_at = rospy.Time.now().to_nsec()
         self._bytes = None
 
     def serialize(self) -> bytes:
-        """Return the serialized status. It is cached once the goal has ended, because it no longer changes."""
+        """Return the serialized status. The bytes are cached once the goal has ended, because the status no longer changes."""
         if self._bytes is not None:
             return self._bytes
         encoded = status_bytes(self.status)
@@ -87,7 +87,7 @@ class HandleTrackerDeleter:
 
 
 class ServerGoalHandle:
-    """A goal received by a server. Without arguments it has no goal, and its methods log an error."""
+    """A goal received by a server. A handle created without arguments has no goal, and its methods log an error."""
 
     def __init__(
         self,
@@ -124,7 +124,7 @@ class ServerGoalHandle:
             self.action_server.publish_status()
 
     def set_canceled(self, result: Message | None = None, text: str = "") -> None:
-        """End the goal after a cancel request: RECALLED if it had not been accepted, else PREEMPTED."""
+        """End the goal after a cancel request, as RECALLED if it had not been accepted, otherwise as PREEMPTED."""
         self._log("Setting status to canceled on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.CANCEL, result, text)
 
@@ -167,7 +167,7 @@ class ServerGoalHandle:
             self.action_server.publish_feedback(self.status_tracker.status, feedback)
 
     def get_goal(self) -> Any:
-        """Return the goal; None if the handle has none."""
+        """Return the goal, or None if the handle has none."""
         return self.goal.goal if self.goal else None
 
     def get_goal_id(self) -> GoalID:

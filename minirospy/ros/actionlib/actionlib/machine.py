@@ -1,4 +1,4 @@
-"""The client's state of its goals: one CommStateMachine per goal, owned by the GoalManager, read by a ClientGoalHandle.
+"""The client's record of its goals: one CommStateMachine per goal, owned by the GoalManager, read by a ClientGoalHandle.
 
 The transitions are tables in `minirospy.core.graph.goals`. Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
@@ -28,11 +28,11 @@ FeedbackCallback = Callable[["ClientGoalHandle", Any], object]
 
 _DONE = CommState.DONE
 _MAY_BE_MISSING = (CommState.WAITING_FOR_GOAL_ACK, CommState.WAITING_FOR_RESULT, CommState.DONE)
-"""States in which the server's list may lack the goal: the goal is not listed yet, or no longer."""
+"""States in which the server's list may lack the goal: it is not listed yet, or no longer listed."""
 
 
 class ClientGoalHandle:
-    """A goal that was sent. Its callbacks are called only while a handle of it exists."""
+    """A goal that was sent. Its callbacks are called only while a handle for the goal exists."""
 
     def __init__(self, comm_state_machine: CommStateMachine) -> None:
         self.comm_state_machine: CommStateMachine | None = comm_state_machine
@@ -60,29 +60,32 @@ class ClientGoalHandle:
                 machine.transition_to(CommState.WAITING_FOR_CANCEL_ACK)
 
     def get_comm_state(self) -> int:
-        """Return the communication state of the goal: one of CommState."""
+        """Return the goal's communication state, a constant from CommState."""
         machine = self._machine("get_comm_state")
         return machine.state if machine else CommState.LOST
 
     def get_goal_status(self) -> int:
-        """Return the last status of the goal: one of GoalStatus."""
+        """Return the goal's last status, a constant from GoalStatus."""
         machine = self._machine("get_goal_status")
         return machine.latest_goal_status.status if machine else GoalStatus.PENDING
 
     def get_goal_status_text(self) -> str:
-        """Return the server's text for the last status."""
+        """Return the text that the server sent with the last status."""
         machine = self._machine("get_goal_status_text")
         if machine is None:
             return "ERROR: Trying to get_goal_status_text on an inactive ClientGoalHandle."
         return machine.latest_goal_status.text
 
     def get_result(self) -> Any:
-        """Return the goal's result; None if there is none yet."""
+        """Return the goal's result, or None if there is none yet."""
         machine = self._machine("get_result")
         return machine.latest_result.result if machine and machine.latest_result else None
 
     def get_terminal_state(self) -> int:
-        """Return the final state of the goal: one of TerminalState. If it has not ended, log an error and return LOST."""
+        """Return the goal's final state, a constant from TerminalState.
+
+        If the goal has not ended, log an error and return LOST.
+        """
         machine = self._machine("get_terminal_state")
         if machine is None:
             return TerminalState.LOST
@@ -104,9 +107,9 @@ class ClientGoalHandle:
 
 
 class CommStateMachine:
-    """A goal as seen by its client: processes the server's messages, and calls back on each state change.
+    """A goal as seen by its client: processes the server's messages, and calls the callback on each state change.
 
-    ``mutex`` is held during callbacks, so the callbacks of a goal never run concurrently.
+    ``mutex`` is held during callbacks, so the callbacks for one goal never run concurrently.
     """
 
     def __init__(
@@ -136,7 +139,7 @@ class CommStateMachine:
         return hash(self.action_goal.goal_id.id)
 
     def set_state(self, state: int) -> None:
-        """Set the state without calling back."""
+        """Set the state without calling the callback."""
         rospy.logdebug(
             "Transitioning CommState from %s to %s",
             CommState.to_string(self.state),
@@ -145,7 +148,7 @@ class CommStateMachine:
         self.state = state
 
     def transition_to(self, state: int) -> None:
-        """Set the state and call back."""
+        """Set the state and call the callback."""
         rospy.logdebug(
             "Transitioning to %s (from %s, goal: %s)",
             CommState.to_string(state),
@@ -169,7 +172,7 @@ class CommStateMachine:
                 self._mark_as_lost()
 
     def update_result(self, action_result: ActionResult) -> None:
-        """Process a result; ignore that of another goal."""
+        """Process a result; ignore a result for another goal."""
         if self.action_goal.goal_id.id != action_result.status.goal_id.id:
             return
         with self.mutex:
@@ -180,12 +183,12 @@ class CommStateMachine:
             elif self.state == CommState.LOST:
                 rospy.logerr("In a funny state: %i", self.state)
             else:
-                # The matching status list may arrive later or never: first make the transitions that it would cause.
+                # The matching status list may arrive later or never: first make its transitions.
                 self._follow(action_result.status.status)
                 self.transition_to(_DONE)
 
     def update_feedback(self, action_feedback: ActionFeedback) -> None:
-        """Process feedback; ignore that of another goal."""
+        """Process feedback; ignore feedback for another goal."""
         if self.action_goal.goal_id.id != action_feedback.status.goal_id.id:
             return
         with self.mutex:
@@ -218,9 +221,9 @@ class CommStateMachine:
 
 
 class GoalManager:
-    """The goals of one action client: creates them, and passes the server's messages to each.
+    """The goals of one action client: creates the goals, and passes the server's messages to each.
 
-    It has only weak references: a goal without handles receives no further messages.
+    The manager has only weak references to them: a goal without handles receives no further messages.
     """
 
     _numbers = itertools.count(1)
@@ -254,7 +257,7 @@ class GoalManager:
         action_goal = self.ActionGoal(goal_id=self._generate_id(), goal=goal)
         action_goal.header.stamp = rospy.get_rostime()
         machine = CommStateMachine(action_goal, transition_cb, feedback_cb, self.send_goal_fn, self.cancel_fn)
-        # Register the goal before sending it: the answer may arrive before the send function returns.
+        # Register the goal before sending it: the server's response may arrive before the send function returns.
         with self.list_mutex:
             self.statuses.append(weakref.ref(machine, self._forget))
         if self.send_goal_fn:

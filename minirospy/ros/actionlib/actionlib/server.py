@@ -1,4 +1,4 @@
-"""ActionServer: receives goals and cancel requests, tracks the status of each goal, publishes statuses, feedback and results.
+"""ActionServer: receives goals and cancel requests, tracks each goal's status, publishes statuses, feedback and results.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
@@ -42,9 +42,9 @@ _TOO_LATE = (
     "This goal handle was canceled by the action server because its timestamp is before the timestamp of "
     "the last cancel request"
 )
-_FEW_STATUSES = 50  # up to this many statuses are published immediately at each change
+_FEW_STATUSES = 50  # up to this many statuses are published immediately on each change
 
-# Pause after a longer list, per status in it: publishing lists must not use all the server's time.
+# Pause after a longer list, per status in it, so that publishing does not use all the server's time.
 _SECONDS_A_STATUS = 1e-4
 
 
@@ -56,12 +56,13 @@ _M = TypeVar("_M", bound=Message)
 
 
 class ActionServer:
-    """The server of the action ``ActionSpec`` in the namespace ``ns``.
+    """A server for the action ``ActionSpec`` in the namespace ``ns``.
 
     ``goal_cb(handle)`` is called with each new goal, ``cancel_cb(handle)`` with each goal that a client cancels. They
-    are called in threads of the library, never concurrently. Parameters: ``actionlib_status_frequency`` in Hz,
-    ``<ns>/status_list_timeout`` in seconds (how long the status of a goal is published after its end),
-    ``actionlib_server_pub_queue_size``, ``actionlib_server_sub_queue_size``. Raise ActionException.
+    are called in the library's threads, never concurrently. Parameters: ``actionlib_status_frequency`` in Hz,
+    ``<ns>/status_list_timeout`` in seconds (how long a goal's status is published after the goal has ended),
+    ``actionlib_server_pub_queue_size``, ``actionlib_server_sub_queue_size``. Raise ActionException if ``ActionSpec`` is not
+    an action class.
     """
 
     def __init__(
@@ -108,12 +109,12 @@ class ActionServer:
 
     @property
     def status_list(self) -> list[StatusTracker]:
-        """All goals whose status is published."""
+        """Return all goals whose status is published."""
         return list(self._trackers.values())
 
     @staticmethod
     def warn_of_auto_start() -> None:
-        """Warn that auto_start can deliver goals before the caller has the server object."""
+        """Warn that auto_start can deliver goals before the constructor has returned."""
         rospy.logwarn(_AUTO_START)
 
     def register_goal_callback(self, cb: GoalCallback) -> None:
@@ -125,7 +126,7 @@ class ActionServer:
         self.cancel_callback = cancel_cb
 
     def start(self) -> None:
-        """Start to accept goals."""
+        """Start accepting goals."""
         with self.lock:
             if self.started:
                 self.stop()
@@ -150,7 +151,7 @@ class ActionServer:
         self.pub_queue_size: int = rospy.get_param("actionlib_server_pub_queue_size", 50)
         if self.pub_queue_size < 0:
             self.pub_queue_size = 50
-        # Disable Nagle's algorithm: a small message must not wait until the previous one is acknowledged.
+        # Disable Nagle's algorithm: it delays a small message until the previous one is acknowledged.
         self.status_pub = rospy.Publisher(
             name + "/status", StatusList, latch=True, tcp_nodelay=True, queue_size=self.pub_queue_size
         )
@@ -186,7 +187,7 @@ class ActionServer:
         self._status_thread = _StatusThread(self.publish_status_now, 1.0 / self.status_frequency)
 
     def publish_result(self, status: GoalStatus, result: Message | None) -> None:
-        """Publish a goal's result, and the statuses."""
+        """Publish a goal's result, then all statuses."""
         with self.lock:
             message = self.ActionResult(status=status, result=result)
             message.header.stamp = rospy.Time.now()
@@ -201,7 +202,7 @@ class ActionServer:
             self._publish(self.feedback_pub, message)
 
     def publish_status(self) -> None:
-        """Publish the statuses of all goals: immediately if there are few, else after a pause."""
+        """Publish all goals' statuses: immediately if there are few, otherwise after a pause."""
         with self.lock:
             pause = len(self._trackers) * _SECONDS_A_STATUS
             now = time.monotonic()
@@ -211,7 +212,7 @@ class ActionServer:
                 self._status_thread.hurry(self._published_at + pause - now)
 
     def publish_status_now(self) -> None:
-        """Publish the statuses of all goals, after removing those that ended longer ago than the status list timeout."""
+        """Publish all goals' statuses, first removing goals that ended longer ago than the status list timeout."""
         with self.lock:
             now = rospy.get_rostime()
             self._forget_old(now)
@@ -221,7 +222,7 @@ class ActionServer:
             self._publish(self.status_pub, message)
 
     def internal_cancel_callback(self, goal_id: GoalID) -> None:
-        """Process a cancel request: for one goal ID, for all goals up to a stamp, or for all goals."""
+        """Process a cancel request: for one goal ID, for all goals up to a time stamp, or for all goals."""
         time.sleep(CANCEL_SECONDS)
 
         with self.lock:
@@ -239,7 +240,7 @@ class ActionServer:
                     self.cancel_callback(handle)
 
             if goal_id.id and goal_id.id not in self._trackers:
-                # The goal may still arrive: it is then recalled immediately.
+                # The goal may still arrive; it is then recalled immediately.
                 tracker = StatusTracker(goal_id, GoalStatus.RECALLING)
                 self._trackers[goal_id.id] = tracker
                 tracker.end()
@@ -270,7 +271,7 @@ class ActionServer:
                 self.goal_callback(handle)
 
     def _meet_again(self, tracker: StatusTracker) -> None:
-        """Process a goal with a known ID: it was sent twice, or cancelled before it arrived."""
+        """Process a goal whose ID is known: the goal was sent twice, or cancelled before it arrived."""
         status = tracker.status
         rospy.logdebug(
             "Goal %s was already in the status list with status %i", status.goal_id.id, status.status
@@ -305,7 +306,7 @@ class ActionServer:
 
 
 class _StatusThread:
-    """A thread that calls ``publish`` every ``period`` seconds, and sooner on request."""
+    """A thread that calls ``publish`` every ``period`` seconds, or sooner on request."""
 
     def __init__(self, publish: Callable[[], None], period: float) -> None:
         self._publish = publish
@@ -324,7 +325,7 @@ class _StatusThread:
             self._wake.set()
 
     def stop(self) -> None:
-        """Stop the calls and the thread."""
+        """Stop the thread."""
         self._stopped = True
         self._wake.set()
 
@@ -339,7 +340,10 @@ class _StatusThread:
 
 
 def _status_frequency(name: str) -> float:
-    """Return the rate in Hz at which a server publishes all statuses. Raise ActionException."""
+    """Return the rate in Hz at which a server publishes all statuses.
+
+    Raise ActionException if the parameter is not a number above 0.
+    """
     if rospy.has_param(name + "/status_frequency"):
         rospy.logwarn(
             "You're using the deprecated status_frequency parameter, please switch to "

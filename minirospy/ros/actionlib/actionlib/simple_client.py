@@ -29,7 +29,8 @@ FeedbackCallback = Callable[[Any], object]
 class SimpleActionClient:
     """A client that tracks one goal at a time: a new goal replaces the previous one.
 
-    ``ns`` is the server's namespace, ``ActionSpec`` the action's class. Raise ActionException.
+    ``ns`` is the server's namespace, ``ActionSpec`` the action's class. Raise ActionException if ``ActionSpec`` is not an
+    action class.
     """
 
     def __init__(self, ns: str, ActionSpec: type[Action]) -> None:
@@ -40,7 +41,7 @@ class SimpleActionClient:
         self.active_cb: Callable[[], object] | None = None
         self.feedback_cb: FeedbackCallback | None = None
         self._set_simple_state(SimpleGoalState.PENDING)
-        # Held while a goal is sent: its answer may arrive before its handle is stored.
+        # Held while a goal is sent: the server's response may arrive before the goal's handle is stored.
         self._lock = threading.RLock()
         self._finished: ClientGoalHandle | None = None
         self._news = Waiting()
@@ -58,8 +59,8 @@ class SimpleActionClient:
     ) -> None:
         """Send a goal; the previous goal is no longer tracked.
 
-        ``active_cb()`` is called when the server accepts the goal, ``feedback_cb(feedback)`` with feedback,
-        ``done_cb(state, result)`` when the goal ends; all in threads of the library.
+        ``active_cb()`` is called when the server accepts the goal, ``feedback_cb(feedback)`` with feedback, and
+        ``done_cb(state, result)`` when the goal ends. All are called in the library's threads.
         """
         with self._lock:
             self.stop_tracking_goal()
@@ -77,7 +78,7 @@ class SimpleActionClient:
     ) -> int:
         """Send a goal, wait until it ends, and return its state.
 
-        After ``execute_timeout`` cancel the goal, and wait for up to ``preempt_timeout`` until it ends. A zero Duration
+        After ``execute_timeout``, cancel the goal and wait for up to ``preempt_timeout`` until it ends. A zero Duration
         means no timeout.
         """
         self.send_goal(goal)
@@ -112,30 +113,30 @@ class SimpleActionClient:
         return self._news.wait_for(is_over, timeout) and self.gh is not None
 
     def get_result(self) -> Any:
-        """Return the goal's result; None if there is none yet."""
+        """Return the goal's result, or None if there is none yet."""
         if self.gh is None:
             rospy.logerr("Called get_result when no goal is running")
             return None
         return self.gh.get_result()
 
     def get_state(self) -> int:
-        """Return the goal's state, one of GoalStatus; LOST if there is no goal."""
+        """Return the goal's state, a constant from GoalStatus; LOST if there is no goal."""
         gh = self.gh
         return visible_state(gh.get_goal_status()) if gh else GoalStatus.LOST
 
     def get_goal_status_text(self) -> str:
-        """Return the server's text for the state."""
+        """Return the text that the server sent with the state."""
         if self.gh is None:
             rospy.logerr("Called get_goal_status_text when no goal is running")
             return "ERROR: Called get_goal_status_text when no goal is running"
         return self.gh.get_goal_status_text()
 
     def cancel_all_goals(self) -> None:
-        """Request the server to cancel all its goals, including those of other clients."""
+        """Request the server to cancel all its goals, including those from other clients."""
         self.action_client.cancel_all_goals()
 
     def cancel_goals_at_and_before_time(self, time: times.Time) -> None:
-        """Request the server to cancel all goals stamped at or before ``time``, including those of other clients."""
+        """Request the server to cancel all goals stamped at or before ``time``, including those from other clients."""
         self.action_client.cancel_goals_at_and_before_time(time)
 
     def cancel_goal(self) -> None:
@@ -174,7 +175,7 @@ class SimpleActionClient:
             self._log_wrong(comm_state)
 
     def _finish(self, tracked: ClientGoalHandle | None) -> None:
-        """Wake the threads that wait for the goal, after its done callback has returned."""
+        """Wake the threads that are waiting for the goal, once its done callback has returned."""
         with self._lock:
             self._finished = tracked
             if self.gh is tracked:

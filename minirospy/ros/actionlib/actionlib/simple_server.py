@@ -72,7 +72,7 @@ class SimpleActionServer:
             self.start()
 
     def start(self) -> None:
-        """Start to accept goals."""
+        """Start accepting goals."""
         self.action_server.start()
 
     def accept_new_goal(self) -> Any:
@@ -96,7 +96,7 @@ class SimpleActionServer:
         return self.new_goal
 
     def is_preempt_requested(self) -> bool:
-        """Return whether the active goal should be preempted: it was cancelled, or another goal is pending."""
+        """Return whether the active goal should be preempted, because it was cancelled or another goal is pending."""
         return self.preempt_request
 
     def is_active(self) -> bool:
@@ -130,7 +130,7 @@ class SimpleActionServer:
         return self.action_server.ActionResultType()
 
     def register_goal_callback(self, cb: Callable[[], object] | None) -> None:
-        """Set ``cb()``, called when a goal arrives; refused, with a warning, for a server with an execute callback."""
+        """Set ``cb()``, which is called when a goal arrives. If the server has an execute callback, log a warning instead."""
         if self.execute_callback:
             rospy.logwarn(
                 "Cannot call SimpleActionServer.register_goal_callback() because an executeCallback exists. "
@@ -140,7 +140,7 @@ class SimpleActionServer:
             self.goal_callback = cb
 
     def register_preempt_callback(self, cb: Callable[[], object] | None) -> None:
-        """Set ``cb()``, called when preemption of the active goal is requested."""
+        """Set ``cb()``, which is called when preemption of the active goal is requested."""
         self.preempt_callback = cb
 
     def internal_goal_callback(self, goal: ServerGoalHandle) -> None:
@@ -166,7 +166,7 @@ class SimpleActionServer:
                         self.preempt_callback()
                 if self.goal_callback:
                     self.goal_callback()
-            except BaseException as error:  # noqa: BLE001 - the user's function: the goal has come all the same
+            except BaseException as error:  # noqa: BLE001 - user code failed, but the goal has arrived
                 rospy.logerr("SimpleActionServer.internal_goal_callback - exception %s", error)
 
             self.execute_condition.notify_all()
@@ -187,7 +187,7 @@ class SimpleActionServer:
                 self.new_goal_preempt_request = True
 
     def executeLoop(self) -> None:
-        """Run the execute callback for each goal; the body of the execute thread."""
+        """Run the execute callback for each goal; this method is the body of the execute thread."""
         with rospy.interrupting(self._wake_soon):
             while True:
                 with self.execute_condition:
@@ -204,7 +204,7 @@ class SimpleActionServer:
         assert self.execute_callback
         try:
             self.execute_callback(goal)
-        except BaseException as error:  # noqa: BLE001 - the user's function: the goals after this one are to be served
+        except BaseException as error:  # noqa: BLE001 - user code failed; serve the next goals
             # During a shutdown exceptions are expected: Ctrl-C interrupts sleeps, and a hook may have closed the
             # callback's resources.
             if not rospy.is_shutdown_requested():
@@ -216,7 +216,7 @@ class SimpleActionServer:
                 self.set_aborted(None, "No terminal state was set.")
 
     def _wake_soon(self) -> None:
-        """Wake the execute loop from a new thread, because a callback that blocks may hold the lock."""
+        """Wake the execute loop from a new thread, because a blocking callback may hold the lock."""
         with naming_thread_limit():
             threading.Thread(target=self._wake, name="minirospy-action-end", daemon=True).start()
 

@@ -1,4 +1,4 @@
-"""The message classes of an action, from its class: `TestAction` -> goal, result and feedback, with and without header."""
+"""An action's message classes, found from its class: `TestAction` -> goal, result and feedback, with and without header."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ __all__ = [
 ]
 
 
-# Field in the connection header of goals from minirospy clients.
+# Field in the connection header of goal topics from minirospy clients.
 TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
 
-# Delay of goals from other clients: Python actionlib drops results that arrive before send_goal has returned.
+# Delay for goals from other clients: Python actionlib drops results that arrive before send_goal has returned.
 SEND_SECONDS = 1e-3
 
-# Delay of cancel requests: a goal sent before uses another connection, and is itself delayed.
+# Delay for cancel requests: a goal sent earlier uses another connection, and is itself delayed.
 CANCEL_SECONDS = 3 * SEND_SECONDS
 
 
 class ActionException(MinirospyError):
-    """A class that is not an action."""
+    """The class is not an action class."""
 
 
 class ActionTypes(NamedTuple):
-    """The message classes of an action; those named ``action_...`` are the ones sent on the topics."""
+    """An action's message classes; those named ``action_...`` are the ones sent on the topics."""
 
     action_goal: type[ActionGoal]
     action_result: type[ActionResult]
@@ -43,7 +43,10 @@ class ActionTypes(NamedTuple):
 
 
 def action_types(action: type[Action]) -> ActionTypes:
-    """Return the message classes of an action's class, such as ``runningLedAction``. Raise ActionException."""
+    """Return the message classes for an action class, such as ``runningLedAction``.
+
+    Raise ActionException if ``action`` is not an action class.
+    """
     try:
         parts = action()
         goal, result, feedback = parts.action_goal, parts.action_result, parts.action_feedback

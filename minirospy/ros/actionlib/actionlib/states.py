@@ -17,24 +17,24 @@ __all__ = [
 ]
 
 NO_TRANSITION, INVALID_TRANSITION = -1, -2
-"""In the transition table of ROS's client: a status that changes nothing, or is invalid.
+"""Entries in the transition table of ROS's client: a status that changes nothing, or is invalid.
 
-minirospy's table is in :mod:`minirospy.core.graph.goals`; programs may use these names after `from actionlib import *`.
+minirospy's table is in :mod:`minirospy.core.graph.goals`. Programs may use these names after `from actionlib import *`.
 """
-g_goal_id = 1  # unused; `from actionlib import *` exports it in ROS
+g_goal_id = 1  # unused; ROS's `from actionlib import *` exports it
 
 
 def get_name_of_constant(C: type, n: int) -> str:
-    """Return the name of a class's constant with this value, or a name such as ``NO_SUCH_STATE_77`` if there is none."""
+    """Return the name of the class constant with this value, or a name such as ``NO_SUCH_STATE_77`` if there is none."""
     for name, value in vars(C).items():
-        # ``type(value) is int`` excludes bool constants, which message classes also have.
+        # ``type(value) is int`` excludes bool constants, which message classes may also define.
         if type(value) is int and value == n and not name.startswith("_"):
             return name
     return f"NO_SUCH_STATE_{n}"
 
 
 class CommState:
-    """The communication states of a goal in the client."""
+    """A goal's communication states in the client."""
 
     WAITING_FOR_GOAL_ACK = int(ClientState.WAITING_FOR_GOAL_ACK)
     PENDING = int(ClientState.PENDING)
@@ -48,12 +48,12 @@ class CommState:
 
     @classmethod
     def to_string(cls, n: int) -> str:
-        """Return the name of a state."""
+        """Return a state's name."""
         return get_name_of_constant(cls, n)
 
 
 class TerminalState:
-    """The final states of a goal."""
+    """A goal's final states."""
 
     RECALLED = int(GoalState.RECALLED)
     REJECTED = int(GoalState.REJECTED)
@@ -64,12 +64,12 @@ class TerminalState:
 
     @classmethod
     def to_string(cls, n: int) -> str:
-        """Return the name of a state."""
+        """Return a state's name."""
         return get_name_of_constant(cls, n)
 
 
 class SimpleGoalState:
-    """The states of the goal in the simple client."""
+    """The goal's states in the simple client."""
 
     PENDING = int(SimpleState.PENDING)
     ACTIVE = int(SimpleState.ACTIVE)
@@ -77,9 +77,9 @@ class SimpleGoalState:
 
     @classmethod
     def to_string(cls, n: int) -> str:
-        """Return the name of a state."""
+        """Return a state's name."""
         return get_name_of_constant(cls, n)
 
 
-# ROS's actionlib also adds this method: `GoalStatus.to_string(client.get_state())`.
+# Added because ROS's actionlib adds it too: `GoalStatus.to_string(client.get_state())`.
 GoalStatus.to_string = classmethod(get_name_of_constant)  # type: ignore[attr-defined]

@@ -1,7 +1,7 @@
-"""A serialized actionlib_msgs/GoalStatusArray: composed of serialized statuses, and parsed only where needed.
+"""A serialized actionlib_msgs/GoalStatusArray: composed from serialized statuses, and parsed only on demand.
 
-A server publishes the status of each goal for seconds after its end, so a busy server publishes thousands at a time, of
-which a client needs only those of its own goals.
+A server publishes each goal's status for seconds after the goal has ended, so a busy server publishes thousands of statuses
+at a time. A client needs only those of its own goals.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def status_bytes(status: GoalStatus) -> bytes:
 
 
 class StatusList(GoalStatusArray):
-    """A GoalStatusArray that is sent from serialized statuses, and parsed on access."""
+    """A GoalStatusArray that is composed from serialized statuses, and parsed on first access."""
 
     _takes_memoryview = False
 
@@ -43,30 +43,30 @@ class StatusList(GoalStatusArray):
 
     @property
     def status_list(self) -> list[GoalStatus]:
-        """The statuses, parsed on first access."""
+        """Return the statuses, parsed on first access."""
         if self._read is None:
             self._read = [self._status(start, end) for start, end in self._bounds()]
         return self._read
 
     @status_list.setter
     def status_list(self, statuses: list[GoalStatus]) -> None:
-        # The base class's constructor sets an empty list.
+        # The base class's constructor sets an empty list: keep None, so that the bytes are still parsed on access.
         self._read = statuses or None
 
     def find(self, id: str) -> GoalStatus | None:
-        """Return the status of a goal; None if it is not in the list."""
+        """Return a goal's status, or None if the goal is not in the list."""
         name = id.encode()
         key = _COUNT.pack(len(name)) + name
         if key not in self._data:
             return None
-        # Check the position: the bytes may also occur in another goal's text.
+        # Check the position: the same bytes may also occur in another goal's text.
         for start, end in self._bounds():
             if self._data.startswith(key, start + 8):
                 return self._status(start, end)
         return None
 
     def serialize(self, buff: Writer) -> None:
-        """Serialize the message. Raise genpy.SerializationError."""
+        """Serialize the message. Raise genpy.SerializationError if a field is invalid."""
         if self._read is not None:
             self._parts = [status_bytes(status) for status in self._read]
         stamp = self.header.stamp
@@ -77,13 +77,14 @@ class StatusList(GoalStatusArray):
         buff.write(b"".join(self._parts))
 
     def deserialize(self, data: Buffer) -> StatusList:
-        """Store the message's bytes, parsing only the header. Raise genpy.DeserializationError."""
+        """Store the message's bytes, parsing only the header. Raise genpy.DeserializationError if the bytes are invalid."""
         data = bytes(data)
         try:
             seq, secs, nsecs, length = _HEADER.unpack_from(data)
             self._start = _HEADER.size + length + _COUNT.size
             (self._count,) = _COUNT.unpack_from(data, self._start - _COUNT.size)
-        except (struct.error, OverflowError):  # OverflowError: an offset beyond the range of struct
+        # OverflowError: the offset exceeds the range that struct supports
+        except (struct.error, OverflowError):
             self._fail(data)
         self.header.seq = seq
         self.header.stamp.secs, self.header.stamp.nsecs = secs, nsecs
@@ -93,7 +94,7 @@ class StatusList(GoalStatusArray):
         return self
 
     def _bounds(self) -> list[tuple[int, int]]:
-        """Return the start and end offset of each status."""
+        """Return each status's start and end offset."""
         bounds = []
         data, end = self._data, self._start
         try:
@@ -102,7 +103,8 @@ class StatusList(GoalStatusArray):
                 end += 17 + _STAMP_AND_LENGTH.unpack_from(data, start)[2]
                 end += _STATUS_AND_LENGTH.unpack_from(data, end - 5)[1]
                 bounds.append((start, end))
-        except (struct.error, OverflowError):  # OverflowError: an offset beyond the range of struct
+        # OverflowError: the offset exceeds the range that struct supports
+        except (struct.error, OverflowError):
             self._fail(data)
         return bounds
 
@@ -112,12 +114,12 @@ class StatusList(GoalStatusArray):
         return status
 
     def _fail(self, data: bytes) -> None:
-        # The generated class raises DeserializationError for the same data, with its message.
+        # For the same data, the generated class raises DeserializationError with the usual error text.
         GoalStatusArray().deserialize(data)
 
 
 def find_status(statuses: GoalStatusArray, id: str) -> GoalStatus | None:
-    """Return the status of a goal in a GoalStatusArray; None if it is not in the list."""
+    """Return a goal's status from a GoalStatusArray, or None if the goal is not in the list."""
     if isinstance(statuses, StatusList):
         return statuses.find(id)
     for status in statuses.status_list:

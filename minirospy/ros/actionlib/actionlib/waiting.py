@@ -1,4 +1,4 @@
-"""Blocking until a condition becomes true: without polling, interrupted by a shutdown, with timeouts in ROS time."""
+"""Blocks until a condition becomes true: without polling, interrupted by a shutdown, with timeouts in ROS time."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from minirospy.base.clock import SignalSafeEvent, wait_for_event
 __all__ = ["Waiting"]
 
 _FOREVER = times.Duration()
-_SIMULATED_SLICE = 0.02  # seconds; polling interval in simulated time, which may run faster than wall time
+_SIMULATED_SLICE = 0.02  # seconds; polling interval in simulated time, which may run faster than real time
 
 
 class Waiting:
-    """Threads that wait for a condition; call :meth:`notify` when it may have become true."""
+    """Wakes threads that wait for a condition; call :meth:`notify` when the condition may have become true."""
 
     def __init__(self) -> None:
         self._events: list[threading.Event] = []
 
     def notify(self) -> None:
-        """Make all waiting threads check their condition again."""
+        """Make all waiting threads check their conditions again."""
         for event in list(self._events):
             event.set()
 

@@ -1,7 +1,7 @@
 """axclient.py: send a goal to an action server from the terminal, with a form generated from the goal's type.
 
-Source: http://wiki.ros.org/actionlib (Tools). ROS's axclient.py opens a window; this one uses lines, so that scripts can use
-it too.
+Source: http://wiki.ros.org/actionlib (Tools). ROS's axclient.py opens a window; this one reads and prints lines, so that
+scripts can use it too.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 class NodeParser(Parser):
-    """A parser that ignores remapping arguments, which the node parses itself."""
+    """A parser that skips remapping arguments, which the node parses itself."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raise CommandLineError."""
+        """Return the arguments by name. Raise CommandLineError if an argument is invalid."""
         from minirospy import client as rospy
 
         return super().parse(rospy.myargv(["", *words])[1:])
@@ -71,7 +71,7 @@ def _axclient(action: str, type: str | None, goal: str | None, timeout: float | 
 
     if goal is None and type and type.lstrip().startswith("{"):
         type, goal = None, type
-    # Without signal handlers: Ctrl-C cancels the goal first.
+    # Disable signal handlers, so that Ctrl-C cancels the goal before the node shuts down.
     rospy.init_node("axclient", anonymous=True, disable_signals=True, disable_rosout=True)
     name = rospy.resolve_name(action)
     cls = action_class(type or _found_type(name, timeout))
@@ -94,9 +94,9 @@ def _axclient(action: str, type: str | None, goal: str | None, timeout: float | 
 
 
 def action_class(type_: str) -> type[Action]:
-    """Return the class of an action from its type, ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
+    """Return an action's class, given its type: ``rpi_msgs/runningLed`` or ``rpi_msgs/runningLedAction``.
 
-    Raise NotFoundError.
+    Raise NotFoundError if there is no such action.
     """
     from minirospy.core.idl.load import get_message_class, message_class
 
@@ -143,7 +143,7 @@ def _found_type(action: str, timeout: float | None) -> str:
 
 
 class _Progress:
-    """A running goal: prints its state and feedback, and cancels it on Ctrl-C."""
+    """Follows a running goal: prints its state and feedback, and cancels the goal on Ctrl-C."""
 
     def __init__(self, client: SimpleActionClient, goal: Message) -> None:
         self._client = client
@@ -163,7 +163,7 @@ class _Progress:
         self._tell("Sent")
         try:
             client.send_goal(self._goal, self._on_done, self._on_active, self._on_feedback)
-            # Wait in slices: a Ctrl-C just before a long wait would take effect only after it.
+            # Wait in slices: a Ctrl-C just before a long wait would take effect only when the wait ends.
             while not self._done.wait(_SLICE_SECONDS):
                 pass
         except KeyboardInterrupt:
@@ -190,7 +190,7 @@ class _Progress:
             self._tell("Active")
 
     def _on_feedback(self, feedback: Message) -> None:
-        # Feedback has a separate connection, and may arrive before the status.
+        # Feedback arrives on a separate connection, possibly before the status.
         self._on_active()
         line = "Feedback: " + ", ".join(f"{field.path}: {flow(field.value)}" for field in fields(feedback))
         share = progress(self._goal, feedback)
@@ -213,7 +213,7 @@ class _Progress:
 
 
 def progress(goal: Message, feedback: Message) -> float | None:
-    """Return the progress, 0 to 1, if goal and feedback each have one number, of which the goal's is not smaller; else None."""
+    """Return the progress, 0 to 1, if goal and feedback have one number each and the goal's is not the smaller one; else None."""
     wanted, reached = (
         [cast("float", field.value) for field in fields(message) if type(field.value) in (int, float)]
         for message in (goal, feedback)

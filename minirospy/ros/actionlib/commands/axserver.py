@@ -1,6 +1,6 @@
-"""axserver.py: an action server on the terminal, whose user answers the goals; for testing a client without a robot.
+"""axserver.py: an action server on the terminal, whose user enters the results; for testing a client without a robot.
 
-Source: http://wiki.ros.org/actionlib (Tools). ROS's axserver.py opens a window; this one uses lines.
+Source: http://wiki.ros.org/actionlib (Tools). ROS's axserver.py opens a window; this one reads and prints lines.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _axserver(action: str, type: str) -> None:
     print(f"Serving {rospy.resolve_name(action)} ({cls._type})", flush=True)
     while True:
         while not news.wait(_SLICE_SECONDS):
-            # Wait in slices: a Ctrl-C just before a long wait would take effect only after it.
+            # Wait in slices: a Ctrl-C just before a long wait would take effect only when the wait ends.
             pass
         news.clear()
         while server.is_new_goal_available():

@@ -17,14 +17,14 @@ __all__ = [
 
 
 class PackageNotFoundError(KeyError):
-    """There is no package of this name in ROS_PACKAGE_PATH or in minirospy."""
+    """The package is neither in ROS_PACKAGE_PATH nor part of minirospy."""
 
     def __str__(self) -> str:
         return str(self.args[0])
 
 
 def get_package_share_directory(package_name: str, print_warning: bool = True) -> str:
-    """Return the folder of a package. Raise PackageNotFoundError."""
+    """Return a package's folder. Raise PackageNotFoundError if there is no such package."""
     try:
         return str(Packages().find(package_name))
     except NotFoundError as error:
@@ -33,12 +33,12 @@ def get_package_share_directory(package_name: str, print_warning: bool = True) -
 
 
 def get_package_share_path(package_name: str, print_warning: bool = True) -> Path:
-    """Return the folder of a package. Raise PackageNotFoundError."""
+    """Return a package's folder as a Path. Raise PackageNotFoundError if there is no such package."""
     return Path(get_package_share_directory(package_name))
 
 
 def get_package_prefix(package_name: str) -> str:
-    """Return the folder of a package: ROS 1 has no shared prefix. Raise PackageNotFoundError."""
+    """Return a package's folder, because ROS 1 has no shared prefix. Raise PackageNotFoundError if there is no such package."""
     return get_package_share_directory(package_name)
 
 

@@ -36,12 +36,12 @@ def normalize_angle(angle: float) -> float:
 
 
 def shortest_angular_distance(from_angle: float, to_angle: float) -> float:
-    """Return the shortest rotation from one angle to another, from -pi to pi."""
+    """Return the shortest rotation from one angle to another; the rotation is from -pi to pi."""
     return normalize_angle(to_angle - from_angle)
 
 
 def two_pi_complement(angle: float) -> float:
-    """Return the rotation to the same angle in the opposite direction, from -2 pi to 2 pi."""
+    """Return the rotation that reaches the same angle in the opposite direction; it is from -2 pi to 2 pi."""
     if abs(angle) > _TURN:
         angle = fmod(angle, _TURN)
     return angle - _TURN if angle > 0 else angle + _TURN
@@ -50,7 +50,7 @@ def two_pi_complement(angle: float) -> float:
 def shortest_angular_distance_with_limits(
     from_angle: float, to_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float]:
-    """Return (success, rotation): the shortest rotation to an angle that stays within limits, if there is one.
+    """Return (success, rotation): the shortest rotation to an angle that stays within the limits, if there is one.
 
     All angles are from -pi to pi. The limits run counter-clockwise from left to right: [0.25, -0.25] contains pi, but not 0.
     """
@@ -61,7 +61,7 @@ def shortest_angular_distance_with_limits(
         for each in (turn, other):
             if least <= each <= greatest:
                 return True, each
-        # The target is outside the limits: rotate towards the limit that is closer to it.
+        # The target is outside the limits: rotate towards the limit that is closer to the target.
         _, least, greatest = _find_min_max_delta(to_angle, left_limit, right_limit)
         least, greatest = greatest, least
 
@@ -75,9 +75,9 @@ def shortest_angular_distance_with_limits(
 def shortest_angular_distance_with_large_limits(
     from_angle: float, to_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float]:
-    """Return (success, rotation), as the function above, for limits that may be beyond -pi and pi.
+    """Return (success, rotation) as :func:`shortest_angular_distance_with_limits` does; the limits may exceed -pi and pi.
 
-    The left limit must be below the right one.
+    The left limit must be less than the right one.
     """
     turn = shortest_angular_distance(from_angle, to_angle)
     other = two_pi_complement(turn)
@@ -93,7 +93,7 @@ def shortest_angular_distance_with_large_limits(
 def _find_min_max_delta(
     from_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float, float]:
-    """Return whether an angle is within limits, and how far it can rotate clockwise and counter-clockwise before a limit."""
+    """Return whether an angle is within the limits, and how far it can rotate clockwise and counter-clockwise before a limit."""
     to_left = shortest_angular_distance(from_angle, left_limit)
     to_right = shortest_angular_distance(from_angle, right_limit)
     left_round, right_round = two_pi_complement(to_left), two_pi_complement(to_right)

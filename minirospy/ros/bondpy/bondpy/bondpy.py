@@ -37,7 +37,7 @@ def as_float_duration(d: Seconds) -> float:
 
 
 class Timeout:
-    """Calls a function ``duration`` after ``reset``, unless it is reset or cancelled before."""
+    """Calls a function ``duration`` after ``reset``, unless the timeout is reset or cancelled before that."""
 
     def __init__(self, duration: Seconds, on_timeout: Callback | None = None) -> None:
         self.duration = duration
@@ -67,12 +67,12 @@ class Timeout:
 
 
 class Bond:
-    """One endpoint of a bond. ``start`` waits for its peer: a Bond with the same topic and ID in another node."""
+    """One endpoint of a bond. ``start`` waits for the peer: a Bond with the same topic and ID in another node."""
 
     def __init__(
         self, topic: str, id: str, on_broken: Callback | None = None, on_formed: Callback | None = None
     ) -> None:
-        """Create an endpoint without starting it. Callbacks are called without holding a lock."""
+        """Create an endpoint without starting it. Callbacks are called without a lock held."""
         self.topic = topic
         self.id = id
         self.instance_id = str(uuid.uuid4())
@@ -92,7 +92,7 @@ class Bond:
             Event.HEARTBEAT_TIMEOUT: Constants.DEFAULT_HEARTBEAT_TIMEOUT,
             Event.DISCONNECT_TIMEOUT: Constants.DEFAULT_DISCONNECT_TIMEOUT,
         }
-        # Deadlines of the active timeouts, in monotonic time.
+        # The active timeouts' deadlines, in monotonic time.
         self._deadlines: dict[Event, float] = {}
         self._heartbeat_period: float = Constants.DEFAULT_HEARTBEAT_PERIOD
         self.sub: rospy.Subscriber[Status] | None = None
@@ -104,11 +104,11 @@ class Bond:
         return f"[Bond {self.id}, Instance {self.instance_id} ({self._state.value})]"
 
     def __del__(self) -> None:
-        # Without ``pub``, __init__ has failed and there is nothing to shut down.
+        # If ``pub`` is missing, __init__ has failed and there is nothing to shut down.
         if hasattr(self, "pub"):
             self.shutdown()
 
-    # Timeouts; they can be changed until the bond is started.
+    # --- timeouts, which can be changed until the bond is started
 
     def get_connect_timeout(self) -> Seconds:
         """Return the maximum time for the bond to form."""
@@ -155,7 +155,7 @@ class Bond:
         assert not self._has_started, "the bond has started"
         self._seconds[timeout] = seconds
 
-    # Public methods.
+    # --- public methods
 
     def start(self) -> None:
         """Start sending heartbeats, and wait for the peer in a thread."""
@@ -220,7 +220,7 @@ class Bond:
                 self.condition.wait(left)
             return has_come()
 
-    # Messages from and to the peer.
+    # --- messages from and to the peer
 
     def _on_bond_status(self, msg: Status) -> None:
         if msg.id != self.id or msg.instance_id == self.instance_id:
@@ -253,7 +253,7 @@ class Bond:
         with suppress(rospy.ROSException):
             self.pub.publish(message)
 
-    # The state machine and its thread, which sends heartbeats and handles expired timeouts.
+    # --- the state machine and its thread, which sends heartbeats and handles expired timeouts
 
     def _handle(self, event: Event) -> None:
         self._state, actions = next_state(self._state, event)
@@ -307,7 +307,7 @@ class Bond:
                 self._run_timeout(event)
             return
         with self.lock:
-            # A message may have restarted the timeout meanwhile.
+            # A message may have restarted the timeout in the meantime.
             deadline = self._deadlines.get(event)
             if deadline is not None and deadline <= time.monotonic():
                 del self._deadlines[event]

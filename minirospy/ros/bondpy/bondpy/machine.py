@@ -17,7 +17,7 @@ class State(enum.Enum):
 
 
 class Event(enum.Enum):
-    """An event in the life of a bond."""
+    """An event in a bond's lifetime."""
 
     SISTER_ALIVE = enum.auto()
     SISTER_DEAD = enum.auto()
@@ -38,7 +38,7 @@ class Action(enum.Enum):
 
 
 _TABLE: dict[tuple[State, Event], tuple[State, tuple[Action, ...]]] = {
-    # The first message counts as a heartbeat, so that a sister that exits right after it is also noticed.
+    # The first message counts as a heartbeat, so that the bond also detects a sister that exits right after it.
     (State.WAITING, Event.SISTER_ALIVE): (State.ALIVE, (Action.CONNECTED, Action.HEARTBEAT)),
     (State.WAITING, Event.SISTER_DEAD): (State.DEAD, (Action.CONNECTED, Action.SISTER_DIED, Action.DEATH)),
     (State.WAITING, Event.CONNECT_TIMEOUT): (State.DEAD, (Action.DEATH,)),

@@ -1,4 +1,4 @@
-"""Conversion of CameraInfo to and from the text of calibration files, in both formats. Pure.
+"""Conversion between CameraInfo and the text of calibration files, in both formats. Pure.
 
 Source: http://wiki.ros.org/camera_calibration_parsers (formats).
 """
@@ -22,19 +22,19 @@ _MATRICES = (
     ("rectification_matrix", "R", (3, 3)),
     ("projection_matrix", "P", (3, 4)),
 )
-"""Key, field of CameraInfo, and shape; None: any shape."""
+"""Key, CameraInfo field, and shape; None: any shape."""
 _INI_COUNTS = {"width": 1, "height": 1, "camera matrix": 9, "rectification": 9, "projection": 12}
 _INI_FIELDS = {"camera matrix": "K", "distortion": "D", "rectification": "R", "projection": "P"}
-_MAX_DIGITS = 100  # in a number of pixels, leading zeros included
+_MAX_DIGITS = 100  # digits in a number of pixels, including leading zeros
 _PLAIN = re.compile(r"[\w/][\w./-]*\Z", re.ASCII)
 
 
 class CalibrationError(ValueError):
-    """A text is not a calibration, or a format does not support a calibration."""
+    """The text is not a calibration, or the format does not support the calibration."""
 
 
 def parse_yaml(text: str) -> tuple[str, CameraInfo]:
-    """Return the camera's name and parameters. Raise CalibrationError."""
+    """Return the camera's name and parameters. Raise CalibrationError if the text is not a calibration."""
     import yaml
 
     try:
@@ -56,7 +56,7 @@ def parse_yaml(text: str) -> tuple[str, CameraInfo]:
 
 
 def yaml_of(name: str, info: CameraInfo) -> str:
-    """Return a calibration as a YAML file, as written by ROS."""
+    """Return a calibration as the text of a YAML file, as ROS writes it."""
     lines = [f"image_width: {info.width}", f"image_height: {info.height}", f"camera_name: {_quoted(name)}"]
 
     def matrix(key: str, values: Sequence[float], rows: int) -> None:
@@ -72,7 +72,7 @@ def yaml_of(name: str, info: CameraInfo) -> str:
 
 
 def parse_ini(text: str) -> tuple[str, CameraInfo]:
-    """Return the camera's name and parameters. Raise CalibrationError."""
+    """Return the camera's name and parameters. Raise CalibrationError if the text is not a calibration."""
     name, found = "unknown", {}
     key = ""
     for line in (each.partition("#")[0].strip() for each in text.splitlines()):
@@ -100,7 +100,10 @@ def parse_ini(text: str) -> tuple[str, CameraInfo]:
 
 
 def ini_of(name: str, info: CameraInfo) -> str:
-    """Return a calibration as an .ini file, as written by ROS. Raise CalibrationError if the model is not plumb_bob."""
+    """Return a calibration as the text of an .ini file, as ROS writes it.
+
+    Raise CalibrationError if the model is not plumb_bob.
+    """
     if info.distortion_model != "plumb_bob" or len(info.D) != 5:
         raise CalibrationError("an .ini file holds the distortion model plumb_bob with 5 numbers alone")
 
@@ -117,14 +120,14 @@ def ini_of(name: str, info: CameraInfo) -> str:
 
 def _pixels(word: object) -> int:
     digits = word.strip() if isinstance(word, str) else ""
-    # Python converts at most 4300 digits.
+    # Limit the digits: Python raises ValueError for more than 4300.
     if not (digits.isdecimal() and len(digits) <= _MAX_DIGITS and int(digits) < 1 << 32):
         raise CalibrationError(f"a width or height is not a number of pixels: {word!r:.80}")
     return int(digits)
 
 
 def _matrix(tree: dict[str, object], key: str, shape: tuple[int, int] | None) -> tuple[float, ...]:
-    """Return the numbers of a matrix; ``shape`` None accepts any shape."""
+    """Return a matrix's numbers; ``shape`` None accepts any shape."""
     found = tree.get(key)
     if not isinstance(found, dict):
         raise CalibrationError(f"{key} is missing")

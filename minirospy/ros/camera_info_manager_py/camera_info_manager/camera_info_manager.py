@@ -1,8 +1,8 @@
 """camera_info_manager.camera_info_manager: CameraInfoManager, and the functions that it uses.
 
-URLs: ``file:///FILE``, ``package://PACKAGE/FILE``, or "" for the default; ``${NAME}`` is the camera's name and
-``${ROS_HOME}`` the folder of ROS's files. Source: http://wiki.ros.org/camera_info_manager_py, and the C++ package for the
-files' format, which is that of camera_calibration_parsers.
+URLs: ``file:///FILE``, ``package://PACKAGE/FILE``, or "" for the default. ``${NAME}`` is the camera's name and
+``${ROS_HOME}`` the folder for ROS's files. Source: http://wiki.ros.org/camera_info_manager_py. The file format is that of
+camera_calibration_parsers, as in the C++ package.
 """
 
 from __future__ import annotations
@@ -60,10 +60,16 @@ class CameraInfoMissingError(CameraInfoError):
 
 
 class CameraInfoManager:
-    """Loads a camera's calibration, and saves the ones sent to service ``set_camera_info``; create it after ``init_node``."""
+    """Loads a camera's calibration, and saves calibrations sent to the service ``set_camera_info``.
+
+    Create the manager after ``init_node``.
+    """
 
     def __init__(self, cname: str = "camera", url: str = "", namespace: str = "") -> None:
-        """Offer the service. ``cname``: the camera's name; ``url``: the calibration file; ``namespace``: that of the service."""
+        """Offer the service.
+
+        ``cname``: the camera's name; ``url``: the calibration file; ``namespace``: the service's namespace.
+        """
         self.cname = cname
         self.url = url
         self.camera_info: CameraInfo | None = None
@@ -71,7 +77,10 @@ class CameraInfoManager:
         self.svc = rospy.Service(service, SetCameraInfo, self.setCameraInfo)
 
     def getCameraInfo(self) -> CameraInfo:
-        """Return the calibration, an empty one if the file is missing. Raise CameraInfoMissingError if it has not been loaded."""
+        """Return the calibration, or an empty one if the file is missing.
+
+        Raise CameraInfoMissingError if the calibration has not been loaded.
+        """
         if self.camera_info is None:
             raise CameraInfoMissingError("Calibration missing, loadCameraInfo() needed.")
         return self.camera_info
@@ -81,7 +90,7 @@ class CameraInfoManager:
         return self.cname
 
     def getURL(self) -> str:
-        """Return the URL of the calibration as it was set."""
+        """Return the calibration's URL as it was set."""
         return self.url
 
     def isCalibrated(self) -> bool:
@@ -89,7 +98,7 @@ class CameraInfoManager:
         return bool(self.getCameraInfo().K[0] != 0.0)
 
     def loadCameraInfo(self) -> None:
-        """Load the calibration, an empty one if the file is missing. Errors are logged."""
+        """Load the calibration, or an empty one if the file is missing. Errors are logged."""
         filename = filename_of(self.url, self.cname)
         if filename is not None:
             self.camera_info = loadCalibrationFile(filename, self.cname)
@@ -114,7 +123,7 @@ class CameraInfoManager:
         return True
 
     def setURL(self, url: str) -> bool:
-        """Set the URL of the calibration, which must then be loaded again; return False if the URL is invalid."""
+        """Set the calibration's URL; return False if it is invalid. The calibration must then be loaded again."""
         if parseURL(resolveURL(url, self.cname)) >= URL_invalid:
             return False
         if self.url != url:
@@ -123,12 +132,12 @@ class CameraInfoManager:
 
 
 def genCameraName(from_string: str) -> str:
-    """Return a valid camera name: every character except letters, digits and ``_`` is replaced by ``_``."""
+    """Return a valid camera name, in which ``_`` replaces every character except letters and digits."""
     return re.sub(r"\W", "_", from_string, flags=re.ASCII)
 
 
 def parseURL(url: str) -> int:
-    """Return the type of a resolved URL: ``URL_empty``, ``URL_file``, ``URL_package`` or ``URL_invalid``."""
+    """Return a resolved URL's type: ``URL_empty``, ``URL_file``, ``URL_package`` or ``URL_invalid``."""
     if not url:
         return URL_empty
     if url[:8].upper() == "FILE:///":
@@ -141,7 +150,7 @@ def parseURL(url: str) -> int:
 
 
 def resolveURL(url: str, cname: str) -> str:
-    """Substitute the variables in a URL; an unknown variable is kept, with a warning."""
+    """Substitute the variables in a URL. Leave an unknown variable unchanged and log a warning."""
 
     def value(match: re.Match[str]) -> str:
         if match[1] == "NAME":
@@ -156,7 +165,7 @@ def resolveURL(url: str, cname: str) -> str:
 
 
 def getPackageFileName(url: str) -> str:
-    """Return the path of a package:// URL; "", with a warning, if the package is not found."""
+    """Return the path for a package:// URL. If the package is not found, log a warning and return ""."""
     package, _, name = url[len("package://") :].partition("/")
     try:
         return f"{RosPack().get_path(package)}/{name}"
@@ -166,7 +175,7 @@ def getPackageFileName(url: str) -> str:
 
 
 def loadCalibrationFile(filename: str, cname: str) -> CameraInfo:
-    """Return the calibration in a file; an empty one if the file is missing or invalid."""
+    """Return the calibration in a file, or an empty one if the file is missing or invalid."""
     if not Path(filename).exists():
         return CameraInfo()
     found = readCalibration(filename)

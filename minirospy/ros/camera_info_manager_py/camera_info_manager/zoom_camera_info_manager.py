@@ -1,4 +1,4 @@
-"""camera_info_manager.zoom_camera_info_manager: calibrations of a camera with zoom.
+"""camera_info_manager.zoom_camera_info_manager: calibrations for a camera with zoom.
 
 Source: http://wiki.ros.org/camera_info_manager_py. The focal length is proportional to the zoom level, a number.
 """
@@ -34,12 +34,12 @@ __all__ = ["ApproximateZoomCameraInfoManager", "InterpolatingZoomCameraInfoManag
 
 
 class ZoomCameraInfoManager(CameraInfoManager):
-    """The base class: a zoom level within limits. As a context manager, it stops the service at the end."""
+    """The base class: a zoom level within limits. As a context manager, it stops the service on exit."""
 
     def __init__(
         self, min_zoom: float, max_zoom: float, cname: str = "camera", url: str = "", namespace: str = ""
     ) -> None:
-        """``url``: the calibration at the lowest zoom level; for the other arguments see CameraInfoManager."""
+        """Set the limits. ``url`` is the calibration at the lowest zoom level; for the other arguments see CameraInfoManager."""
         super().__init__(cname, url, namespace)
         self._min_zoom = min_zoom
         self._max_zoom = max_zoom
@@ -66,7 +66,7 @@ class ZoomCameraInfoManager(CameraInfoManager):
 
 
 class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
-    """Computes K from the fields of view at both ends of the zoom range; all else is from the calibration file, if any."""
+    """Computes K from the fields of view at both ends of the zoom range; all else comes from the calibration file, if any."""
 
     def __init__(
         self,
@@ -80,7 +80,10 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
         url: str = "",
         namespace: str = "",
     ) -> None:
-        """``min_fov``, ``max_fov``: the horizontal field of view in degrees at the highest and at the lowest zoom level."""
+        """Set the fields of view.
+
+        ``min_fov``, ``max_fov``: horizontal, in degrees, at the highest and at the lowest zoom level.
+        """
         super().__init__(min_zoom, max_zoom, cname, url, namespace)
         self._min_fov = min_fov
         self._max_fov = max_fov
@@ -89,7 +92,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
         self._loaded_camera_info: CameraInfo | None = None
 
     def loadCameraInfo(self) -> None:
-        """Load the calibration, an empty one if the file is missing."""
+        """Load the calibration, or an empty one if the file is missing."""
         super().loadCameraInfo()
         self._loaded_camera_info = deepcopy(self.camera_info)
 
@@ -114,7 +117,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
         matrix[0] = width / (2 * tan(horizontal / 2))
         matrix[4] = height / (2 * tan(vertical / 2))
         matrix[8] = 1.0
-        # A calibrated center is scaled with the image's size; without a calibration the image's center is used.
+        # A calibrated center is scaled with the image size; without a calibration, the image center is used.
         is_calibrated = matrix[2] != 0.0 and loaded.width and loaded.height
         matrix[2] = matrix[2] * width / loaded.width if is_calibrated else width / 2
         matrix[5] = matrix[5] * height / loaded.height if is_calibrated else height / 2
@@ -123,7 +126,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
 
 
 class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
-    """Uses calibrations at some zoom levels, and interpolates linearly between them."""
+    """Uses calibrations for some zoom levels, and interpolates linearly between them."""
 
     def __init__(
         self,
@@ -133,7 +136,7 @@ class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
         url: str = "",
         namespace: str = "",
     ) -> None:
-        """``calibration_url_template``: a URL with ``%d`` for the zoom level; ``zoom_levels``: the calibrated levels."""
+        """Set the calibrated levels: ``zoom_levels``. ``calibration_url_template`` is a URL with ``%d`` for the zoom level."""
         super().__init__(min(zoom_levels), max(zoom_levels), cname, url, namespace)
         self._calibration_url_template = calibration_url_template
         self._zoom_levels = zoom_levels
@@ -142,7 +145,7 @@ class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
     def loadCameraInfo(self) -> None:
         """Load all calibrations.
 
-        Raise CameraInfoMissingError if their package is missing, CameraInfoError if there are fewer than two.
+        Raise CameraInfoMissingError if their package is missing, CameraInfoError if fewer than two can be loaded.
         """
         super().loadCameraInfo()
         self._camera_infos = {level: self._load(level) for level in self._zoom_levels}

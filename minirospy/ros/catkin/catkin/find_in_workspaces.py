@@ -27,7 +27,7 @@ def find_in_workspaces(
     workspace_to_source_spaces: object = None,
     source_path_to_packages: object = None,
 ) -> list[str]:
-    """Return the existing folders ``search_dirs`` of the workspaces, or the files ``path`` in them, for package ``project``.
+    """Return the existing folders ``search_dirs`` in the workspaces, or the files ``path`` in them, for package ``project``.
 
     ``search_dirs`` may contain etc, include, libexec and share; if ``project`` is None, also bin and lib. All searched paths
     are appended to ``considered_paths``. Raise ValueError for other folders.
@@ -59,7 +59,7 @@ def _checked(search_dirs: Sequence[str] | None, project: str | None) -> list[str
 def _by_workspace(
     workspaces: Sequence[str], chosen: Sequence[str], project: str | None
 ) -> Iterator[list[Path]]:
-    """Yield a list of folders to search for each workspace; last, the folder of the package if it is elsewhere."""
+    """Yield a list of folders to search for each workspace; last, the package's folder if it is in no workspace."""
     for workspace in workspaces:
         folders = []
         for each in chosen:

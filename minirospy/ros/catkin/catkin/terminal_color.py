@@ -26,7 +26,7 @@ for _number, _color in enumerate(_COLORS):
 
 
 class ColorTemplate(string.Template):
-    """A string template in which ``@`` precedes the name of a color."""
+    """A string template in which ``@`` precedes a color name."""
 
     delimiter = "@"
 
@@ -46,17 +46,17 @@ _USED = _Colors()
 
 
 def ansi(key: str) -> str:
-    """Return the ANSI code of a color or style. Raise KeyError."""
+    """Return the ANSI code for a color or style. Raise KeyError if the name is unknown."""
     return _USED.codes[key]
 
 
 def enable_ANSI_colors() -> None:
-    """Make the functions of this module insert ANSI codes."""
+    """Make this module's functions insert ANSI codes."""
     _USED.switch(is_on=True)
 
 
 def disable_ANSI_colors() -> None:
-    """Make the functions of this module return plain text."""
+    """Make this module's functions return plain text."""
     _USED.switch(is_on=False)
 
 
@@ -71,7 +71,7 @@ _NAMES = {"!": "boldon", "/": "italicson", "_": "ulon", "|": "reset"}
 
 
 def sanitize(msg: str) -> str:
-    """Escape a string so that :func:`fmt` returns it unchanged, except that braces are doubled."""
+    """Escape a string so that :func:`fmt` returns the original string, except that braces are doubled."""
     msg = msg.replace("@", "@@").replace("{", "{{").replace("}", "}}")
     for mark, name in _MARKS.items():
         msg = msg.replace(f"@@{mark}", f"@{{{name}}}")

@@ -11,13 +11,16 @@ CATKIN_MARKER_FILE = ".catkin"
 
 
 def get_workspaces() -> list[str]:
-    """Return the folders in CMAKE_PREFIX_PATH that are devel or install folders of catkin."""
+    """Return the folders in CMAKE_PREFIX_PATH that are catkin devel or install folders."""
     folders = os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep)
     return [folder for folder in folders if folder and Path(folder, CATKIN_MARKER_FILE).is_file()]
 
 
 def get_source_paths(workspace: str) -> list[str]:
-    """Return the source folders of a devel folder; [] for an install folder. Raise ValueError."""
+    """Return a devel folder's source folders; [] for an install folder.
+
+    Raise ValueError if ``workspace`` is not a catkin workspace.
+    """
     marker = Path(workspace, CATKIN_MARKER_FILE)
     if not marker.is_file():
         raise ValueError(f'Not a catkin workspace: "{workspace}", missing file {marker}')

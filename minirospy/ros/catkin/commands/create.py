@@ -1,4 +1,4 @@
-"""catkin_create_pkg and catkin_init_workspace: create the first files of a package and of a workspace."""
+"""catkin_create_pkg and catkin_init_workspace: create the first files in a package and in a workspace."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _init(folder: Path) -> None:
 
 
 def create_parser(command: str) -> Parser:
-    """Return the parser of catkin_create_pkg, or of `catkin create pkg`."""
+    """Return the parser for catkin_create_pkg, or for `catkin create pkg`."""
     parser = Parser(command, "Create a new catkin package in the current folder.")
     add = parser.add_argument
 

@@ -1,7 +1,7 @@
 """catkin_find, catkin_find_pkg and catkin_topological_order: find catkin's folders, files and packages.
 
-Source: http://docs.ros.org/api/catkin/html. The output is that of catkin; packages without dependencies on each other are
-sorted by name.
+Source: http://docs.ros.org/api/catkin/html. The output is identical to catkin's; packages that do not depend on each other
+are sorted by name.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ _PLACES: dict[str, Callable[[str], str]] = {
     "libexec": lambda project: f"lib/{project}",
     "share": lambda project: f"share/{project}",
 }
-"""For each search folder, its path below a workspace's devel or install folder."""
+"""Search folder -> its path below a workspace's devel or install folder."""
 
 _WITHOUT_PROJECT = ("bin", "etc", "include", "lib", "share")
 _WITH_PROJECT = ("etc", "include", "libexec", "share")
 
 
 def catkin_find(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command."""
+    """Run the command; return an exit status as defined in minirospy.command.command."""
     return FIND.main(argv)
 
 
@@ -53,7 +53,7 @@ def catkin_find_pkg(argv: Sequence[str] | None = None) -> int:
 
 
 def catkin_topological_order(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command."""
+    """Run the command; return an exit status as defined in minirospy.command.command."""
     return TOPOLOGICAL_ORDER.main(argv)
 
 
@@ -97,7 +97,7 @@ def _find(
 
 
 def _workspaces() -> Iterator[Path | None]:
-    """Yield the prefixes of the sourced workspaces, topmost overlay first; then None for minirospy's own packages."""
+    """Yield the prefixes of the sourced workspaces, topmost overlay first; then None, for minirospy's own packages."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
         if prefix and Path(prefix, ".catkin").is_file():
             yield Path(prefix)

@@ -1,6 +1,6 @@
 """catkin_make: build workspaces without CMake.
 
-catkin_make_isolated only uses other folder names: packages that need no compiler cannot conflict in CMake.
+catkin_make_isolated differs only in its folder names: without CMake there are no conflicts from which to isolate packages.
 Source: http://wiki.ros.org/catkin/commands/catkin_make.
 """
 
@@ -45,10 +45,10 @@ def catkin_make_isolated(argv: Sequence[str] | None = None) -> int:
 
 
 class _MakeParser(Parser):
-    """Removes CMake arguments; the variables that they set become the argument ``variables``."""
+    """Removes CMake arguments, and returns the variables that they set as the argument ``variables``."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raise CommandLineError."""
+        """Return the arguments by name. Raise CommandLineError if an argument is invalid."""
         return {**super().parse(without_cmake(words)), "variables": cmake_variables(words)}
 
 
@@ -151,7 +151,7 @@ def _catkin_make(
 
     tests = [target for target in targets if target.startswith("run_tests_")]
     others = {"all", "install", *TEST_TARGETS, *tests}
-    # Words with "=", such as VERBOSE=1, are variables of make. A generator's target means its whole package.
+    # Words with "=", such as VERBOSE=1, set make variables. A target for a message generator means its whole package.
     named = [_GENERATED.sub("", word) for word in targets if word not in others and "=" not in word]
     chosen = [*(pkg or []), *named]
     plans = build_packages(workspace, chosen, only_pkg_with_deps or (), variables)
@@ -167,7 +167,7 @@ def _catkin_make(
 
 
 def _check_folders(command: str, workspace: Workspace) -> None:
-    """Raise BuildError if the folder is not that of a workspace."""
+    """Raise BuildError if the folder is not a workspace."""
     if not workspace.source.is_dir():
         raise BuildError(
             str(workspace.source),
@@ -181,7 +181,7 @@ def _check_folders(command: str, workspace: Workspace) -> None:
 
 
 def _where_to_build(command: str, workspace: Workspace) -> str:
-    """Return advice if folder src does not exist: usually the current folder is src, or devel."""
+    """Return advice for a workspace without folder src: usually the current folder is src, or devel."""
     for above in workspace.root.parents:
         source = above / workspace.source.name
         if workspace.root.is_relative_to(source) or (

@@ -23,13 +23,13 @@ from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
 
 __all__ = ["run_tests"]
 
-_END_SECONDS = 20.0  # a bit longer than roslaunch waits for its nodes to exit
+_END_SECONDS = 20.0  # seconds; a bit longer than roslaunch waits for its nodes to exit
 
 
 def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
     """Run the tests of the chosen packages, or of all; return 1 if one failed.
 
-    Raise BuildError, NotFoundError; MinirospyError on Ctrl-C.
+    Raise BuildError or NotFoundError if a test cannot be run, MinirospyError on Ctrl-C.
 
     To choose a single test, use its target name in catkin, such as ``PACKAGE_rostest_test_x.test``. The results are JUnit XML
     files in ``build/test_results/PACKAGE``.
@@ -46,7 +46,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
             continue
         results = workspace.build / "test_results" / plan.name
         if _flat(plan.name) in wanted:
-            # Remove old results: their tests may no longer exist.
+            # Remove old results: the tests that wrote them may no longer exist.
             for file in results.glob("*.xml"):
                 file.unlink()
         for test in plan.tests:
@@ -59,7 +59,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
             command = _COMMANDS[test.kind](plan, test, results)
             print(f"{plan.name}: {' '.join([test.kind, test.path, *test.arguments])}", flush=True)
             status = _run(command, _environment(workspace), _folder_of(test, plan, workspace))
-            # Status 5 of pytest: it found no tests.
+            # pytest exits with status 5 if it finds no tests.
             worst |= status not in ((0, 5) if test.kind == "pytest" else (0,))
         for _, counts in results_below(results):
             if isinstance(counts, Counts):
@@ -81,7 +81,7 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
         while (status := popen.poll()) is None and not interrupted.is_set():
             interrupted.wait(POLL_SECONDS)
         if status is None:
-            # The terminal has also sent the Ctrl-C to the test.
+            # The terminal has sent the Ctrl-C to the test too.
             try:
                 popen.wait(_END_SECONDS)
             except subprocess.TimeoutExpired:
@@ -93,9 +93,9 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
 
 
 def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
-    """Return the folder in which to run a test; create it if it is the package's build folder.
+    """Return the folder in which to run a test; create the folder if it is the package's build folder.
 
-    As in catkin, ``nosetests --where=FOLDER`` changes into a folder of tests; other programs run in the build folder.
+    As in catkin, ``nosetests --where=FOLDER`` runs in the given folder; other programs run in the build folder.
     """
     if test.folder:
         return Path(test.folder)
@@ -109,7 +109,7 @@ def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
 
 
 def _targets(plan: Plan, test: Test | None) -> list[str]:
-    """Return the names of the CMake targets that run a package's tests, or one of them, in the form of :func:`_flat`."""
+    """Return the CMake targets that run a package's tests, or one test. The names are as returned by :func:`_flat`."""
     if test is None:
         return [_flat(plan.name)]
     kinds = {"pytest": ("nosetests", "pytests")}.get(test.kind, (test.kind,))
@@ -117,7 +117,7 @@ def _targets(plan: Plan, test: Test | None) -> list[str]:
 
 
 def _flat(name: str) -> str:
-    """Return a name with underscores in place of other separators: CMake target names have no slashes."""
+    """Return a name with underscores in place of other separators, because CMake target names contain no slashes."""
     return re.sub(r"\W", "_", name)
 
 
@@ -130,7 +130,7 @@ def _pytest(plan: Plan, test: Test, results: Path) -> list[str]:
 
 
 def _rostest(plan: Plan, test: Test, results: Path) -> list[str]:
-    # The same file may be run with several sets of arguments.
+    # The same file may be run with different sets of arguments.
     stem = "__".join([os.path.splitext(test.path)[0], *test.arguments])
     name = re.sub(r"[^\w.-]", "_", stem)
     options = ["--package", plan.name, "--pkgdir", str(plan.folder), "--results-filename", f"{name}.xml"]
@@ -150,7 +150,7 @@ _COMMANDS = {"pytest": _pytest, "rostest": _rostest, "roslaunch-check": _launch_
 
 
 def _environment(workspace: Workspace) -> dict[str, str]:
-    """Return the environment, with the workspace's folders prepended as by its setup file."""
+    """Return the environment, with the workspace's folders prepended as its setup file does."""
 
     def before(variable: str, path: Path) -> str:
         return os.pathsep.join(filter(None, [str(path), os.environ.get(variable, "")]))

@@ -44,12 +44,12 @@ class Counts(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0 if all passed, 1 after errors or failures, or if the folder does not exist."""
+    """Run the command; return 0 if all tests passed, 1 after errors or failures, or if the folder does not exist."""
     return COMMAND.main(argv)
 
 
 def read_counts(file: Path) -> Counts:
-    """Return the counts of a file, summed over its suites. Raise ValueError with the reason if it is not a result file."""
+    """Return a file's counts, summed over its suites. Raise ValueError with the reason if it is not a result file."""
     try:
         check_xml(text := file.read_bytes())
         root = ElementTree.fromstring(text)
@@ -69,7 +69,7 @@ def read_counts(file: Path) -> Counts:
 
 
 def results_below(folder: Path) -> Iterator[tuple[Path, Counts | ValueError]]:
-    """Yield the XML files below a folder, sorted, each with its counts, or with the error if it has none."""
+    """Yield the XML files below a folder, sorted, each with its counts, or with the error if it is not a result file."""
     for file in sorted(folder.rglob("*.xml")):
         try:
             yield file, read_counts(file)

@@ -46,7 +46,7 @@ def catkin(argv: Sequence[str] | None = None) -> int:
 
 
 class _Settings(NamedTuple):
-    """The settings that `catkin config` saves for `catkin build`; None if not set."""
+    """The settings that `catkin config` saves for `catkin build`; None means not set."""
 
     install: bool | None = None
     blacklist: Sequence[str] | None = None
@@ -55,7 +55,7 @@ class _Settings(NamedTuple):
 
     @classmethod
     def read(cls, workspace: Workspace) -> _Settings:
-        """Return the settings of a workspace; empty settings if the file is missing or invalid."""
+        """Return a workspace's settings; empty settings if the file is missing or invalid."""
         try:
             found = json.loads((workspace.root / _SETTINGS).read_bytes())
         except (OSError, ValueError):
@@ -65,7 +65,7 @@ class _Settings(NamedTuple):
         return cls(**{name: found[name] for name in cls._fields if name in found})
 
     def updated(self, new: _Settings) -> _Settings:
-        """Return these settings, overridden by those set in ``new``."""
+        """Return a copy in which the settings in ``new`` override these."""
         return _Settings(
             self.install if new.install is None else new.install,
             self.blacklist if new.blacklist is None else new.blacklist,
@@ -89,7 +89,7 @@ class _Settings(NamedTuple):
 
 
 class _CatkinParser(Parser):
-    """The parser of a verb; CMake arguments are removed; those with -D become the argument ``cmake_words``."""
+    """A verb's parser. It removes CMake arguments, and returns those that start with -D as the argument ``cmake_words``."""
 
     def __init__(self, verb: str, description: str, *, takes_cmake_words: bool = False) -> None:
         super().__init__(f"catkin {verb}", description)
@@ -103,7 +103,7 @@ class _CatkinParser(Parser):
         )
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raise CommandLineError."""
+        """Return the arguments by name. Raise CommandLineError if an argument is invalid."""
         if not self._takes_cmake_words:
             return super().parse(words)
         options = super().parse(without_cmake(words))

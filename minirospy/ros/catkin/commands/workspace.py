@@ -1,4 +1,4 @@
-"""The common part of catkin_make and catkin: the folders of a workspace; building, installing and removing."""
+"""Code shared by catkin_make and catkin: a workspace's folders; building, installing and removing."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def build_packages(
     with_deps: Collection[str] = (),
     variables: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Plan]:
-    """Build the chosen packages, or all, printing a line for each; return the plans of all packages."""
+    """Build the chosen packages, or all, printing a line for each; return all packages' plans."""
     white = [name for name in variables.get("CATKIN_WHITELIST_PACKAGES", "").split(";") if name]
     plans = read_plans(workspace.source, variables)
     names = {plan.name for plan in plans}
@@ -77,7 +77,7 @@ def build_packages(
         for warning in report.warnings:
             print(f"WARNING: {warning}", file=sys.stderr)
 
-    # As in catkin, which configures first: the workspace can be sourced even if a package fails to build.
+    # catkin configures first, so the workspace can be sourced even if a package fails to build; do the same.
     write_set_up(workspace.devel, (workspace.source,))
     build(workspace, plans, Packages(), only or None, show)
     if not plans:

@@ -1,4 +1,4 @@
-"""cv_bridge.core: CvBridge. It needs only numpy; OpenCV is needed for Bayer patterns and YUV."""
+"""cv_bridge.core: CvBridge. It needs only numpy, and OpenCV for Bayer patterns and YUV."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ __all__ = ["CvBridge", "CvBridgeError"]
 
 
 class CvBridgeError(TypeError):
-    """An image cannot be converted."""
+    """The image cannot be converted."""
 
 
 class CvBridge:
-    """Converts messages to OpenCV's arrays, (height, width) or (height, width, channels), and back."""
+    """Converts messages to OpenCV arrays, (height, width) or (height, width, channels), and back."""
 
     def __init__(self) -> None:
         self.cvdepth_to_numpy_depth: dict[int, str] = dict(enumerate(DEPTHS.values()))
@@ -41,7 +41,7 @@ class CvBridge:
         }
 
     def dtype_with_channels_to_cvtype2(self, dtype: numpy.dtype[numpy.generic], n_channels: int) -> str:
-        """Return the OpenCV name of an array type, such as 8UC3. Raise CvBridgeError if OpenCV has no such type."""
+        """Return the OpenCV name for an array type, such as 8UC3. Raise CvBridgeError if OpenCV has no such type."""
         if dtype.name not in self.numpy_type_to_cvtype:
             raise CvBridgeError(
                 f"images of {dtype.name} have no encoding: there is {', '.join(DEPTHS.values())}"
@@ -53,20 +53,20 @@ class CvBridge:
         return self.cvdepth_to_numpy_depth[cvtype % 8], cvtype // 8 + 1
 
     def encoding_to_cvtype2(self, encoding: str) -> int:
-        """Return the OpenCV type number for an encoding. Raise CvBridgeError."""
+        """Return the OpenCV type number for an encoding. Raise CvBridgeError if the encoding is unknown."""
         try:
             return type_of_encoding(encoding)
         except ValueError as error:
             raise CvBridgeError(error) from error
 
     def encoding_to_dtype_with_channels(self, encoding: str) -> tuple[str, int]:
-        """Return the numpy type and the number of channels for an encoding. Raise CvBridgeError."""
+        """Return the numpy type and the number of channels for an encoding. Raise CvBridgeError if the encoding is unknown."""
         return self.cvtype2_to_dtype_with_channels(self.encoding_to_cvtype2(encoding))
 
     def imgmsg_to_cv2(self, img_msg: Image, desired_encoding: str = "passthrough") -> Pixels:
         """Return the image in a message as an array.
 
-        It is a read-only view of the message's data, without a copy, unless the encoding or the byte order has to change.
+        The array is a read-only view into the message's data, without a copy, unless the encoding or byte order has to change.
         Padding between the rows (``step``) is skipped. Raise CvBridgeError if the encoding is unknown, the conversion
         does not exist, or the message has too little data.
         """
@@ -103,7 +103,7 @@ class CvBridge:
     def compressed_imgmsg_to_cv2(
         self, cmprs_img_msg: CompressedImage, desired_encoding: str = "passthrough"
     ) -> Pixels:
-        """Decode a compressed message. Raise CvBridgeError if it is not an image or the conversion does not exist."""
+        """Decode a compressed message. Raise CvBridgeError if the data is not an image or the conversion does not exist."""
         try:
             image = decode(bytes(cmprs_img_msg.data))
         except ValueError as error:
@@ -115,9 +115,9 @@ class CvBridge:
         return _converted(image, f"{kind}{8 * image.dtype.itemsize}", desired_encoding)
 
     def cv2_to_compressed_imgmsg(self, cvim: Pixels, dst_format: str = "jpg") -> CompressedImage:
-        """Return an array as a compressed message: jpg, png, bmp, tiff, webp, ...
+        """Return an array as a compressed message, in format jpg, png, bmp, tiff, webp or another that OpenCV supports.
 
-        Raise CvBridgeError if the format does not support it, TypeError if it is not an array.
+        Raise CvBridgeError if the format does not support the array, TypeError if it is not an array.
         """
         _check_array(cvim)
         try:
@@ -136,7 +136,7 @@ def _check_array(image: object) -> None:
 
 
 def _converted(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Convert an image to another encoding. Raise CvBridgeError."""
+    """Convert an image to another encoding. Raise CvBridgeError if there is no such conversion."""
     try:
         if is_converted_by_opencv(source, wanted):
             image, source = _by_opencv(image, source, wanted)
@@ -146,14 +146,17 @@ def _converted(image: Pixels, source: str, wanted: str) -> Pixels:
 
 
 def _by_opencv(image: Pixels, source: str, wanted: str) -> tuple[Pixels, str]:
-    """Convert a Bayer or YUV image to colors of the same depth; return it with its new encoding. Raise ValueError."""
+    """Convert a Bayer or YUV image to colors with the same depth; return the image with its new encoding.
+
+    Raise ValueError if OpenCV is not installed.
+    """
     cv2 = opencv()
     if cv2 is None:
         raise ValueError(
             f"converting [{source}] to [{wanted}] needs OpenCV: {install_command('opencv-python-headless')}"
         )
 
-    # OpenCV names a Bayer pattern after the pixels in the second row, from the second column on.
+    # OpenCV names a Bayer pattern after the pixels in the second row, starting at the second column.
     patterns = {
         "bayer_rggb": "BayerBG",
         "bayer_bggr": "BayerRG",

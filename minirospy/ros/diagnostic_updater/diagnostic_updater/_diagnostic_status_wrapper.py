@@ -17,7 +17,7 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
     """A diagnostic_msgs/DiagnosticStatus that is filled step by step, and can be published directly."""
 
     def __init__(self, *args: Any, **kwds: Any) -> None:
-        """Set the fields: all by position, or some by name."""
+        """Set the fields: all by position, or some by keyword."""
         super().__init__(*args, **kwds)
 
     @overload
@@ -27,12 +27,12 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
     def summary(self, level: int, message: object, /) -> None: ...
 
     def summary(self, *args: object) -> None:
-        """Set level and message: ``summary(level, message)``, or copy them with ``summary(status)``."""
+        """Set level and message: ``summary(level, message)``, or ``summary(status)`` to copy them."""
         self.level, message = _summary_of(args)
         self.message = str(message)
 
     def clearSummary(self) -> None:
-        """Set level OK and an empty message."""
+        """Set the level to OK and the message to an empty string."""
         self.summary(OK, "")
 
     @overload
@@ -44,7 +44,9 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
     def mergeSummary(self, *args: object) -> None:
         """Merge a level and a message; the arguments are those of ``summary``.
 
-        The higher level is used. The messages are joined if both are OK or neither is, else the one that is not OK is used.
+        The higher level is used. If both levels are OK or neither is, the messages are joined; otherwise, the message
+        whose level
+        is not OK is used.
         """
         level, message = _summary_of(args)
         if (level > OK) == (self.level > OK):
@@ -59,7 +61,7 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
 
 
 def _summary_of(args: tuple[object, ...]) -> tuple[int, str]:
-    """Return level and message. Raise TypeError if the arguments are neither a status nor a level and a message."""
+    """Return the level and message. Raise TypeError if the arguments are neither a status nor a level and a message."""
     if len(args) == 2:
         level, message = args
     elif len(args) == 1 and isinstance(args[0], DiagnosticStatus):

@@ -64,7 +64,7 @@ class FunctionDiagnosticTask(DiagnosticTask):
 
 
 class CompositeDiagnosticTask(DiagnosticTask):
-    """Several tasks with one status: it has all their values, the highest level, and the merged messages."""
+    """Several tasks with one status, which has all their values, the highest level, and the merged messages."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -80,7 +80,7 @@ class CompositeDiagnosticTask(DiagnosticTask):
         initial.summary(stat)
         for task in self.tasks:
             stat.summary(initial)
-            # Accept a task that returns None: it has filled the status anyway.
+            # Accept a task that returns None: it has filled the status in place.
             stat = task.run(stat) or stat
             merged.mergeSummary(stat)
         stat.summary(merged)
@@ -98,7 +98,7 @@ class DiagnosticTaskVector:
             self.fn = fn
 
         def run(self, stat: Status) -> Status:
-            """Set the status's name and fill it."""
+            """Set the status's name and fill the status."""
             stat.name = self.name
             return self.fn(stat)
 
@@ -133,7 +133,7 @@ class DiagnosticTaskVector:
 
 
 class Updater(DiagnosticTaskVector):
-    """Runs its tasks in ``update``, every ~diagnostic_period seconds (default 1), and publishes them on /diagnostics."""
+    """Runs its tasks in ``update``, every ~diagnostic_period seconds (default 1); publishes the statuses on /diagnostics."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -188,7 +188,7 @@ class Updater(DiagnosticTaskVector):
         self.publish(statuses)
 
     def publish(self, msg: Status | list[Status]) -> None:
-        """Publish one or several statuses, with the node's name prepended to their names."""
+        """Publish one or several statuses, with the node's name added in front of theirs."""
         statuses = msg if isinstance(msg, list) else [msg]
         for status in statuses:
             status.name = f"{rospy.get_name()[1:]}: {status.name}"

@@ -1,4 +1,4 @@
-"""Diagnostics of a topic: its publishing frequency, and the age of its stamps.
+"""Diagnostics for a topic: its publishing frequency, and the age of its time stamps.
 
 Source: http://wiki.ros.org/diagnostic_updater.
 """
@@ -25,7 +25,7 @@ __all__ = ["DiagnosedPublisher", "HeaderlessTopicDiagnostic", "TopicDiagnostic"]
 
 
 class HeaderlessTopicDiagnostic(CompositeDiagnosticTask):
-    """A task that reports the frequency of a topic."""
+    """A task that reports a topic's frequency."""
 
     def __init__(self, name: str, diag: DiagnosticTaskVector, freq: FrequencyStatusParam) -> None:
         """Create the task, and add it to the updater ``diag`` as "<name> topic status"."""
@@ -45,7 +45,7 @@ class HeaderlessTopicDiagnostic(CompositeDiagnosticTask):
 
 
 class TopicDiagnostic(HeaderlessTopicDiagnostic):
-    """A task that reports the frequency of a topic and the age of its stamps."""
+    """A task that reports a topic's frequency and the age of its time stamps."""
 
     def __init__(
         self, name: str, diag: DiagnosticTaskVector, freq: FrequencyStatusParam, stamp: TimeStampStatusParam
@@ -55,7 +55,7 @@ class TopicDiagnostic(HeaderlessTopicDiagnostic):
         self.addTask(self.stamp)
 
     def tick(self, stamp: times.Time | float) -> None:
-        """Count a message with this stamp."""
+        """Count a message with this time stamp."""
         self.stamp.tick(stamp)
         self.freq.tick()
 
@@ -74,6 +74,6 @@ class DiagnosedPublisher(TopicDiagnostic):
         self.publisher = pub
 
     def publish(self, message: Stamped) -> None:
-        """Count a message with its header's stamp and publish it."""
+        """Count a message with its header's time stamp, and publish the message."""
         self.tick(message.header.stamp)
         self.publisher.publish(message)

@@ -1,4 +1,4 @@
-"""Tasks that monitor the frequency of events, the age of stamps, and whether the node is alive.
+"""Tasks that monitor the frequency of events, the age of time stamps, and whether the node is alive.
 
 Source: http://wiki.ros.org/diagnostic_updater.
 """
@@ -27,7 +27,7 @@ class FrequencyStatusParam:
     """The limits of FrequencyStatus."""
 
     def __init__(self, freq_bound: Mapping[str, float], tolerance: float = 0.1, window_size: int = 5) -> None:
-        """``freq_bound``: "min" and optionally "max", in Hz; read at each run.
+        """Set the limits. ``freq_bound``: "min" and optionally "max", in Hz, read at each run.
 
         ``tolerance``: the fraction by which a frequency may exceed the bounds; ``window_size``: in runs.
         """
@@ -101,7 +101,7 @@ class FrequencyStatus(DiagnosticTask):
 
 
 class TimeStampStatusParam:
-    """The accepted age of a stamp on arrival, in seconds; a negative age is in the future."""
+    """The accepted age of a time stamp on arrival, in seconds; a negative age is in the future."""
 
     def __init__(self, min_acceptable: float = -1, max_acceptable: float = 5) -> None:
         self.max_acceptable = max_acceptable
@@ -109,7 +109,7 @@ class TimeStampStatusParam:
 
 
 class TimeStampStatus(DiagnosticTask):
-    """Reports stamps since the last run that are zero, too old, or too far in the future, and counts such runs."""
+    """Reports time stamps since the last run that are zero, too old, or too far in the future, and counts such runs."""
 
     def __init__(self, params: TimeStampStatusParam | None = None, name: str = "Timestamp Status") -> None:
         super().__init__(name)
@@ -127,7 +127,7 @@ class TimeStampStatus(DiagnosticTask):
         self.deltas_valid = False
 
     def tick(self, stamp: times.Time | float) -> None:
-        """Count an event with its stamp: a Time, or seconds."""
+        """Count an event with its time stamp: a Time, or seconds."""
         seconds = stamp if isinstance(stamp, (int, float)) else stamp.to_sec()
         with self.lock:
             if seconds == 0:
@@ -139,7 +139,7 @@ class TimeStampStatus(DiagnosticTask):
             self.deltas_valid = True
 
     def run(self, stat: Status) -> Status:
-        """Fill a status from the stamps since the last run."""
+        """Fill a status from the time stamps since the last run."""
         with self.lock:
             self._summarize(stat)
             for key, value in (

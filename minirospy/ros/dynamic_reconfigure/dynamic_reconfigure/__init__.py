@@ -15,13 +15,13 @@ __all__ = [
 
 _SUFFIX = "/set_parameters"
 
-Value: TypeAlias = bool | int | float | str  # the value of a parameter
+Value: TypeAlias = bool | int | float | str  # a parameter's value
 
 Values: TypeAlias = Mapping[str, Any]
-"""Values by parameter name; ``groups``, if present, has the tree of groups or their states."""
+"""Values by parameter name; ``groups``, if present, contains the tree of groups or their states."""
 
 GroupTree: TypeAlias = Mapping[str, Any]
-"""A group, as in a type's description or decoded: its ID, name and state, its parameters, and its subgroups."""
+"""A group, from a type's description or decoded: its ID, name and state, its parameters, and its subgroups."""
 
 
 class Entry(TypedDict, total=False):
@@ -34,9 +34,9 @@ class Entry(TypedDict, total=False):
     description: str
     srcfile: str
     srcline: int
-    # Constants only.
+    # For constants only.
     value: Value
-    # Parameters only.
+    # For parameters only.
     default: Value | None
     min: Value | None
     max: Value | None

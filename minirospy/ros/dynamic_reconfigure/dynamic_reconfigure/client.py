@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Client", "ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv"]
 
-_SLICE_SECONDS = 0.25  # seconds between checks for the node's shutdown while waiting
+_SLICE_SECONDS = 0.25  # seconds between checks for the node's shutdown
 
 _TYPES: dict[str, type] = {"int": int, "double": float, "str": str, "bool": bool}
 _TRUE = ("yes", "true", "t", "1")
@@ -44,7 +44,7 @@ DescriptionCallback = Callable[[list[Entry] | None], object]
 
 
 class Client:
-    """A client for the configuration of a server, which usually is a node."""
+    """A client for the configuration of a server, usually a node."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class Client:
         ``config_callback(config)`` is called on each change. Raise ROSException if the server does not appear in time.
         """
         if not isinstance(name, str):
-            # Without this check it would wait for a server that cannot exist.
+            # Without this check the client would wait for a server that cannot exist.
             raise TypeError(f"the name of a server is a string, not {name!r}")
         self.name = name
         self.config: Config | None = None
@@ -80,7 +80,10 @@ class Client:
         )
 
     def get_configuration(self, timeout: float | None = None) -> Config | None:
-        """Return the server's latest configuration, waiting for the first; None after ``timeout`` seconds or at shutdown."""
+        """Return the server's latest configuration, waiting for the first one.
+
+        Return None after ``timeout`` seconds or at shutdown.
+        """
         if not timeout:
             if not self._wait(lambda: self.config is not None, 1.0):
                 print("Waiting for configuration...", file=sys.stderr)
@@ -89,12 +92,12 @@ class Client:
         return self.config
 
     def get_parameter_descriptions(self, timeout: float | None = None) -> list[Entry] | None:
-        """Return a dict for each parameter of the server; None after ``timeout`` seconds or at shutdown."""
+        """Return a dict for each of the server's parameters, or None after ``timeout`` seconds or at shutdown."""
         self._wait(lambda: self.param_description is not None, timeout)
         return self.param_description
 
     def get_group_descriptions(self, timeout: float | None = None) -> Config | None:
-        """Return the tree of the server's groups; None after ``timeout`` seconds or at shutdown."""
+        """Return the tree of the server's groups, or None after ``timeout`` seconds or at shutdown."""
         self._wait(lambda: self.group_description is not None, timeout)
         return self.group_description
 
@@ -155,7 +158,7 @@ class Client:
         return self._description_callback
 
     def set_description_callback(self, value: DescriptionCallback | None) -> None:
-        """Set the callback for parameter descriptions, and call it with the current ones."""
+        """Set the callback for parameter descriptions, and call it with the current descriptions."""
         self._description_callback = value
         if value is not None:
             value(self.param_description)
@@ -163,7 +166,10 @@ class Client:
     description_callback = property(get_description_callback, set_description_callback)
 
     def _wait(self, is_there: Callable[[], bool], timeout: float | None) -> bool:
-        """Wait until ``is_there()`` is true, and return it. With ``timeout`` None or 0, wait until the node shuts down."""
+        """Wait until ``is_there()`` is true, and return its last result.
+
+        With ``timeout`` None or 0, wait until the node shuts down.
+        """
         end = time.monotonic() + timeout if timeout else None
         with self._cv:
             while not is_there() and not rospy.is_shutdown():
@@ -198,7 +204,7 @@ class Client:
         return _TYPES[type_str]
 
     def _converted(self, description: Entry, value: object) -> object:
-        """Return a value converted to the type of a parameter."""
+        """Return a value converted to a parameter's type."""
         name = description["name"]
         wanted = self._param_types[name]
         if isinstance(value, str):
@@ -216,7 +222,7 @@ class Client:
 
 
 def _constants(edit_method: str) -> list[dict[str, Any]]:
-    """Return the constants of an enum. The string is a Python dict from another node, so it is parsed but not executed."""
+    """Return an enum's constants. The string is a Python dict from another node, so it is parsed but not executed."""
     try:
         found = ast.literal_eval(edit_method)["enum"] if edit_method else []
     except (ValueError, SyntaxError, KeyError, TypeError, MemoryError, RecursionError):
@@ -225,7 +231,7 @@ def _constants(edit_method: str) -> list[dict[str, Any]]:
 
 
 def _wait_for(service: str, timeout: float | None) -> None:
-    """Wait for a service. Raise ROSException."""
+    """Wait for a service. Raise ROSException after ``timeout`` seconds, or if the node shuts down."""
     if timeout:
         rospy.wait_for_service(service, timeout)
         return

@@ -67,7 +67,7 @@ Example launch file:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status. ``argv`` excludes the program's name."""
+    """Run the command; return its exit status. ``argv`` does not include the program's name."""
     words = rospy.myargv(["dynparam", *(sys.argv[1:] if argv is None else argv)])[1:]
     command = COMMANDS.get(words[0]) if words else None
     if command is None:
@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser(verb: str, usage: str = "", *more: str, missing: Mapping[str, str] | None = None) -> Parser:
-    """Return the parser of a verb whose arguments are a node's name, and ``more``."""
+    """Return the parser for a verb whose arguments are a node's name, and ``more``."""
     parser = Parser(
         f"dynparam {verb}",
         ros_usage=(usage or f"%prog {verb} [options] node{''.join(f' {each}' for each in more)}").replace(
@@ -166,7 +166,7 @@ def _load(node: str, file: str, timeout: float | None) -> None:
 
 
 def _documents(file: str) -> list[object]:
-    """Return the documents of a YAML file. Raise MinirospyError."""
+    """Return the documents in a YAML file. Raise MinirospyError if the file is not valid YAML."""
     from minirospy.introspect.configurations import configuration_documents
 
     try:
@@ -193,7 +193,7 @@ def _plain(value: object) -> object:
 
 
 def _connect() -> None:
-    """Initialize a node. Raise MasterUnreachableError; ROS waits silently for a master instead."""
+    """Initialize a node. Raise MasterUnreachableError if there is no master; ROS waits for a master silently."""
     _check_master()
     rospy.init_node("dynparam", anonymous=True)
 
@@ -213,7 +213,7 @@ def _values_of(node: str, timeout: float | None) -> Config | None:
 
 
 def _change(node: str, values: Values, timeout: float | None) -> None:
-    """Change values at a node. Raise ROSException if it does not appear in time, MinirospyError if its server fails."""
+    """Change values at a node. Raise ROSException if the node does not appear in time, MinirospyError if its server fails."""
     from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.client import Client
 
     client = Client(node, timeout=timeout)

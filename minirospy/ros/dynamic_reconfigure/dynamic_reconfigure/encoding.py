@@ -1,6 +1,6 @@
 """dynamic_reconfigure.encoding: conversion of configurations and descriptions to messages, and back.
 
-A configuration is a dict of values by name; its key ``groups`` has the tree of its groups, each a dict with ``id``,
+A configuration is a dict of values by name. Its key ``groups`` contains the tree of its groups, each a dict with ``id``,
 ``parent``, ``name``, ``type``, ``state``, ``groups`` and ``parameters``. Groups refer to each other by ID; 0 is the
 root group.
 """
@@ -59,12 +59,12 @@ class Config(dict[str, Any]):
     """A configuration; its values are also attributes. Reading a missing attribute raises KeyError, as in ROS."""
 
     def __init__(self, *args: Iterable[tuple[str, object]] | Values, **kwargs: object) -> None:
-        """Create it from the arguments of dict."""
+        """Create a configuration from the arguments that dict accepts."""
         super().__init__(*args, **kwargs)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
-            # copy and pickle test for special methods and expect AttributeError.
+            # copy and pickle look for special methods and expect AttributeError.
             raise AttributeError(name)
         return self[name]
 
@@ -93,7 +93,7 @@ def encode_description(descr: ConfigType) -> ConfigDescription:
 
 
 def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
-    """Return a group of a type's description as a message, followed by all its subgroups."""
+    """Return a group from a type's description as a message, followed by all its subgroups."""
     parameters = [
         ParamDescription(*(each[key] for key in ("name", "type", "level", "description", "edit_method")))
         for each in group["parameters"]
@@ -105,7 +105,7 @@ def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
 def encode_config(config: Values, flat: bool = True) -> ConfigMsg:
     """Return a configuration as a message. Values other than bool, int, float, str and groups are omitted.
 
-    With ``flat``, a group is a tree; without, its values are the groups.
+    ``flat``: the key ``groups`` contains a tree, of which all groups are added; otherwise, it contains a dict of the groups.
     """
     message = ConfigMsg()
     lists: dict[type, tuple[list[Any], type[Any]]] = {
@@ -134,7 +134,7 @@ def _inner_groups(group: GroupTree) -> Iterator[GroupTree]:
 
 
 def group_dict(group: Group | GroupState) -> Config:
-    """Return a group without its subgroups and parameters; for a description, its state is True."""
+    """Return a group without its subgroups and parameters; in a description, the group's state is True."""
     return Config(
         id=group.id,
         parent=group.parent,
@@ -147,7 +147,7 @@ def group_dict(group: Group | GroupState) -> Config:
 
 
 def decode_description(msg: ConfigDescription) -> Config:
-    """Return the tree of a type's groups; each parameter is a dict with ``name``, ``min``, ``max``, ``default``, ..."""
+    """Return a type's groups as a tree; each parameter is a dict with ``name``, ``min``, ``max``, ``default``, ..."""
     least, greatest, defaults = (decode_config(each) for each in (msg.min, msg.max, msg.dflt))
 
     def described(group: Group) -> Config:
@@ -171,14 +171,14 @@ def decode_description(msg: ConfigDescription) -> Config:
 
 
 def get_tree(m: ConfigDescription | ConfigMsg, group: Group | GroupState | None = None) -> Config:
-    """Return the tree of a message's groups; if ``group`` is given and not the root, return only its subgroups by name."""
+    """Return a message's groups as a tree; if ``group`` is given and not the root, return only its subgroups by name."""
     if group is None or group.id == 0:
         return _tree(m.groups, group_dict)
     return _children(m.groups, group.id, group_dict, set())
 
 
 def _tree(groups: Iterable[_G], decode: Callable[[_G], Config]) -> Config:
-    """Return the root group with its subgroups; an empty group if the message has none."""
+    """Return the root group with its subgroups, or an empty group if the message has none."""
     outermost = [each for each in groups if each.id == 0]
     if not outermost:
         return Config(groups=Config(), parameters=[])
@@ -188,7 +188,7 @@ def _tree(groups: Iterable[_G], decode: Callable[[_G], Config]) -> Config:
 
 
 def _children(groups: Iterable[_G], parent: int, decode: Callable[[_G], Config], above: set[int]) -> Config:
-    """Return the subgroups of a group by name. Groups that contain themselves are omitted."""
+    """Return a group's subgroups by name. Groups that contain themselves are omitted."""
     children = Config()
     for each in groups:
         if each.id != 0 and each.parent == parent and each.id not in above:
@@ -214,7 +214,7 @@ def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Conf
 
 
 def decode_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
-    """Return a configuration; given the type's description, its groups also contain the values of their parameters."""
+    """Return a configuration. If a type's description is given, the groups also contain their parameters' values."""
     config = _values(msg)
     if msg.groups and description is not None:
         config["groups"] = get_tree(msg)
@@ -235,7 +235,7 @@ def _values(msg: ConfigMsg) -> Config:
 
 
 def _groups_in(group: GroupTree) -> list[GroupTree]:
-    """Return the subgroups of a group: they are a list in a type's description, a dict in a decoded one."""
+    """Return a group's subgroups: a type's description has a list of them, a decoded one a dict."""
     groups = group["groups"]
     return list(groups.values()) if isinstance(groups, dict) else list(groups)
 
@@ -247,7 +247,7 @@ def _all_groups(group: GroupTree) -> Iterator[GroupTree]:
 
 
 def _matching(group: Config, description: GroupTree) -> Iterator[tuple[Config, GroupTree]]:
-    """Yield each group of a configuration with its description, matched by name."""
+    """Yield each group in a configuration with its description, matched by name."""
     yield group, description
     described = {each["name"]: each for each in _groups_in(description)}
     for name, each in group["groups"].items():
@@ -256,7 +256,7 @@ def _matching(group: Config, description: GroupTree) -> Iterator[tuple[Config, G
 
 
 def extract_params(group: GroupTree) -> list[Entry]:
-    """Return the parameters of a group and of all its subgroups."""
+    """Return the parameters in a group and in all its subgroups."""
     return [each for inner in _all_groups(group) for each in inner["parameters"]]
 
 

@@ -1,4 +1,4 @@
-"""The files generated from a .cfg file: the text of the Python module and of the documents. Pure."""
+"""The files generated from a .cfg file: the text of the Python module and of the documentation. Pure."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def wiki_document(group: Group) -> str:
 
 
 def _range(param: Entry) -> str:
-    """Return the allowed values of a parameter, as text."""
+    """Return a parameter's allowed values, as text."""
     if param["edit_method"]:
         try:
             constants = ast.literal_eval(param["edit_method"])["enum"]

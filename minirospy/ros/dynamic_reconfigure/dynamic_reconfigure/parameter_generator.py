@@ -1,4 +1,4 @@
-"""dynamic_reconfigure.parameter_generator: what .cfg files describe parameters with. Source: http://wiki.ros.org/dynamic_reconfigure."""
+"""dynamic_reconfigure.parameter_generator: the names that .cfg files import. Source: http://wiki.ros.org/dynamic_reconfigure."""
 
 import inspect as inspect
 import os as os

@@ -1,7 +1,7 @@
 """dynamic_reconfigure.parameter_generator_catkin: the API with which a .cfg file, a Python program, defines parameters.
 
-catkin_make runs it with four folders, as ROS does: of dynamic_reconfigure, and for documents, C++ headers and Python modules.
-No header is written: nothing here compiles C++.
+As in ROS, catkin_make runs the .cfg file with four folders: dynamic_reconfigure's own, and those for documentation, C++
+headers and Python modules. It writes no C++ header, because minirospy does not compile C++.
 Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfgFile.
 """
 
@@ -61,7 +61,7 @@ See http://wiki.ros.org/dynamic_reconfigure/Tutorials"""
 
 
 def check_description(description: str) -> None:
-    """Raise Exception if a description has a quote, as ROS does, whose C++ header cannot hold one."""
+    """Raise Exception if a description contains a quote, as in ROS, whose C++ header cannot represent one."""
     if "'" in description or '"' in description:
         raise Exception(f"quotes not allowed in description string `{description}`")
 
@@ -76,7 +76,7 @@ def check_name(name: str) -> None:
 
 
 class ParameterGenerator:
-    """The parameters of a node, in groups; ``generate`` writes the files that programs import and include."""
+    """A node's parameters, in groups; ``generate`` writes the files that programs import and include."""
 
     minval: Mapping[str, Value] = {int_t: -0x80000000, double_t: -float("inf"), str_t: "", bool_t: False}
     maxval: Mapping[str, Value] = {int_t: 0x7FFFFFFF, double_t: float("inf"), str_t: "", bool_t: True}
@@ -88,7 +88,10 @@ class ParameterGenerator:
         def __init__(
             self, gen: ParameterGenerator, name: str, type: str, state: bool, id: int, parent: int
         ) -> None:
-            """``type``: how it is shown ("", "collapse", "tab", "hide", "apply"); ``state``: whether it is open."""
+            """Create a group.
+
+            ``type``: how the group is shown ("", "collapse", "tab", "hide", "apply"); ``state``: whether it is open.
+            """
             self.gen = gen
             self.name = name.replace(" ", "_")
             self.type = type
@@ -101,7 +104,7 @@ class ParameterGenerator:
             gen._groups[id] = self
 
         def get_group(self, id: int) -> ParameterGenerator.Group:
-            """Return the group with this ID. Raise KeyError."""
+            """Return the group with this ID. Raise KeyError if there is none."""
             return self.gen._groups[id]
 
         def add_group(self, name: str, type: str = "", state: bool = True) -> ParameterGenerator.Group:
@@ -121,9 +124,9 @@ class ParameterGenerator:
             max: Value | None = None,
             edit_method: str = "",
         ) -> None:
-            """Add a parameter; ``level`` is the bit mask passed to the server's callback when it changes.
+            """Add a parameter; ``level`` is the bit mask passed to the server's callback when the parameter changes.
 
-            Raise Exception for an invalid name or limits on a str or bool parameter, TypeError for a value of another type.
+            Raise Exception for an invalid name or limits on a str or bool parameter, TypeError if a value has the wrong type.
             """
             if paramtype in (str_t, bool_t) and (max is not None or min is not None):
                 raise Exception(f"Max or min specified for {name}, which is of '{paramtype}' type")
@@ -149,26 +152,26 @@ class ParameterGenerator:
             self.parameters.append(param)
 
         def get_parameters(self) -> list[Entry]:
-            """Return the parameters of this group and of all its subgroups."""
+            """Return the parameters in this group and in all its subgroups."""
             return [*self.parameters, *(each for group in self.groups for each in group.get_parameters())]
 
         def get_parents(self) -> list[str]:
-            """Return the names of the groups that contain this group, outermost first, then its own name."""
+            """Return the names of the groups that contain this group, outermost first, then this group's name."""
             above = self.get_group(self.parent).get_parents() if self.id else []
             return [*above, self.name]
 
         def get_field(self) -> str:
-            """Return the C++ name of the member variable for this group."""
+            """Return the name of the C++ member variable for this group."""
             *above, name = self.get_parents()
             return "::".join([*map(str.upper, above), name.lower()])
 
         def get_class(self, parent: bool = False) -> str:
-            """Return the C++ name of this group's class; with ``parent``, that of the enclosing class."""
+            """Return the name of this group's C++ class, or with ``parent``, of the enclosing class."""
             names = [name.upper() for name in self.get_parents()]
             return "::".join(names[:-1] if parent else names)
 
         def to_dict(self) -> dict[str, object]:
-            """Return the description of this group for the generated module."""
+            """Return this group's description for the generated module."""
             return {
                 "name": self.name,
                 "type": self.type,
@@ -198,18 +201,18 @@ class ParameterGenerator:
         self.dynconfpath, self.binary_dir, self.cpp_gen_dir, self.py_gen_dir = sys.argv[1:5]
 
     def pytype(self, drtype: str) -> type[Value]:
-        """Return the Python type for a parameter type. Raise KeyError."""
+        """Return the Python type for a parameter type. Raise KeyError if the type is unknown."""
         return _PYTHON_TYPES[drtype]
 
     def check_type(self, param: Entry, field: _ValueKey) -> None:
-        """Convert a parameter's value to its type. Raise TypeError if that is not possible."""
+        """Convert a parameter's value to its type. Raise TypeError if the value cannot be converted."""
         value, wanted = param[field], self.pytype(param["type"])
         if type(value) is not wanted and (wanted is not float or type(value) is not int):
             raise TypeError(f"'{param['name']}' has type {param['type']}, but {field} is {value!r}")
         param[field] = float(value) if type(value) is int and wanted is float else value
 
     def fill_type(self, param: Entry) -> None:
-        """Add the C++ types of a parameter or constant. Raise TypeError if its type is unknown."""
+        """Add the C++ types to a parameter or constant. Raise TypeError if its type is unknown."""
         if param["type"] not in _CPP_TYPES:
             raise TypeError(
                 f"'{param['name']}' has type {param['type']!r}: a type is {', '.join(_CPP_TYPES)}"
@@ -218,14 +221,17 @@ class ParameterGenerator:
         param["cconsttype"] = _CPP_CONSTANTS[param["type"]]
 
     def check_type_fill_default(self, param: Entry, field: _ValueKey, default: Value) -> None:
-        """Convert a parameter's value, or set it to ``default`` if it is None. Raise TypeError."""
+        """Convert a parameter's value, or set it to ``default`` if it is None. Raise TypeError if it cannot be converted."""
         if param[field] is None:
             param[field] = default
         else:
             self.check_type(param, field)
 
     def const(self, name: str, type: str, value: Value, descr: str) -> Entry:
-        """Add a constant ``NAME_name`` to the module; return it as an argument for ``enum``. Raise Exception, TypeError."""
+        """Add a constant ``NAME_name`` to the module; return it as an argument for ``enum``.
+
+        Raise Exception for an invalid description, TypeError if the value does not have the type.
+        """
         srcfile, srcline = _source_line()
         constant: Entry = {
             "name": name,
@@ -242,7 +248,10 @@ class ParameterGenerator:
         return constant
 
     def enum(self, constants: Sequence[Entry], description: str) -> str:
-        """Return the ``edit_method`` of a parameter whose value is one of these constants. Raise Exception."""
+        """Return the ``edit_method`` for a parameter whose value is one of these constants.
+
+        Raise Exception if the constants have different types, or the description is invalid.
+        """
         if len({constant["type"] for constant in constants}) != 1:
             raise Exception("Inconsistent types in enum!")
         check_description(description)
@@ -267,7 +276,7 @@ class ParameterGenerator:
         return self.group.add_group(name, type, state)
 
     def generate(self, pkgname: str, nodename: str, name: str) -> None:
-        """Write NAMEConfig.py and documents; ``name`` is that of the .cfg file."""
+        """Write NAMEConfig.py and its documentation; ``name`` is the .cfg file's name."""
         self.pkgname, self.nodename, self.name = pkgname, nodename, name
         self.msgname = f"{name}Config"
         print(f"Generating reconfiguration files for {name} in {pkgname}")
@@ -291,7 +300,7 @@ class ParameterGenerator:
 
 
 def _source_line() -> tuple[str, int]:
-    """Return the name of the .cfg file and the line in it that is running, which the description of each parameter has."""
+    """Return the .cfg file's name and its current line, which are stored in each parameter's description."""
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename == __file__:
         frame = frame.f_back

@@ -1,6 +1,6 @@
-"""dynamic_reconfigure.server: parameters of a node that other nodes can change.
+"""dynamic_reconfigure.server: a node's parameters that other nodes can change.
 
-Latched topics ``~parameter_descriptions`` and ``~parameter_updates``; service ``~set_parameters``.
+It offers the latched topics ``~parameter_descriptions`` and ``~parameter_updates``, and the service ``~set_parameters``.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv", "Server"]
 
-# Python types allowed by each parameter type; rosparam stores a double without a decimal point as an int.
+# Python types allowed for each parameter type; rosparam stores a double without a decimal point as an int.
 _TYPES: dict[str, tuple[type, ...]] = {
     "int": (int,),
     "double": (float, int),
@@ -51,15 +51,16 @@ _TYPES: dict[str, tuple[type, ...]] = {
 class Server:
     """Serves a configuration: ``callback(config, level)`` is called initially and on each change, and returns the configuration.
 
-    ``level`` has the bits of all changed parameters; it is -1 in the first call. Values are clamped to the limits.
+    ``level`` combines the bits of all changed parameters; it is -1 in the first call. Values are clamped to the limits.
     """
 
     def __init__(
         self, type: ConfigType, callback: Callable[[Config, int], Config | None], namespace: str = ""
     ) -> None:
-        """``type`` is the module package.cfg.NAMEConfig; ``namespace`` is for the topics and the service, below the node's name.
+        """Start serving. ``type`` is the module package.cfg.NAMEConfig.
 
-        Raise DynamicReconfigureCallbackException if the callback returns None, or any exception that the callback raises.
+        ``namespace``, below the node's name, is used for the topics and the service. Raise DynamicReconfigureCallbackException
+        if the callback returns None. Any exception that the callback raises is propagated.
         """
         self.mutex = threading.Lock()
         if not namespace or namespace == "~":
@@ -88,7 +89,7 @@ class Server:
         self.set_service = rospy.Service(self.ns + "set_parameters", Reconfigure, self._set_callback)
 
     def update_configuration(self, changes: Values) -> Config:
-        """Change values; return the configuration returned by the callback. Raise any exception that the callback raises."""
+        """Change values; return the configuration that the callback returns. Any exception from the callback is propagated."""
         with self.mutex:
             config = copy.deepcopy(self.config)
             config.update(changes)
@@ -101,7 +102,7 @@ class Server:
         return encode_config(self.update_configuration(changes))
 
     def _copy_from_parameter_server(self, config: Config) -> None:
-        """Use the values on the parameter server; log an error for values of a wrong type."""
+        """Use the values on the parameter server; log an error for each value with a wrong type."""
         for param in self._params:
             name = param["name"]
             value = rospy.get_param(self.ns + name, None)
@@ -168,7 +169,7 @@ def _fits(param: Entry, value: object) -> bool:
 
 
 def _converted(param: Entry, value: Value) -> Value:
-    """Return a value converted to the type of its message field."""
+    """Return a value converted to the type that its message field requires."""
     if param["type"] == "double":
         return float(value)
     return bool(value) if param["type"] == "bool" else value

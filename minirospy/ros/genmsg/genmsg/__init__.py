@@ -1,4 +1,4 @@
-"""genmsg: definitions of messages and services, as code generators read them."""
+"""genmsg: message and service definitions, as code generators read them."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""genmsg.base: constants of definition files, and the exception for a definition that cannot be parsed."""
+"""genmsg.base: constants for definition files, and the exception for a definition that cannot be parsed."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ IODELIM = "---"
 
 
 class InvalidMsgSpec(Exception):
-    """A definition does not parse."""
+    """The definition cannot be parsed."""
 
 
 class MsgGenerationException(MessageException):
-    """No class can be made from a definition."""
+    """No class can be generated from the definition."""

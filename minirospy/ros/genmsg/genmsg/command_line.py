@@ -8,7 +8,10 @@ __all__ = ["includepath_to_dict"]
 
 
 def includepath_to_dict(includepath: Iterable[str] | None) -> dict[str, list[str]]:
-    """Return package -> folders for the values ``package:folder`` of option ``-I``; the key is '' if there is no package."""
+    """Return package -> folders for the values ``package:folder`` of option ``-I``.
+
+    The key is '' for a value without a package.
+    """
     found: dict[str, list[str]] = {}
     for value in includepath or ():
         package, colon, folder = value.partition(":")

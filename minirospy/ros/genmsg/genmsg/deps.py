@@ -25,26 +25,38 @@ __all__ = [
 def find_msg_dependencies_with_type(
     pkg_name: str, msg_file: str, search_path: SearchPath
 ) -> list[tuple[str, str | None]]:
-    """Return (type, file) of each message that the message in ``msg_file`` uses. Raise InvalidMsgSpec, MsgNotFound."""
+    """Return (type, file) for each message that the message in ``msg_file`` uses.
+
+    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
+    """
     context = MsgContext.create_default()
     return _needed(context, load_msg_from_file(context, msg_file, _type(pkg_name, msg_file)), search_path)
 
 
 def find_msg_dependencies(pkg_name: str, msg_file: str, search_path: SearchPath) -> list[str | None]:
-    """Return the files of the messages that the message in ``msg_file`` uses. Raise InvalidMsgSpec, MsgNotFound."""
+    """Return the files that define the messages used by the message in ``msg_file``.
+
+    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
+    """
     return [file for _, file in find_msg_dependencies_with_type(pkg_name, msg_file, search_path)]
 
 
 def find_srv_dependencies_with_type(
     pkg_name: str, msg_file: str, search_path: SearchPath
 ) -> list[tuple[str, str | None]]:
-    """Return (type, file) of each message that a service uses. Raise InvalidMsgSpec, MsgNotFound."""
+    """Return (type, file) for each message that a service uses.
+
+    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
+    """
     context = MsgContext.create_default()
     return _needed(context, load_srv_from_file(context, msg_file, _type(pkg_name, msg_file)), search_path)
 
 
 def find_srv_dependencies(pkg_name: str, msg_file: str, search_path: SearchPath) -> list[str | None]:
-    """Return the files of the messages that a service uses. Raise InvalidMsgSpec, MsgNotFound."""
+    """Return the files that define the messages used by a service.
+
+    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
+    """
     return [file for _, file in find_srv_dependencies_with_type(pkg_name, msg_file, search_path)]
 
 

@@ -11,21 +11,21 @@ __all__ = ["compute_full_text", "compute_md5", "compute_md5_text"]
 
 
 def compute_md5_text(msg_context: MsgContext, spec: MsgSpec) -> str:
-    """Return the text from which a message's md5sum is computed. Raise KeyError if it uses an unknown message."""
+    """Return the text from which a message's md5sum is computed. Raise KeyError if the message uses an unknown one."""
     return digest.md5_text(parsed_message(spec), lookup_in(msg_context))
 
 
 def compute_md5(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
-    """Return the md5sum of a message or service. Raise KeyError if it uses an unknown message."""
+    """Return a message's or service's md5sum. Raise KeyError if it uses an unknown message."""
     if isinstance(spec, SrvSpec):
         return digest.service_md5(parsed_service(spec.text, spec.full_name), lookup_in(msg_context))
     return digest.message_md5(parsed_message(spec), lookup_in(msg_context))
 
 
 def compute_full_text(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
-    """Return the full definition of a message or service, with those that it uses, as in connection headers and bags.
+    """Return a message's or service's full definition, including the messages that it uses, as in connection headers and bags.
 
-    Raise KeyError if :func:`load_depends` has not been called for it.
+    Raise KeyError if :func:`load_depends` has not been called for ``spec``.
     """
     needed = msg_context.get_all_depends(spec.full_name)
     return digest.joined_texts(spec.text, ((name, msg_context.get_registered(name).text) for name in needed))

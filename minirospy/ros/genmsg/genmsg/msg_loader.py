@@ -69,11 +69,11 @@ __all__ = [
 
 _BETWEEN = re.compile(r"^---.*\n?", re.MULTILINE)
 
-SearchPath = Mapping[str, Sequence[str]]  # package -> folders of its definitions
+SearchPath = Mapping[str, Sequence[str]]  # package -> folders that contain its definitions
 
 
 class MsgNotFound(Exception):
-    """The file of a definition was not found."""
+    """The file that contains a definition was not found."""
 
     def __init__(
         self,
@@ -89,7 +89,7 @@ class MsgNotFound(Exception):
 
 
 class MsgContext:
-    """The known messages, their files, and the messages that each uses."""
+    """The known messages, their files, and the message types that each uses."""
 
     def __init__(self) -> None:
         self._specs: dict[str, MsgSpec] = {}
@@ -114,27 +114,30 @@ class MsgContext:
         return bare_msg_type(full_msg_type) in self._specs
 
     def get_registered(self, full_msg_type: str) -> MsgSpec:
-        """Return a known message. Raise KeyError."""
+        """Return a known message. Raise KeyError if it is unknown."""
         return self._specs[bare_msg_type(full_msg_type)]
 
     def set_file(self, full_msg_type: str, file_path: str) -> None:
-        """Set the file of a definition."""
+        """Record the file that contains a definition."""
         self._files[full_msg_type] = file_path
 
     def get_file(self, full_msg_type: str) -> str | None:
-        """Return the file of a definition; None if it is unknown."""
+        """Return the file that contains a definition, or None if it is unknown."""
         return self._files.get(full_msg_type)
 
     def set_depends(self, full_msg_type: str, dependencies: list[str]) -> None:
-        """Set the message types of a message's fields."""
+        """Set the message types that a message's fields use."""
         self._depends[full_msg_type] = dependencies
 
     def get_depends(self, full_msg_type: str) -> list[str] | None:
-        """Return the message types of a message's fields; None before :func:`load_depends`."""
+        """Return the message types that a message's fields use, or None before :func:`load_depends`."""
         return self._depends.get(full_msg_type)
 
     def get_all_depends(self, full_msg_type: str) -> list[str]:
-        """Return all messages used by a message, directly or indirectly, each before those that it uses. Raise KeyError."""
+        """Return all messages that a message uses, directly or indirectly, each before those that it uses.
+
+        Raise KeyError before :func:`load_depends`.
+        """
         found: list[str] = []
         for name in self._depends[full_msg_type]:
             found += [each for each in (name, *self.get_all_depends(name)) if each not in found]
@@ -142,7 +145,10 @@ class MsgContext:
 
 
 def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str = ".msg") -> str:
-    """Return the file of a definition. Raise MsgNotFound; ValueError if the search path is not a dictionary."""
+    """Return the file that contains a definition.
+
+    Raise MsgNotFound if there is none, ValueError if the search path is not a dictionary.
+    """
     if not isinstance(search_path, Mapping):
         raise ValueError("search_path must be a dictionary of namespaces to lists of folders")
     if package not in search_path:
@@ -167,19 +173,22 @@ def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str
 
 
 def get_srv_file(package: str, base_type: str, search_path: SearchPath) -> str:
-    """Return the file of a service's definition. Raise MsgNotFound."""
+    """Return the file that contains a service's definition. Raise MsgNotFound if there is none."""
     return get_msg_file(package, base_type, search_path, ".srv")
 
 
 def load_msg_from_string(msg_context: MsgContext, text: str, full_name: str) -> MsgSpec:
-    """Parse a message definition, add it to the context, and return it. Raise InvalidMsgSpec."""
+    """Parse a message definition, add it to the context, and return it. Raise InvalidMsgSpec if it is invalid."""
     spec = _msg_spec(_parsed(text, full_name))
     msg_context.register(full_name, spec)
     return spec
 
 
 def load_msg_from_file(msg_context: MsgContext, file_path: str, full_name: str) -> MsgSpec:
-    """Load a message from a file, add it to the context, and return it. Raise InvalidMsgSpec, OSError."""
+    """Load a message from a file, add it to the context, and return it.
+
+    Raise InvalidMsgSpec if the definition is invalid, OSError if the file cannot be read.
+    """
     text = _text(file_path)
     try:
         spec = load_msg_from_string(msg_context, text, full_name)
@@ -190,14 +199,20 @@ def load_msg_from_file(msg_context: MsgContext, file_path: str, full_name: str) 
 
 
 def load_msg_by_type(msg_context: MsgContext, msg_type: str, search_path: SearchPath) -> MsgSpec:
-    """Load a message by its type, add it to the context, and return it. Raise InvalidMsgSpec, MsgNotFound."""
+    """Load a message by its type, add it to the context, and return it.
+
+    Raise InvalidMsgSpec if the definition is invalid, MsgNotFound if it is missing.
+    """
     name = HEADER_FULL_NAME if msg_type == "Header" else msg_type
     package, base = package_resource_name(name)
     return load_msg_from_file(msg_context, get_msg_file(package, base, search_path), name)
 
 
 def load_srv_from_string(msg_context: MsgContext, text: str, full_name: str) -> SrvSpec:
-    """Parse a service definition and return it; add its request and response to the context. Raise InvalidMsgSpec."""
+    """Parse a service definition and return it; add its request and response to the context.
+
+    Raise InvalidMsgSpec if the definition is invalid.
+    """
     parsed = parsed_service(text, full_name)
     request, response = _msg_spec(parsed.request), _msg_spec(parsed.response)
     for spec in (request, response):
@@ -206,22 +221,23 @@ def load_srv_from_string(msg_context: MsgContext, text: str, full_name: str) -> 
 
 
 def load_srv_from_file(msg_context: MsgContext, file_path: str, full_name: str) -> SrvSpec:
-    """Load a service from a file. Raise InvalidMsgSpec, OSError."""
+    """Load a service from a file. Raise InvalidMsgSpec if the definition is invalid, OSError if the file cannot be read."""
     spec = load_srv_from_string(msg_context, _text(file_path), full_name)
     msg_context.set_file(full_name, file_path)
     return spec
 
 
 def load_srv_by_type(msg_context: MsgContext, srv_type: str, search_path: SearchPath) -> SrvSpec:
-    """Load a service by its type. Raise InvalidMsgSpec, MsgNotFound."""
+    """Load a service by its type. Raise InvalidMsgSpec if the definition is invalid, MsgNotFound if it is missing."""
     package, base = package_resource_name(srv_type)
     return load_srv_from_file(msg_context, get_srv_file(package, base, search_path), srv_type)
 
 
 def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_path: SearchPath) -> list[str]:
-    """Load all messages that a message or service uses into the context; return the types of its fields, without duplicates.
+    """Load all messages that a message or service uses into the context; return its fields' types, without duplicates.
 
-    Raise InvalidMsgSpec, MsgNotFound; ValueError if ``spec`` is not a message or service.
+    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing, ValueError if ``spec`` is not a message or
+    service.
     """
     if not isinstance(spec, MsgSpec | SrvSpec):
         raise ValueError(f"spec does not appear to be a message or service: {spec}")
@@ -250,12 +266,12 @@ def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_pa
 
 
 def lookup_in(msg_context: MsgContext) -> digest.Lookup:
-    """Return a function that looks up a message in a context as minirospy's MessageSpec, or raises KeyError."""
+    """Return a function that looks up a message in a context and returns it as a MessageSpec, or raises KeyError."""
     return lambda name: parsed_message(msg_context.get_registered(name))
 
 
 def parsed_message(spec: MsgSpec) -> MessageSpec:
-    """Return a message as minirospy's MessageSpec. Raise InvalidMsgSpec."""
+    """Return a message as minirospy's MessageSpec. Raise InvalidMsgSpec if the definition is invalid."""
     return _parsed(spec.text, spec.full_name)
 
 
@@ -271,7 +287,7 @@ def parsed_service(text: str, full_name: str) -> ServiceSpec:
     package, name = package_resource_name(full_name)
     request, *responses = _BETWEEN.split(text)
     if len(responses) != 1:
-        # genmsg also accepts a text without a separator line, or with several.
+        # genmsg also accepts a definition without a separator line, or with several.
         text = "\n".join([request, "---", *responses])
     try:
         return parse_service(text, package, name)

@@ -64,7 +64,10 @@ class _Constant(NamedTuple):
 
 
 class Constant(_Constant):
-    """A constant: ``val`` is its value, ``val_text`` its text in the definition. Raise ValueError if an argument is None."""
+    """A constant: ``val`` is its value, ``val_text`` the value's text in the definition.
+
+    Raise ValueError if an argument is None.
+    """
 
     __slots__ = ()
 
@@ -98,7 +101,7 @@ class Field:
 
 
 class MsgSpec:
-    """A message: ``types`` and ``names`` of its fields, its constants, text and name."""
+    """A message: its fields' ``types`` and ``names``, its constants, text and name."""
 
     def __init__(
         self,
@@ -127,7 +130,7 @@ class MsgSpec:
         self.header_present = self.has_header()
 
     def fields(self) -> list[tuple[str, str]]:
-        """Return (type, name) of each field."""
+        """Return (type, name) for each field."""
         return list(zip(self.types, self.names, strict=True))
 
     def parsed_fields(self) -> list[Field]:
@@ -162,7 +165,7 @@ def is_builtin(msg_type_name: str) -> bool:
 
 
 def is_header_type(msg_type: str) -> bool:
-    """Return whether a type is one of the names of std_msgs/Header."""
+    """Return whether a type is a name for std_msgs/Header."""
     return msg_type in _HEADERS
 
 
@@ -187,16 +190,16 @@ def bare_msg_type(msg_type: str) -> str:
 
 
 def resolve_type(msg_type: str, package_context: str) -> str:
-    """Return a type's full name, as it is resolved in definitions of ``package_context``."""
+    """Return a type's full name, resolved as in the definitions of ``package_context``."""
     bare = bare_msg_type(msg_type)
     if "/" in bare or is_builtin(bare):
         return msg_type
-    # ROS's genmsg drops the brackets after Header; they are kept here.
+    # ROS's genmsg drops the brackets after Header; minirospy does not.
     return f"std_msgs/{msg_type}" if bare == "Header" else f"{package_context}/{msg_type}"
 
 
 def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
-    """Return (base type, whether it is an array, its length if fixed). Raise ValueError."""
+    """Return (base type, whether it is an array, its length if fixed). Raise ValueError if the type is invalid."""
     if not msg_type:
         raise ValueError("Invalid empty type")
     if "[" not in msg_type:

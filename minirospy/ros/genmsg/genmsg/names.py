@@ -1,4 +1,4 @@
-"""genmsg.names: names of resources (``package/name``)."""
+"""genmsg.names: resource names (``package/name``)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PRN_SEPARATOR = "/"
 
 
 def resource_name(res_pkg_name: str, name: str, my_pkg: str | None = None) -> str:
-    """Return ``package/name``, or the name alone in the package itself."""
+    """Return ``package/name``, or the name alone if its package is ``my_pkg``."""
     return name if res_pkg_name == my_pkg else res_pkg_name + PRN_SEPARATOR + name
 
 
@@ -28,12 +28,12 @@ def resource_name_base(name: str) -> str:
 
 
 def resource_name_package(name: str) -> str | None:
-    """Return the package of a name, or None."""
+    """Return a name's package, or None if it has none."""
     return name.partition(PRN_SEPARATOR)[0] if PRN_SEPARATOR in name else None
 
 
 def package_resource_name(name: str) -> tuple[str, str]:
-    """Return (package, name); the package is empty if the name has none. Raise ValueError on two slashes."""
+    """Return (package, name); the package is empty if the name has none. Raise ValueError if the name has two slashes."""
     if PRN_SEPARATOR not in name:
         return "", name
     if name.count(PRN_SEPARATOR) > 1:
@@ -43,10 +43,10 @@ def package_resource_name(name: str) -> tuple[str, str]:
 
 
 def is_legal_resource_name(name: str) -> bool:
-    """Return whether a name is one of a resource, with or without its package."""
+    """Return whether a string is a valid resource name, with or without a package."""
     return name is not None and bool(re.match(r"^[A-Za-z][\w/]*\Z", name, re.ASCII)) and "//" not in name
 
 
 def is_legal_resource_base_name(name: str) -> bool:
-    """Return whether a name is one of a resource without its package."""
+    """Return whether a string is a valid resource name without a package."""
     return name is not None and bool(re.match(r"^[A-Za-z]\w*\Z", name, re.ASCII))

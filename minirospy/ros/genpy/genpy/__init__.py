@@ -1,4 +1,4 @@
-"""genpy: what generated messages import."""
+"""genpy: the names that generated messages import."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""genpy.base: the types that the `struct` module packs."""
+"""genpy.base: types that the `struct` module can pack."""
 
 from __future__ import annotations
 

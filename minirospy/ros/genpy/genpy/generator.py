@@ -44,7 +44,10 @@ _Emitter = Callable[..., Iterator[str]]
 
 
 def msg_generator(msg_context: MsgContext, spec: MsgSpec, search_path: SearchPath) -> Iterator[str]:
-    """Yield the lines of a message's module. Raise MsgGenerationException, InvalidMsgSpec, MsgNotFound."""
+    """Yield the lines of a message's module.
+
+    Raise MsgGenerationException or InvalidMsgSpec if the definition is invalid, MsgNotFound if one is missing.
+    """
     load_depends(msg_context, spec, search_path)
     try:
         yield from emit_message(parsed_message(spec), lookup_in(msg_context)).splitlines()
@@ -53,7 +56,10 @@ def msg_generator(msg_context: MsgContext, spec: MsgSpec, search_path: SearchPat
 
 
 def srv_generator(msg_context: MsgContext, spec: SrvSpec, search_path: SearchPath) -> Iterator[str]:
-    """Yield the lines of a service's module. Raise MsgGenerationException, InvalidMsgSpec, MsgNotFound."""
+    """Yield the lines of a service's module.
+
+    Raise MsgGenerationException or InvalidMsgSpec if the definition is invalid, MsgNotFound if one is missing.
+    """
     load_depends(msg_context, spec, search_path)
     try:
         yield from emit_service(
@@ -74,7 +80,7 @@ def compute_outfile_name(outdir: str, infile_name: str, ext: str) -> str:
 
 
 def compute_pkg_type(package: str, type_: str) -> tuple[str, str]:
-    """Return package and name of a type used by definitions in ``package``. Raise MsgGenerationException."""
+    """Return the package and name of a type, as used in ``package``. Raise MsgGenerationException if the name is invalid."""
     words = type_.split("/")
     if len(words) > 2:
         raise MsgGenerationException(f"illegal message type: {type_}")
@@ -82,7 +88,7 @@ def compute_pkg_type(package: str, type_: str) -> tuple[str, str]:
 
 
 def make_python_safe(spec: MsgSpec) -> MsgSpec:
-    """Return a message in which Python's reserved words are renamed in fields and constants."""
+    """Return a message whose fields and constants are renamed if they are Python keywords."""
     constants = [
         Constant(each.type, _remap_reserved(each.name), each.val, each.val_text) for each in spec.constants
     ]
@@ -97,7 +103,11 @@ def _remap_reserved(field_name: str) -> str:
 
 
 class Generator:
-    """Generates modules: ``what`` names the kind of definition, ``ext`` is the file extension; the functions load and emit it."""
+    """Generates modules.
+
+    ``what`` names the kind of definition, ``ext`` is the file extension. The functions load a definition and yield the
+    module's lines.
+    """
 
     def __init__(self, what: str, ext: str, spec_loader_fn: _Loader, generator_fn: _Emitter) -> None:
         self.what = what
@@ -110,7 +120,9 @@ class Generator:
     ) -> str:
         """Generate the module for the definition file ``f``; return the module's path.
 
-        Raise MsgGenerationException, InvalidMsgSpec, MsgNotFound, OSError.
+        Raise MsgGenerationException or InvalidMsgSpec if the definition is invalid, MsgNotFound if one that it uses is
+        missing,
+        OSError if a file cannot be read or written.
         """
         spec = self.spec_loader_fn(msg_context, f, full_type)
         lines = list(self.generator_fn(msg_context, spec, search_path))
@@ -122,7 +134,7 @@ class Generator:
     def generate_messages(
         self, package: str, package_files: Sequence[str], outdir: str, search_path: SearchPath
     ) -> int:
-        """Generate modules for a package's files in ``outdir``; return 0, or 1 after an error, which is printed to stderr."""
+        """Generate modules for a package's files in ``outdir``. Return 0, or print errors to stderr and return 1."""
         msg_context = MsgContext.create_default()
         status = 0
         for file in package_files:
@@ -148,14 +160,14 @@ class Generator:
 
 
 class MsgGenerator(Generator):
-    """Generates the modules of messages."""
+    """Generates modules for messages."""
 
     def __init__(self) -> None:
         super().__init__("messages", ".msg", load_msg_from_file, msg_generator)
 
 
 class SrvGenerator(Generator):
-    """Generates the modules of services."""
+    """Generates modules for services."""
 
     def __init__(self) -> None:
         super().__init__("services", ".srv", load_srv_from_file, srv_generator)

@@ -19,14 +19,16 @@ __all__ = ["genmain", "usage"]
 
 
 def usage(progname: str) -> None:
-    """Print the usage of a generator."""
+    """Print a generator's usage."""
     print(f"{progname} file(s)")
 
 
 def genmain(argv: Sequence[str], progname: str, gen: Generator) -> NoReturn:
-    """Run a generator with a command line, program name included, and exit: 0, 1 to 3 after an error, 2 after a usage error.
+    """Run a generator with a command line that includes the program name, and exit.
 
-    Arguments: ``-p PACKAGE -o FOLDER -I PACKAGE:FOLDER FILE ...``, or ``--initpy -o FOLDER``.
+    The status is 0, 1 to 3 after an error, 2 after a usage error. Arguments: ``-p PACKAGE -o FOLDER -I PACKAGE:FOLDER
+    FILE ...``,
+    or ``--initpy -o FOLDER``.
     """
     parser = OptionParser(f"{progname} file")
     parser.add_option("--initpy", action="store_true", default=False)

@@ -1,7 +1,7 @@
-"""image_geometry.cameramodels: models of one and of two cameras. Pixels are (u, v), points are (x, y, z) in meters.
+"""image_geometry.cameramodels: models for one and for two cameras. Pixels are (u, v), points are (x, y, z) in meters.
 
-K is the raw image's camera matrix, D its distortion, R the rotation to the rectified image, P that image's projection.
-Source: http://wiki.ros.org/image_geometry, http://wiki.ros.org/image_pipeline/CameraInfo.
+K is the raw image's camera matrix, D its distortion, R the rotation to the rectified image, P the rectified image's
+projection. Source: http://wiki.ros.org/image_geometry, http://wiki.ros.org/image_pipeline/CameraInfo.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = ["PinholeCameraModel", "StereoCameraModel", "mkmat"]
 
 
 def mkmat(rows: int, cols: int, L: Sequence[float]) -> Matrix:
-    """Return a matrix of these values, given by rows. Raise ValueError if their number is not ``rows`` x ``cols``."""
+    """Return a matrix with these values, row by row. Raise ValueError if there are not ``rows`` x ``cols`` values."""
     import numpy as np
 
     return np.array(L, np.float64).reshape(rows, cols).view(np.matrix)
@@ -88,12 +88,12 @@ class PinholeCameraModel:
         rectified_image(raw, rectified, (self.K, self._distortion(), self.R, self.P), self.resolution)
 
     def rectifyPoint(self, uv_raw: Point) -> Array:
-        """Convert a pixel of the raw image to the rectified image; return an array (u, v)."""
+        """Convert a pixel in the raw image to the rectified image; return an array (u, v)."""
         self._check()
         return undistorted(uv_raw, self.K, self._distortion(), self.R, self.P)
 
     def unrectifyPoint(self, uv_rect: Point) -> Array:
-        """Convert a pixel of the rectified image to the raw image, as the C++ class does; return an array (u, v)."""
+        """Convert a pixel in the rectified image to the raw image, as the C++ class does; return an array (u, v)."""
         import numpy as np
 
         self._check()
@@ -102,7 +102,7 @@ class PinholeCameraModel:
         return np.array([raw_u[0], raw_v[0]])
 
     def project3dToPixel(self, point: Point) -> tuple[float, float]:
-        """Return the rectified pixel (u, v) of a point; (nan, nan) if the point is in the plane of the camera's center."""
+        """Return a point's rectified pixel (u, v); (nan, nan) if the point is in the plane through the camera's center."""
         u, v, w = (float(row) for row in self._checked_P() @ [point[0], point[1], point[2], 1.0])
         return (u / w, v / w) if w != 0 else (math.nan, math.nan)
 
@@ -135,7 +135,7 @@ class PinholeCameraModel:
         return self.resolution
 
     def intrinsicMatrix(self) -> Matrix:
-        """Return K, 3x3. This and the following matrices are None before ``fromCameraInfo``."""
+        """Return K, 3x3. All matrices are None before ``fromCameraInfo``."""
         return self.K
 
     def distortionCoeffs(self) -> Matrix:
@@ -151,11 +151,11 @@ class PinholeCameraModel:
         return self.P
 
     def fullIntrinsicMatrix(self) -> Matrix:
-        """Return K of the full sensor."""
+        """Return K for the full sensor."""
         return self.full_K
 
     def fullProjectionMatrix(self) -> Matrix:
-        """Return P of the full sensor."""
+        """Return P for the full sensor."""
         return self.full_P
 
     def cx(self) -> float:
@@ -175,7 +175,7 @@ class PinholeCameraModel:
         return self._of_P(1, 1)
 
     def Tx(self) -> float:
-        """Return the x translation in P; for the right camera of a pair it is -fx times the baseline."""
+        """Return the x translation in P; for the right camera in a pair, it is -fx times the baseline."""
         return self._of_P(0, 3)
 
     def Ty(self) -> float:
@@ -233,15 +233,15 @@ class StereoCameraModel:
         self.Q[3, 2] = _ratio(1.0, baseline)
 
     def tfFrame(self) -> str | None:
-        """Return the frame ID of the points, which is that of the left camera."""
+        """Return the left camera's frame ID, which is also the frame of the points."""
         return self.left.tfFrame()
 
     def project3dToPixel(self, point: Point) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return the rectified pixels of a point in the left and in the right image."""
+        """Return a point's rectified pixels in the left and in the right image."""
         return self.left.project3dToPixel(point), self.right.project3dToPixel(point)
 
     def projectPixelTo3d(self, left_uv: Point, disparity: float) -> tuple[float, float, float]:
-        """Return the point at a rectified pixel of the left image; (0, 0, 0) if it is infinitely far away."""
+        """Return the point at a rectified pixel in the left image; (0, 0, 0) if the point is infinitely far away."""
         self._check()
         x, y, z, w = (float(row) for row in self.Q @ [left_uv[0], left_uv[1], disparity, 1.0])
         return (x / w, y / w, z / w) if w != 0 else (0.0, 0.0, 0.0)
@@ -260,7 +260,7 @@ class StereoCameraModel:
 
 
 def _ratio(above: float, below: float) -> float:
-    """Return a quotient; for a division by zero return inf or nan, as numpy does, without its warning."""
+    """Return a quotient. If the divisor is zero, return inf or nan as numpy does, but without a warning."""
     if below:
         return above / below
     if above == 0 or math.isnan(above):

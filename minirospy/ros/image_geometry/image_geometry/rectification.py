@@ -1,4 +1,4 @@
-"""Lens distortion of single points and of whole images, in numpy, with OpenCV's model and results. Pure.
+"""Lens distortion for single points and for whole images, in numpy, with OpenCV's model and results. Pure.
 
 Source: https://docs.opencv.org (calib3d: undistortPoints, initUndistortRectifyMap; imgproc: remap with INTER_CUBIC).
 """
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Values: TypeAlias = NDArray[Any]
-    # K1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], or empty.
+    # Coefficients k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], or empty.
     Distortion: TypeAlias = Sequence[float] | Values
     Calibration: TypeAlias = tuple[Values, Distortion, Values, Values]  # K, D, R and P
 else:
@@ -22,9 +22,9 @@ else:
 
 __all__ = ["Distortion", "distorted", "rectified_image", "undistorted"]
 
-_ITERATIONS = 5  # iterations of OpenCV's undistortPoints
+_ITERATIONS = 5  # iterations in OpenCV's undistortPoints
 _STEPS = 32  # subpixel positions per pixel in OpenCV's interpolation
-_ONE = 1 << 15  # sum of the integer weights of a pixel's neighbors
+_ONE = 1 << 15  # sum of the integer weights for a pixel's neighbors
 _COUNTS = (0, 4, 5, 8, 12, 14)
 
 
@@ -59,7 +59,7 @@ def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Val
 
 
 def distorted(u: Values, v: Values, K: Values, D: Distortion, R: Values, P: Values) -> tuple[Values, Values]:
-    """Return the raw pixels for rectified ones: all u and all v. Raise ValueError if the length of D is not supported."""
+    """Return the raw pixels for rectified ones, as arrays of u and of v. Raise ValueError if the length of D is not supported."""
     import numpy as np
 
     k = _coefficients(D)
@@ -130,7 +130,10 @@ def _tilt(tau_x: float, tau_y: float) -> Values:
 
 
 def _remapped(raw: Values, map_x: Values, map_y: Values) -> Values:
-    """Return an image whose pixels are read from ``raw`` at the map's positions, with bicubic interpolation; black outside."""
+    """Return an image whose pixels are read from ``raw`` at the map's positions, with bicubic interpolation.
+
+    Positions outside ``raw`` become black.
+    """
     import numpy as np
 
     if raw.dtype not in (np.uint8, np.uint16, np.int16, np.float32, np.float64):
@@ -164,7 +167,7 @@ def _remapped(raw: Values, map_x: Values, map_y: Values) -> Values:
 
 
 def _weights() -> Values:
-    """Return the weights of the 4x4 neighbors, with shape (_STEPS of v, _STEPS of u, 4, 4)."""
+    """Return the weights for the 4x4 neighbors, with shape (_STEPS of v, _STEPS of u, 4, 4)."""
     import numpy as np
 
     a, x = np.float32(-0.75), (np.arange(_STEPS) / np.float32(_STEPS)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The server of interactive markers: publishes a program's changes to them, and receives feedback from viewers.
+"""The server for interactive markers: publishes a program's changes to its markers, and receives feedback from viewers.
 
 Topics: NS/update, NS/update_full (latched, all markers), NS/feedback.
 Source: http://wiki.ros.org/rviz/Tutorials/Interactive%20Markers%3A%20Basic%20Controls.
@@ -28,7 +28,7 @@ Callback = Callable[[InteractiveMarkerFeedback], object]
 
 _QUEUE_SIZE = 100
 _KEEP_ALIVE = 0.5  # seconds between keep-alive updates to viewers
-_TURN = 1.0  # seconds for which feedback from viewers other than the last one is ignored
+_TURN = 1.0  # seconds for which feedback from other viewers is ignored
 _UNCHANGED: Callback | int = -1
 
 
@@ -45,7 +45,7 @@ class MarkerContext:
 
 @dataclass
 class UpdateContext:
-    """A pending change of a marker."""
+    """A pending change to a marker."""
 
     FULL_UPDATE = 0
     POSE_UPDATE = 1
@@ -58,12 +58,12 @@ class UpdateContext:
 
 
 class InteractiveMarkerServer:
-    """The markers of one namespace. Changes are published by ``applyChanges``."""
+    """The markers in one namespace. ``applyChanges`` publishes changes."""
 
     DEFAULT_FEEDBACK_CB = 255
 
     def __init__(self, topic_ns: str, server_id: str = "", q_size: int = 100) -> None:
-        """``server_id``: required if a node has several servers; ``q_size``: the feedback queue's size."""
+        """Create a server. ``server_id`` is required if a node has several servers; ``q_size`` is the feedback queue's size."""
         self.topic_ns = topic_ns
         self.seq_num = 0
         self.mutex = Lock()
@@ -83,7 +83,7 @@ class InteractiveMarkerServer:
         self._timer = rospy.Timer(rospy.Duration(_KEEP_ALIVE), self.keepAlive, reset=True)
         self.publishInit()
 
-    # Public methods.
+    # --- public methods
 
     def insert(
         self,
@@ -102,9 +102,9 @@ class InteractiveMarkerServer:
     def setCallback(
         self, name: str, feedback_cb: Callback | None, feedback_type: int = DEFAULT_FEEDBACK_CB
     ) -> bool:
-        """Set the callback for feedback of one type, or for all feedback whose type has no own callback.
+        """Set the callback for one type of feedback, or for all feedback whose type has no callback of its own.
 
-        None removes the callback. Takes effect immediately. Return whether the marker exists.
+        None removes the callback. The change takes effect immediately. Return whether the marker exists.
         """
         with self.mutex:
             found = [
@@ -122,7 +122,7 @@ class InteractiveMarkerServer:
             return bool(found)
 
     def setPose(self, name: str, pose: Pose, header: Header = Header()) -> bool:  # noqa: B008 - it is only read
-        """Move a marker; a header without a frame keeps the marker's header. Return whether the marker has been published.
+        """Move a marker; if ``header`` has no frame, keep the marker's header. Return whether the marker has been published.
 
         As in ROS, a marker that the next ``applyChanges`` adds or replaces is not moved.
         """
@@ -149,7 +149,7 @@ class InteractiveMarkerServer:
             self.pending_updates = {name: UpdateContext(UpdateContext.ERASE) for name in self.marker_contexts}
 
     def get(self, name: str) -> InteractiveMarker | None:
-        """Return a marker with its pending changes; None if it does not exist."""
+        """Return a marker with its pending changes, or None if it does not exist."""
         context, update = self.marker_contexts.get(name), self.pending_updates.get(name)
         if update is None:
             return context.int_marker if context else None
@@ -170,12 +170,12 @@ class InteractiveMarkerServer:
                 self._apply(name, update, message)
             self.pending_updates = {}
             self.seq_num += 1
-            # Still with the lock: no other message with the new sequence number may precede it.
+            # Publish with the lock held, so that no other message with the new sequence number is sent first.
             self.publish(message)
         self.publishInit()
 
     def _apply(self, name: str, update: UpdateContext, message: InteractiveMarkerUpdate) -> None:
-        """Apply a change to a marker, and add it to a message."""
+        """Apply a change to a marker, and add the change to a message."""
         context = self.marker_contexts.get(name)
         if update.update_type == UpdateContext.FULL_UPDATE:
             if context is None:
@@ -185,7 +185,7 @@ class InteractiveMarkerServer:
             context.int_marker = update.int_marker
             message.markers.append(context.int_marker)
         elif context is None:
-            # The marker was added and erased between two applyChanges(): it was never published.
+            # The marker was added and erased between two applyChanges(), so it was never published.
             return
         elif update.update_type == UpdateContext.POSE_UPDATE:
             marker = context.int_marker
@@ -197,12 +197,12 @@ class InteractiveMarkerServer:
             del self.marker_contexts[name]
             message.erases.append(name)
 
-    # Messages from and to viewers.
+    # --- messages from and to viewers
 
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        """Move a marker as requested by a viewer, and call the program's callback.
+        """Move a marker as a viewer has requested, and call the program's callback.
 
-        For one second, feedback for the marker from other viewers is ignored.
+        For one second, ignore feedback for the marker from other viewers.
         """
         with self.mutex:
             context = self.marker_contexts.get(feedback.marker_name)
@@ -219,7 +219,7 @@ class InteractiveMarkerServer:
             context.last_feedback, context.last_client_id = now, feedback.client_id
 
             if feedback.event_type == feedback.POSE_UPDATE:
-                # A marker without a stamp keeps its frame.
+                # A marker without a time stamp keeps its frame.
                 header = context.int_marker.header
                 self.doSetPose(
                     self.pending_updates.get(feedback.marker_name),

@@ -1,4 +1,4 @@
-"""Menus of interactive markers: entries, checkboxes, and callbacks for selected entries."""
+"""Menus for interactive markers: entries, checkboxes, and callbacks for selected entries."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Callback = Callable[[InteractiveMarkerFeedback], object]
 
 @dataclass
 class EntryContext:
-    """An entry of a menu."""
+    """A menu entry."""
 
     title: str = ""
     command: str = ""
@@ -63,7 +63,7 @@ class MenuHandler:
         return handle
 
     def doInsert(self, title: str, command_type: int, command: str, feedback_cb: Callback | None) -> int:
-        """Create an entry that is not in a menu yet; return its handle."""
+        """Create an entry that is not in any menu yet; return its handle."""
         handle = self.current_handle_
         self.current_handle_ += 1
         self.entry_contexts_[handle] = EntryContext(title, command, command_type, feedback_cb=feedback_cb)
@@ -84,17 +84,20 @@ class MenuHandler:
         return True
 
     def getCheckState(self, handle: int) -> int | None:
-        """Return NO_CHECKBOX, CHECKED or UNCHECKED; None if the entry does not exist."""
+        """Return NO_CHECKBOX, CHECKED or UNCHECKED, or None if the entry does not exist."""
         context = self.entry_contexts_.get(handle)
         return context.check_state if context else None
 
     def getTitle(self, handle: int) -> str | None:
-        """Return the title of an entry; None if it does not exist."""
+        """Return an entry's title, or None if the entry does not exist."""
         context = self.entry_contexts_.get(handle)
         return context.title if context else None
 
     def apply(self, server: InteractiveMarkerServer, marker_name: str) -> bool:
-        """Attach the menu in its current state to a marker, effective at ``applyChanges``; return whether the marker exists."""
+        """Attach the menu in its current state to a marker; return whether the marker exists.
+
+        ``applyChanges`` publishes the change.
+        """
         marker = server.get(marker_name)
         if not marker:
             self.managed_markers_.discard(marker_name)
@@ -106,13 +109,13 @@ class MenuHandler:
         return True
 
     def reApply(self, server: InteractiveMarkerServer) -> bool:
-        """Apply the menu again to all markers that have it; return whether they all still exist."""
-        # A list, not a generator: continue after a missing marker.
+        """Apply the menu again to all markers that use it; return whether all these markers still exist."""
+        # Use a list, not a generator, to continue after a missing marker.
         found = [self.apply(server, marker) for marker in list(self.managed_markers_)]
         return all(found)
 
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        """Call the callback of the selected entry."""
+        """Call the selected entry's callback."""
         context = self.entry_contexts_.get(feedback.menu_entry_id)
         if context is not None and context.feedback_cb is not None:
             context.feedback_cb(feedback)
@@ -120,7 +123,7 @@ class MenuHandler:
     def pushMenuEntries(
         self, handles_in: Iterable[int], entries_out: list[MenuEntry], parent_handle: int
     ) -> bool:
-        """Append the messages of entries and of their submenus; return whether all of them exist."""
+        """Append the messages for entries and their submenus; return whether all the entries exist."""
         for handle in handles_in:
             context = self.entry_contexts_.get(handle)
             if context is None:
@@ -133,7 +136,7 @@ class MenuHandler:
         return True
 
     def makeEntry(self, context: EntryContext, handle: int, parent_handle: int) -> MenuEntry:
-        """Return the message of an entry; its title includes the checkbox."""
+        """Return an entry's message; its title includes the checkbox."""
         box = {self.CHECKED: "[x] ", self.UNCHECKED: "[ ] "}.get(context.check_state, "")
         return MenuEntry(
             id=handle,

@@ -22,7 +22,7 @@ _TYPE_NAMES = {
 
 
 class Joint:
-    """The joint of a segment."""
+    """A segment's joint."""
 
     def __init__(self, joint: UrdfJoint) -> None:
         self._joint = joint
@@ -32,7 +32,7 @@ class Joint:
         return self._joint.name
 
     def getTypeName(self) -> str:
-        """Return RotAxis, TransAxis, or None, which is KDL's name for a fixed joint."""
+        """Return RotAxis, TransAxis, or None. KDL names a fixed joint None."""
         return _TYPE_NAMES.get(self._joint.type, "None")
 
 
@@ -50,7 +50,7 @@ class Segment:
 
     @property
     def parent(self) -> str:
-        """The parent link's name."""
+        """Return the parent link's name."""
         return self._segment.joint.parent
 
     def getName(self) -> str:
@@ -62,7 +62,7 @@ class Segment:
         return self._joint
 
     def pose(self, q: float) -> Pose:
-        """Return the link's pose in its parent link: translation, and rotation as (x, y, z, w)."""
+        """Return the link's pose relative to its parent link: translation, and rotation as (x, y, z, w)."""
         return self._segment.pose(q)
 
 
@@ -86,7 +86,7 @@ class Chain:
 
 
 class Tree:
-    """The segments of a robot below its root."""
+    """A robot's segments below its root."""
 
     def __init__(self, root_name: str = "root") -> None:
         self._root = root_name
@@ -102,7 +102,7 @@ class Tree:
         return True
 
     def getNrOfSegments(self) -> int:
-        """Return the number of segments, without the root."""
+        """Return the number of segments, excluding the root."""
         return len(self._segments)
 
     def getNrOfJoints(self) -> int:
@@ -110,7 +110,7 @@ class Tree:
         return sum(segment.is_moving for segment in self._segments.values())
 
     def getChain(self, chain_root: str, chain_tip: str) -> Chain:
-        """Return the segments from a link down to a descendant. Raise ValueError if it is not a descendant."""
+        """Return the segments from a link down to a descendant. Raise ValueError if ``chain_tip`` is not a descendant."""
         found: list[Segment] = []
         link = chain_tip
         while link != chain_root:
@@ -123,7 +123,7 @@ class Tree:
 
 
 def tree_of(robot: Robot) -> Tree:
-    """Return the tree of a robot, adding each link after its parent."""
+    """Return a robot's tree, adding each link after its parent."""
     tree = Tree(robot.root)
     for joint in _downwards(robot):
         tree.addSegment(Segment(joint), joint.parent)

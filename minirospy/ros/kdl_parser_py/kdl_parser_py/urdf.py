@@ -18,24 +18,33 @@ class Writable(Protocol):
 
 
 def treeFromFile(filename: str) -> tuple[bool, Tree]:
-    """Return the tree of a description file. Raise UrdfError, OSError."""
+    """Return the tree for a description file.
+
+    Raise UrdfError if the description is invalid, OSError if the file cannot be read.
+    """
     return True, tree_of(read_robot(filename))
 
 
 def treeFromParam(param: str) -> tuple[bool, Tree]:
-    """Return the tree of a description in a parameter. Raise KeyError if it is not set, UrdfError."""
+    """Return the tree for a description in a parameter.
+
+    Raise KeyError if the parameter is not set, UrdfError if the description is invalid.
+    """
     from minirospy import client as rospy
 
     return True, tree_of(parse_robot(rospy.get_param(param), param))
 
 
 def treeFromString(xml: str | bytes) -> tuple[bool, Tree]:
-    """Return the tree of a description. Raise UrdfError."""
+    """Return the tree for a description. Raise UrdfError if it is invalid."""
     return True, tree_of(parse_robot(xml))
 
 
 def treeFromUrdfModel(robot_model: Writable, quiet: bool = False) -> tuple[bool, Tree]:
-    """Return the tree of urdf_parser_py's robot; warn if the root has an inertia, unless ``quiet``. Raise UrdfError."""
+    """Return the tree for urdf_parser_py's robot; warn if the root has an inertia, unless ``quiet``.
+
+    Raise UrdfError if the description is invalid.
+    """
     robot = parse_robot(robot_model.to_xml_string())
     if robot.links[robot.root].inertial and not quiet:
         print(

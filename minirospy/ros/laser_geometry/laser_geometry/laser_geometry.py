@@ -1,4 +1,4 @@
-"""laser_geometry.laser_geometry: LaserProjection, in numpy; its clouds are byte-identical to those of ROS's Python module.
+"""laser_geometry.laser_geometry: LaserProjection, in numpy. Its clouds are byte-identical to those from ROS's Python module.
 
 Source: http://wiki.ros.org/laser_geometry.
 """
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["LaserProjection", "PointCloud2"]
 
 _VIEWPOINT = ("vp_x", "vp_y", "vp_z")
-_INT32, _FLOAT32 = 5, 7  # type numbers of PointField
+_INT32, _FLOAT32 = 5, 7  # type numbers in PointField
 
 
 class LaserProjection:
@@ -37,7 +37,7 @@ class LaserProjection:
     LASER_SCAN_MAX_RANGE = -3.0
 
     class ChannelOption:
-        """The fields of a cloud in addition to x, y and z, as bits."""
+        """A cloud's fields in addition to x, y and z, as bits."""
 
         NONE = 0x00
         INTENSITY = 0x01
@@ -57,7 +57,7 @@ class LaserProjection:
         range_cutoff: float = -1.0,
         channel_options: int = ChannelOption.DEFAULT,
     ) -> PointCloud2:
-        """Return the cloud of a scan, in the scan's frame; ranges outside the scan's limits are omitted.
+        """Return a scan's cloud, in the scan's frame; ranges outside the scan's limits are omitted.
 
         ``range_cutoff``: omit ranges from this distance in meters; if negative, only the scan's limit applies.
         ``channel_options``: the fields, from ``ChannelOption``; ``INTENSITY`` is ignored if the scan has no intensities.
@@ -102,10 +102,11 @@ class LaserProjection:
         range_cutoff: float = -1.0,
         channel_options: int = ChannelOption.DEFAULT,
     ) -> PointCloud2:
-        """Return the cloud of a scan in another frame, each point transformed with the laser's pose at its measurement.
+        """Return a scan's cloud in another frame. Each point is transformed with the laser's pose at the time it was measured.
 
-        The transforms at the first and last beam are looked up in a tf2 buffer, and interpolated in between, as in the
-        C++ class; ROS's Python module lacks this method. Raise the exceptions of ``lookup_transform``.
+        The transforms for the first and last beam are looked up in a tf2 buffer, and interpolated in between, as in the
+        C++ class. ROS's Python module lacks this method. Raise an exception as ``lookup_transform`` does, if there is no
+        transform.
         """
         import numpy as np
 
@@ -197,7 +198,7 @@ def _interpolated(first: TransformStamped, last: TransformStamped, ratios: Value
 
 
 def _rotated(points: Values, rotations: Values) -> Values:
-    """Return the points, each rotated by its rotation, with shape (3, points)."""
+    """Return the points, each rotated by its own rotation, with shape (3, points)."""
     import numpy as np
 
     vectors = np.array([points[axis] for axis in "xyz"], np.float64)

@@ -1,4 +1,4 @@
-"""message_filters: combine messages of several topics by their stamps.
+"""message_filters: combine messages from several topics by their time stamps.
 
 A filter calls its callbacks with each message, or set of messages, that passes; filters can be chained.
 Source: http://wiki.ros.org/message_filters.
@@ -33,17 +33,17 @@ class Input(Protocol):
     """An object to which a filter can be connected."""
 
     def registerCallback(self, cb: Callback, *args: object) -> object:
-        """Register ``cb`` to be called with each message, followed by ``args``."""
+        """Register ``cb``, which is called with each message, followed by ``args``."""
 
 
 class SimpleFilter:
-    """The base class of filters: stores callbacks, and calls them with the messages that pass."""
+    """The base class for filters: stores callbacks, and calls them with the messages that pass."""
 
     def __init__(self) -> None:
         self.callbacks: dict[int, tuple[Callback, tuple[object, ...]]] = {}
 
     def registerCallback(self, cb: Callback, *args: object) -> int:
-        """Register ``cb`` to be called with each message or set that passes, followed by ``args``; return the callback's ID."""
+        """Register ``cb``, called with each message or set that passes, followed by ``args``; return the callback's ID."""
         conn = len(self.callbacks)
         self.callbacks[conn] = (cb, args)
         return conn
@@ -55,7 +55,7 @@ class SimpleFilter:
 
 
 class Subscriber(SimpleFilter):
-    """Passes on the messages of a topic; arguments and all other attributes are those of rospy.Subscriber."""
+    """Passes on a topic's messages. The arguments and all other attributes are those of rospy.Subscriber."""
 
     def __init__(self, *args: object, **kwargs: object) -> None:
         super().__init__()
@@ -72,17 +72,20 @@ class Subscriber(SimpleFilter):
         return self.topic
 
     def __getattr__(self, key: str) -> object:
-        # A copied object has no attributes at first: avoid an infinite recursion.
+        # A copied object has no attributes at first, so looking up ``sub`` would recurse infinitely.
         if key == "sub":
             raise AttributeError(key)
         return getattr(self.sub, key)
 
 
 class Cache(SimpleFilter):
-    """Stores the last ``cache_size`` messages of a filter for look-up by time, and passes each message on."""
+    """Stores the last ``cache_size`` messages from a filter for look-up by time, and passes each message on."""
 
     def __init__(self, f: Input, cache_size: int = 1, allow_headerless: bool = False) -> None:
-        """``allow_headerless``: stamp a message without a header with its arrival time, instead of warning and dropping it."""
+        """Create a cache.
+
+        ``allow_headerless``: stamp a message without a header on arrival, instead of dropping it with a warning.
+        """
         super().__init__()
         self.cache_size = cache_size
         self.cache_msgs: list[object] = []
@@ -96,7 +99,7 @@ class Cache(SimpleFilter):
         self.incoming_connection = f.registerCallback(self.add)
 
     def add(self, msg: object) -> None:
-        """Store a message, and pass it on."""
+        """Store a message, and pass the message on."""
         stamp = _stamp_of(msg, self.allow_headerless)
         if stamp is None:
             return
@@ -111,7 +114,7 @@ class Cache(SimpleFilter):
         self.signalMessage(msg)
 
     def getInterval(self, from_stamp: Time, to_stamp: Time) -> list[object]:
-        """Return the messages from one stamp to another, inclusive. Raise AssertionError if the interval is reversed."""
+        """Return the messages from one time stamp to another, inclusive. Raise AssertionError if the interval is reversed."""
         assert from_stamp <= to_stamp
         return [msg for time, msg in self._stored() if from_stamp <= time <= to_stamp]
 
@@ -124,16 +127,16 @@ class Cache(SimpleFilter):
         return next((msg for time, msg in reversed(self._stored()) if time <= stamp), None)
 
     def getLatestTime(self) -> Time | None:
-        """Return the stamp of the message that was stored last, or None."""
+        """Return the time stamp of the message that was stored last, or None."""
         stored = self._stored()
         return stored[-1][0] if stored else None
 
     def getLastestTime(self) -> Time | None:
-        """Return ``getLatestTime()``; this is its old, misspelt name."""
+        """Return ``getLatestTime()``; this name is old and misspelt."""
         return self.getLatestTime()
 
     def getOldestTime(self) -> Time | None:
-        """Return the stamp of the message that was stored first, or None."""
+        """Return the time stamp of the message that was stored first, or None."""
         stored = self._stored()
         return stored[0][0] if stored else None
 
@@ -148,19 +151,19 @@ class Cache(SimpleFilter):
 
 
 class TimeSynchronizer(SimpleFilter):
-    """Passes on sets of messages with the same stamp, one from each input.
+    """Passes on sets of messages with the same time stamp, one from each input.
 
     A callback's arguments are one message per input. Callbacks do not run concurrently.
     """
 
     def __init__(self, fs: Iterable[Input], queue_size: int, reset: bool = False) -> None:
-        """``queue_size``: the number of messages per input that wait for the other inputs.
+        """Connect the inputs. ``queue_size``: the number of messages per input that are queued until the other inputs' arrive.
 
         ``reset``: if simulated time jumps back, discard the input's queued messages.
         """
         super().__init__()
         self.queue_size = queue_size
-        # A reentrant lock: a callback may publish to an input in the same process.
+        # The lock is reentrant, because a callback may publish to an input in the same process.
         self.lock = threading.RLock()
         self.enable_reset = reset
         self.connectInput(fs)
@@ -209,10 +212,10 @@ class TimeSynchronizer(SimpleFilter):
 
 
 class ApproximateTimeSynchronizer(TimeSynchronizer):
-    """Passes on sets of messages, one from each input, whose stamps differ by less than ``slop`` seconds.
+    """Passes on sets of messages, one from each input, whose time stamps differ by less than ``slop`` seconds.
 
-    A new message is matched with the closest messages of the other inputs: of all possible sets, the first in the order in
-    which ROS tries them.
+    A new message is matched with the closest messages from the other inputs. Of all possible sets, the first is used, in the
+    order in which ROS tries them.
     """
 
     def __init__(
@@ -223,14 +226,17 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         allow_headerless: bool = False,
         reset: bool = False,
     ) -> None:
-        """``slop``: in seconds. ``allow_headerless``: stamp a message without a header with its arrival time."""
+        """Connect the inputs. ``slop`` is in seconds.
+
+        ``allow_headerless``: stamp a message without a header with its arrival time.
+        """
         self.slop: Duration = rospy.Duration.from_sec(slop)
         self.allow_headerless = allow_headerless
         self._last_added = 0
         super().__init__(fs, queue_size, reset)
 
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
-        """Store a message from an input; pass on the set that it completes."""
+        """Store a message from an input; if it completes a set, pass the set on."""
         try:
             stamp: Time = msg.header.stamp  # type: ignore[attr-defined]
         except AttributeError:
@@ -257,7 +263,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             if waiting > self.queue_size:
                 _keep_newest(my_queue, self.queue_size)
                 if my_queue_index is not None and stamp not in my_queue:
-                    # The new message was removed again, because it is older than all others in the queue.
+                    # The queue is full, and the new message was removed again because it is the oldest.
                     return
             if is_stale:
                 return
@@ -271,12 +277,12 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
     @property
     def last_added(self) -> Time:
-        """The time at which the last message arrived."""
+        """Return the time at which the last message arrived."""
         return rospy.Time(*divmod(self._last_added, 1_000_000_000))
 
     def _match(self, my_queue_index: int | None, nanoseconds: int) -> list[object]:
-        """Remove the set that a stamp completes from the queues, and return its messages; [] if there is no such set."""
-        # A subclass may have created its own list ``queues``, of dicts.
+        """Remove from the queues the set that a time stamp completes, and return its messages; [] if there is no such set."""
+        # A subclass may have replaced ``queues`` by its own list of dicts.
         queues = self._stamp_queues
         if self.queues is not queues:
             queues = [queue if isinstance(queue, StampQueue) else StampQueue(queue) for queue in self.queues]
@@ -292,7 +298,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
 
 def _stamp_of(message: object, allow_headerless: bool) -> Time | None:
-    """Return a message's stamp. Without a header return the current time, or None with a warning."""
+    """Return a message's time stamp. If it has no header, return the current time, or log a warning and return None."""
     try:
         stamp: Time = message.header.stamp  # type: ignore[attr-defined]
     except AttributeError:
@@ -306,13 +312,13 @@ def _stamp_of(message: object, allow_headerless: bool) -> Time | None:
 
 
 def _now() -> int:
-    """Return the node's time in nanoseconds. Raise ROSInitException before init_node."""
+    """Return the node's time in nanoseconds. Raise ROSInitException if init_node has not been called."""
     session = current_session()
     return session.clock.now() if session.has_time else rospy.Time.now().to_nsec()
 
 
 def _keep_newest(queue: Queue, size: int) -> None:
-    """Remove the oldest messages of a queue until at most ``size`` are left."""
+    """Remove a queue's oldest messages until at most ``size`` are left."""
     if isinstance(queue, StampQueue):
         queue.keep_newest(size)
     else:

@@ -1,4 +1,4 @@
-"""Queues of messages by stamp, and the search for a set of stamps that are close together. Pure."""
+"""Queues of messages by time stamp, and the search for a set of stamps that are close together. Pure."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ __all__ = ["StampQueue", "closest_stamps"]
 
 
 class StampQueue(MutableMapping[Time, object]):
-    """The messages of one input by stamp: a dict as in ROS, which also has a sorted list of its stamps."""
+    """One input's messages by time stamp: a dict as in ROS, which also contains a sorted list of the stamps."""
 
     __slots__ = ("_entries", "order")
 
     def __init__(self, messages: Mapping[Time, object] | None = None) -> None:
-        """``messages``: the initial contents, in order of arrival."""
+        """Create a queue. ``messages``: the initial contents, in order of arrival."""
         self.order: list[int] = []
         """Stamps in nanoseconds, ascending; always the same list object."""
         self._entries: dict[int, tuple[Time, object]] = {}
@@ -45,7 +45,7 @@ class StampQueue(MutableMapping[Time, object]):
         return repr(dict(self))
 
     def put(self, nanoseconds: int, stamp: Time, message: object) -> None:
-        """Store a message by its stamp, which is given in both forms."""
+        """Store a message under its stamp, which is given both in nanoseconds and as a Time."""
         entries, order = self._entries, self.order
         if nanoseconds in entries:
             # As in a dict, an existing key keeps its position and its identity.
@@ -62,14 +62,14 @@ class StampQueue(MutableMapping[Time, object]):
         self._entries.clear()
 
     def take(self, nanoseconds: int) -> object:
-        """Remove the message with this stamp in nanoseconds, and return it. Raise KeyError."""
+        """Remove the message with this stamp in nanoseconds, and return it. Raise KeyError if there is none."""
         message = self._entries.pop(nanoseconds)[1]
         order = self.order
         del order[bisect_left(order, nanoseconds) if nanoseconds > order[0] else 0]
         return message
 
     def stamp_at(self, nanoseconds: int) -> Time:
-        """Return the stamp object that was stored. Raise KeyError."""
+        """Return the stamp object that was stored. Raise KeyError if there is none."""
         return self._entries[nanoseconds][0]
 
     def keep_newest(self, size: int) -> None:
@@ -78,7 +78,10 @@ class StampQueue(MutableMapping[Time, object]):
             del self._entries[self.order.pop(0)]
 
     def nearest(self, stamp: int) -> int:
-        """Return the stored stamp closest to ``stamp``; of two, the one that arrived first. Raise IndexError if empty."""
+        """Return the stored stamp closest to ``stamp``; of two equally close ones, the first to arrive.
+
+        Raise IndexError if empty.
+        """
         order = self.order
         if order[-1] <= stamp:
             return order[-1]
@@ -103,9 +106,9 @@ class StampQueue(MutableMapping[Time, object]):
 def closest_stamps(
     queues: Sequence[StampQueue], stamp: int, slop: int, index: int | None = None
 ) -> list[int] | None:
-    """Return one stamp from each queue so that all differ by less than ``slop``; None if there is no such set.
+    """Return one stamp from each queue so that all differ by less than ``slop``, or None if there is no such set.
 
-    ``stamp`` is the new one, in queue number ``index``; the set contains it.
+    ``stamp`` is the new stamp, from queue number ``index``; the set contains it.
 
     The result is the set that ROS finds first. ROS tries all combinations of the stamps within ``slop`` of ``stamp``, closest
     first, with the first queue in the outermost loop. This function takes O(n log n) steps for n stamps, instead of the
@@ -119,7 +122,7 @@ def closest_stamps(
         if at == index:
             nearest.append(stamp)
         else:
-            # Fast path for the most frequent case: the new message is the newest of all.
+            # Fast path for the most frequent case: the new message is newer than all others.
             nearest.append(newest if (newest := order[-1]) <= stamp else queue.nearest(stamp))
     first, last = min(nearest), max(nearest)
     if first < stamp - slop or last > stamp + slop:
@@ -127,19 +130,19 @@ def closest_stamps(
     if last - first < slop:
         return nearest
 
-    # Stamps that differ by less than `slop` are in a window of that width that starts at one of them.
+    # Stamps that differ by less than `slop` are in a window with that width that starts at one of them.
     candidates = [
         [stamp] if at == index else queue.between(stamp - slop, stamp + slop)
         for at, queue in enumerate(queues)
     ]
-    # The window must contain the new stamp, so it starts at it or before it.
+    # The window must contain the new stamp, so it starts at or before that stamp.
     last = stamp + slop if index is None else stamp
     starts = {each for stamps in candidates for each in stamps if each <= last}
     windows = [start for start in sorted(starts) if _has_each(candidates, start, start + slop - 1)]
 
     chosen = []
     for queue, stamps in zip(queues, candidates, strict=True):
-        # Choose the first stamp that is in a remaining window: ROS's loops reach it first.
+        # Choose the first stamp that is in a remaining window, because ROS's loops reach that stamp first.
         for each in queue.by_distance(stamps, stamp):
             if left := _around(windows, each, slop):
                 windows = left

@@ -17,12 +17,12 @@ _T = TypeVar("_T", Vector, Twist, Wrench)
 
 
 class Rotation:
-    """A 3x3 rotation matrix, stored by rows."""
+    """A 3x3 rotation matrix, stored row by row."""
 
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, *args: Any) -> None:
-        """Create it from nothing (identity), nine numbers by rows, three column vectors, or another Rotation."""
+        """Create a rotation from nine numbers row by row, three column vectors, or another Rotation; by default, the identity."""
         if not args:
             self._m = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
         elif len(args) == 1 and isinstance(args[0], Rotation):
@@ -36,7 +36,7 @@ class Rotation:
                 "a Rotation is made of nothing, of nine numbers, of three Vectors, or of another Rotation"
             )
 
-    # --- made of angles
+    # --- created from angles
 
     @staticmethod
     def Identity() -> Rotation:
@@ -97,7 +97,7 @@ class Rotation:
 
     @staticmethod
     def Quaternion(x: float, y: float, z: float, w: float) -> Rotation:
-        """Return the rotation of a quaternion, without normalising it."""
+        """Return a quaternion's rotation, without normalising the quaternion."""
         xx, yy, zz, ww = x * x, y * y, z * z, w * w
         return Rotation(
             ww + xx - yy - zz, 2 * x * y - 2 * w * z, 2 * x * z + 2 * w * y,
@@ -105,7 +105,7 @@ class Rotation:
             2 * x * z - 2 * w * y, 2 * y * z + 2 * w * x, ww - xx - yy + zz,
         )  # fmt: skip
 
-    # --- taken apart
+    # --- returned as angles and axes
 
     def GetRPY(self) -> tuple[float, float, float]:
         """Return roll, pitch and yaw."""
@@ -116,12 +116,12 @@ class Rotation:
         return math.atan2(m[7], m[8]), pitch, math.atan2(m[3], m[0])
 
     def GetEulerZYX(self) -> tuple[float, float, float]:
-        """Return the angles of :meth:`EulerZYX`."""
+        """Return the angles that :meth:`EulerZYX` accepts."""
         gamma, beta, alfa = self.GetRPY()
         return alfa, beta, gamma
 
     def GetEulerZYZ(self) -> tuple[float, float, float]:
-        """Return the angles of :meth:`EulerZYZ`."""
+        """Return the angles that :meth:`EulerZYZ` accepts."""
         m = self._m
         if abs(m[8]) > 1 - _TINY:
             return (
@@ -146,7 +146,7 @@ class Rotation:
         return (m[2] + m[6]) / s, (m[5] + m[7]) / s, 0.25 * s, (m[3] - m[1]) / s
 
     def GetRotAngle(self, eps: float = EPSILON) -> tuple[float, Vector]:
-        """Return the angle and the axis; without rotation, the axis is z."""
+        """Return the angle and the axis; if the angle is 0, the axis is z."""
         m = self._m
         cosine = (m[0] + m[4] + m[8] - 1) / 2.0
         tolerance = eps * eps / 2.0
@@ -169,18 +169,18 @@ class Rotation:
         return axis * angle
 
     def UnitX(self, value: Vector | None = None) -> Vector | None:
-        """Return the x axis, the first column, or set it."""
+        """Get or set the x axis, the first column."""
         return self._column(0, value)
 
     def UnitY(self, value: Vector | None = None) -> Vector | None:
-        """Return the y axis, the second column, or set it."""
+        """Get or set the y axis, the second column."""
         return self._column(1, value)
 
     def UnitZ(self, value: Vector | None = None) -> Vector | None:
-        """Return the z axis, the third column, or set it."""
+        """Get or set the z axis, the third column."""
         return self._column(2, value)
 
-    # --- changed
+    # --- modified and inverted
 
     def DoRotX(self, angle: float) -> None:
         """Rotate about the local x axis."""
@@ -269,10 +269,10 @@ class Frame:
     """A pose: the rotation ``M`` and the position ``p``."""
 
     __hash__ = None  # type: ignore[assignment]
-    header: Header  # set by tf2_ros.Stamped only
+    header: Header  # set only by tf2_ros.Stamped
 
     def __init__(self, R: Rotation | Vector | Frame | None = None, V: Vector | None = None) -> None:
-        """Create it from a Rotation and a Vector, from one of them, from another Frame, or from nothing (identity)."""
+        """Create a pose from a Rotation and a Vector, from one of these, or from another Frame; by default, the identity."""
         self.M: Rotation
         self.p: Vector
         if isinstance(R, Frame):
@@ -308,7 +308,7 @@ class Frame:
         )
 
     def Integrate(self, twist: Twist, frequency: float) -> None:
-        """Move by a twist, given in this frame, for ``1 / frequency`` seconds."""
+        """Move the frame by a twist, given in this frame, for ``1 / frequency`` seconds."""
         angle = twist.rot.Norm() / frequency
         if angle < EPSILON:
             self.p = self.p + self.M * (twist.vel / frequency)

@@ -1,4 +1,4 @@
-"""PyKDL's functions on frames, and placeholders for the missing part: kinematic chains and their solvers."""
+"""PyKDL's functions on frames, and placeholders for kinematic chains and their solvers, which are not implemented."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _Geometry = TypeVar("_Geometry", Vector, Rotation, Frame, Twist, Wrench)
 
 
 def dot(a: Vector | Twist | Wrench, b: Vector | Twist | Wrench) -> float:
-    """Return the scalar product of two vectors, or the power of a twist and a wrench. Raise TypeError."""
+    """Return the scalar product of two vectors, or the power of a twist and a wrench. Raise TypeError for other arguments."""
     if isinstance(a, Vector) and isinstance(b, Vector):
         return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     if isinstance(a, Wrench) and isinstance(b, Twist):
@@ -24,7 +24,10 @@ def dot(a: Vector | Twist | Wrench, b: Vector | Twist | Wrench) -> float:
 
 
 def Equal(a: object, b: object, eps: float = EPSILON) -> bool:
-    """Return whether two objects of the same type are equal within ``eps`` in each number. Raise TypeError."""
+    """Return whether two objects of the same type differ by less than ``eps`` in each number.
+
+    Raise TypeError for objects of different types.
+    """
     kinds = Vector | Rotation | Frame | Screw
     if type(a) is not type(b) or not isinstance(a, kinds) or not isinstance(b, kinds):
         raise TypeError("Equal() takes two objects of one type: Vector, Rotation, Frame, Twist or Wrench")
@@ -50,7 +53,7 @@ def diff(a: Wrench, b: Wrench, dt: float = 1) -> Wrench: ...
 
 
 def diff(a: Any, b: Any, dt: float = 1) -> Any:
-    """Return the velocity that leads from ``a`` to ``b`` within ``dt``; for poses it is a twist in the base frame."""
+    """Return the velocity that leads from ``a`` to ``b`` within ``dt``; for poses, a twist in the base frame."""
     if isinstance(a, Frame) and isinstance(b, Frame):
         return Twist(diff(a.p, b.p, dt), diff(a.M, b.M, dt))
     if isinstance(a, Rotation) and isinstance(b, Rotation):
@@ -59,7 +62,7 @@ def diff(a: Any, b: Any, dt: float = 1) -> Any:
 
 
 def addDelta(a: _Geometry, da: Any, dt: float = 1) -> _Geometry:
-    """Return the result of moving ``a`` with the velocity ``da`` for ``dt``; the inverse of :func:`diff`."""
+    """Return the result of moving ``a`` with the velocity ``da`` for ``dt``; this function is the inverse of :func:`diff`."""
     if isinstance(a, Frame):
         return Frame(addDelta(a.M, da.rot, dt), addDelta(a.p, da.vel, dt))
     if isinstance(a, Rotation):
@@ -70,7 +73,7 @@ def addDelta(a: _Geometry, da: Any, dt: float = 1) -> _Geometry:
 
 
 def refusal(name: str) -> type:
-    """Return a placeholder class of this name; creating an instance raises NotImplementedError with advice."""
+    """Return a placeholder class with this name; creating an instance raises NotImplementedError with advice."""
 
     def refuse(*_: object, **__: object) -> NoReturn:
         raise NotImplementedError(

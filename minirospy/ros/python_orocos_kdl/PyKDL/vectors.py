@@ -19,7 +19,7 @@ class Vector:
     """Three floats: a point or a direction. Other attributes can be set."""
 
     __hash__ = None  # type: ignore[assignment]
-    header: Header  # set by tf2_ros.Stamped only
+    header: Header  # set only by tf2_ros.Stamped
 
     @overload
     def __init__(self, x: float, y: float, z: float) -> None: ...
@@ -50,7 +50,7 @@ class Vector:
     def x(self) -> float: ...
 
     def x(self, value: float | None = None) -> float | None:
-        """Return x, or set it."""
+        """Get or set x."""
         return self._component(0, value)
 
     @overload
@@ -59,7 +59,7 @@ class Vector:
     def y(self) -> float: ...
 
     def y(self, value: float | None = None) -> float | None:
-        """Return y, or set it."""
+        """Get or set y."""
         return self._component(1, value)
 
     @overload
@@ -68,7 +68,7 @@ class Vector:
     def z(self) -> float: ...
 
     def z(self, value: float | None = None) -> float | None:
-        """Return z, or set it."""
+        """Get or set z."""
         return self._component(2, value)
 
     def Norm(self, eps: float = EPSILON) -> float:
@@ -77,7 +77,7 @@ class Vector:
         return 0.0 if length < eps else length
 
     def Normalize(self, eps: float = EPSILON) -> float:
-        """Scale the vector to length 1, and return its old length; a vector shorter than ``eps`` becomes (1, 0, 0)."""
+        """Scale the vector to length 1, and return the previous length; a vector shorter than ``eps`` becomes (1, 0, 0)."""
         length = self.Norm(eps)
         self._v = [1.0, 0.0, 0.0] if length < eps else [each / length for each in self._v]
         return length
@@ -153,7 +153,7 @@ class Screw:
 
     _NAMES: tuple[str, str]
     __hash__ = None  # type: ignore[assignment]
-    header: Header  # set by tf2_ros.Stamped only
+    header: Header  # set only by tf2_ros.Stamped
 
     def _parts(self) -> tuple[Vector, Vector]:
         first, second = (getattr(self, name) for name in self._NAMES)
@@ -267,10 +267,10 @@ class Wrench(Screw):
 
 
 def are_near(a: Sequence[float], b: Sequence[float], eps: float = EPSILON) -> bool:
-    """Return whether all pairs of numbers differ by less than ``eps``, KDL's criterion of equality."""
+    """Return whether all pairs of numbers differ by less than ``eps``, which is KDL's criterion for equality."""
     return all(abs(x - y) < eps for x, y in zip(a, b, strict=True))
 
 
 def numbers_text(values: list[float]) -> str:
-    """Return numbers formatted as KDL prints them: in columns of twelve characters."""
+    """Return numbers formatted as KDL prints them, in columns 12 characters wide."""
     return f"[{','.join(f'{each:12.6g}' for each in values)}]"

@@ -12,14 +12,14 @@ from minirospy.ros.rospkg.rospkg.rospack import RosPack
 __all__ = ["PACKAGE_PREFIX", "URLError", "get", "get_filename", "urlopen"]
 
 PACKAGE_PREFIX = "package://"
-_TIMEOUT = 60.0  # seconds without data from a server until it counts as unreachable
+_TIMEOUT = 60.0  # seconds without data after which a server counts as unreachable
 
 
 def get(url: str) -> bytes:
     """Return the data at a URL: ``package://PACKAGE/FILE``, ``file:///FILE``, or one that urllib opens, such as http and https.
 
-    Raise Exception, as ROS does, if there is no such resource; ResourceNotFound if the package is not found; ValueError if it
-    is not a URL.
+    Raise Exception, as ROS does, if there is no such resource, ResourceNotFound if the package is not found, ValueError if
+    ``url`` is not a URL.
     """
     try:
         if url.startswith(PACKAGE_PREFIX):
@@ -35,7 +35,7 @@ def get_filename(url: str, use_protocol: bool = True) -> str:
     """Convert a package:// URL to a file:// URL; return other URLs unchanged.
 
     Without ``use_protocol``, return the file's path. Raise ResourceNotFound if the package is not found, Exception if the URL
-    names no file.
+    does not name a file.
     """
     if not url.startswith(PACKAGE_PREFIX):
         return url

@@ -79,7 +79,7 @@ def numpy_to_quat(arr: Array) -> object:
 
 @converts_to_numpy(Transform)
 def transform_to_numpy(msg: Transform) -> Floats:
-    """Return the 4x4 matrix of a transform."""
+    """Return a transform's 4x4 matrix."""
     return _matrix(vector3_to_numpy(msg.translation), quat_to_numpy(msg.rotation))
 
 
@@ -92,7 +92,7 @@ def numpy_to_transform(arr: Array) -> object:
 
 @converts_to_numpy(Pose)
 def pose_to_numpy(msg: Pose) -> Floats:
-    """Return the 4x4 matrix of a pose."""
+    """Return a pose's 4x4 matrix."""
     return _matrix(point_to_numpy(msg.position), quat_to_numpy(msg.orientation))
 
 
@@ -115,7 +115,7 @@ def _parts(matrix: Array, position: type[_P]) -> tuple[_P, Quaternion]:
 
 
 def _each(arr: Array, dimensions: int, make: Callable[[Array], object]) -> object:
-    """Return a message made from the last ``dimensions`` axes; an array of messages if there are more axes."""
+    """Return a message made from the last ``dimensions`` axes, or an array of messages if there are more axes."""
     if arr.ndim == dimensions:
         return make(arr)
     shape = arr.shape[:-dimensions]

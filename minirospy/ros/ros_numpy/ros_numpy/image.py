@@ -18,7 +18,10 @@ __all__ = ["image_to_numpy", "numpy_to_image"]
 
 @converts_to_numpy(Image)
 def image_to_numpy(msg: Image) -> Array:
-    """Return an image as an array; a read-only view of the message if it has the native byte order. Raise TypeError."""
+    """Return an image as an array: a read-only view into the message if it has the native byte order.
+
+    Raise TypeError if the image cannot be converted.
+    """
     return CvBridge().imgmsg_to_cv2(msg)
 
 

@@ -19,11 +19,11 @@ _F = TypeVar("_F", bound=_Function)
 
 _to_numpy: dict[tuple[str, bool], _Function] = {}
 _from_numpy: dict[tuple[str, bool], _Function] = {}
-"""Both are keyed by type name, because a bag's messages have other classes, and by whether they convert a list of messages."""
+"""Conversion functions by type name, because messages in a bag have other classes, and by whether they convert lists."""
 
 
 def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a function for messages of a type, or with ``plural`` for lists of them."""
+    """Return a decorator that registers a function for messages with a type, or with ``plural`` for lists of them."""
 
     def register(function: _F) -> _F:
         _to_numpy[msgtype._type, plural] = function
@@ -33,7 +33,7 @@ def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[
 
 
 def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a function from an array to a message of a type, or to a list of them."""
+    """Return a decorator that registers a function from an array to a message with a type, or with ``plural`` to a list."""
 
     def register(function: _F) -> _F:
         _from_numpy[msgtype._type, plural] = function
@@ -43,7 +43,7 @@ def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callabl
 
 
 def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
-    """Convert a message or a list of messages to an array; None to None. Raise ValueError if there is no conversion."""
+    """Convert a message or a list of messages to an array; return None for None. Raise ValueError if there is no conversion."""
     if msg is None:
         return None
     plural = isinstance(msg, Sequence)
@@ -59,7 +59,7 @@ def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
 
 
 def msgify(msg_type: type[Any], numpy_obj: Any, *args: Any, plural: bool = False, **kwargs: Any) -> Any:
-    """Convert an array to a message, with ``plural`` to a list of messages. Raise ValueError if there is no conversion."""
+    """Convert an array to a message, or with ``plural`` to a list of messages. Raise ValueError if there is no conversion."""
     function = _from_numpy.get((getattr(msg_type, "_type", ""), plural))
     if function is None:
         raise ValueError(

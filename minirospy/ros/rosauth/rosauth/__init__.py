@@ -1,1 +1,1 @@
-"""rosauth: authentication of web clients. Source: http://wiki.ros.org/rosauth."""
+"""rosauth: authenticates web clients. Source: http://wiki.ros.org/rosauth."""

@@ -19,12 +19,12 @@ __all__ = ["is_authentic", "mac_of", "main"]
 
 SECRET_LENGTH = 16
 _SECRET_FILE = "secret_file_location"
-# ROS's node returns -1, -2 and -3, which become these exit statuses.
+# ROS's node returns -1, -2 and -3, which the shell reports as these exit statuses.
 _NO_PARAMETER, _NO_FILE, _NO_SECRET = 255, 254, 253
 
 
 def main() -> int:
-    """Run the node; return the exit status: 255 without the parameter, 254 without the file, 253 for an invalid secret."""
+    """Run the node; return the exit status: 255 if the parameter is missing, 254 if the file is, 253 if the secret is invalid."""
     rospy.init_node("ros_mac_authentication")
     file = rospy.get_param(f"~{_SECRET_FILE}", None)
     if not isinstance(file, str):
@@ -57,13 +57,16 @@ def main() -> int:
 
 
 def mac_of(request: AuthenticationRequest, secret: str) -> str:
-    """Return the MAC of a request from a sender that knows the secret: SHA-512, in hexadecimal."""
+    """Return the MAC for a request from a sender that knows the secret: SHA-512, in hexadecimal."""
     text = f"{secret}{request.client}{request.dest}{request.rand}{request.t.secs}{request.level}{request.end.secs}"
     return hashlib.sha512(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def is_authentic(request: AuthenticationRequest, secret: str, now: times.Time, allowed_delta: float) -> bool:
-    """Return whether a request has the right MAC and, unless ``allowed_delta`` is negative, is recent and has not expired."""
+    """Return whether a request has the right MAC, is recent and has not expired.
+
+    If ``allowed_delta`` is negative, check only the MAC.
+    """
     is_in_time = allowed_delta < 0 or (abs(request.t - now).secs < allowed_delta and request.end > now)
     mac = request.mac.encode("utf-8", "surrogateescape")
     return is_in_time and hmac.compare_digest(mac, mac_of(request, secret).encode("ascii"))

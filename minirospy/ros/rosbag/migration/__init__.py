@@ -1,1 +1,1 @@
-"""Migration of bags to newer message definitions."""
+"""Migrates bags to newer message definitions."""

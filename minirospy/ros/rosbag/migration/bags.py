@@ -1,4 +1,4 @@
-"""Bags with messages whose types have changed: find the required migrations, and write a migrated bag."""
+"""Bags that contain messages whose types have changed: find the required migrations, and write a migrated bag."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["check_bag", "check_classes", "fix_bag"]
 
 
 def check_classes(migrator: MessageMigrator, classes: Iterable[MessageClass]) -> list[Migration]:
-    """Return the migrations that messages of these classes need, one per class."""
+    """Return the migrations that messages with these classes need, one per class."""
     found = []
     seen = set()
     for each in classes:
@@ -28,7 +28,10 @@ def check_classes(migrator: MessageMigrator, classes: Iterable[MessageClass]) ->
 
 
 def check_bag(migrator: MessageMigrator, path: str, warn: Callable[[str], object]) -> list[Migration]:
-    """Return the migrations that the messages of a bag need, in order of first use. Raise BagError, OSError."""
+    """Return the migrations that a bag's messages need, in order of first use.
+
+    Raise BagError if the bag is invalid, OSError if it cannot be read.
+    """
     with open_reader(path) as reader:
         connections = list(reader.connections.values())
         first: dict[int, MessageClass] = {}
@@ -46,8 +49,9 @@ def fix_bag(
 ) -> list[Migration]:
     """Write a bag with its messages migrated; return the migrations without a rule. If there are any, write nothing.
 
-    ``force``: write the bag anyway, and copy messages that cannot be migrated. Raise BagError, OSError,
-    BagMigrationException.
+    ``force``: write the bag anyway, and copy messages that cannot be migrated. Raise BagError if the bag is invalid,
+    OSError if
+    a file cannot be read or written, BagMigrationException if a message cannot be migrated.
     """
     missing = [each for each in check_bag(migrator, source, warn) if each.missing]
     if missing and not force:

@@ -1,4 +1,4 @@
-"""Rules that convert a message of an old type to a new type: from .bmr files, or generated from the two types.
+"""Rules that convert a message from an old type to a new type: from .bmr files, or generated from the two types.
 
 Source: http://wiki.ros.org/rosbag/migration. A generated rule copies the fields whose name and type are equal; it is valid
 if no field is lost or needs an invented value. No text from a bag is executed.
@@ -34,17 +34,17 @@ __all__ = [
 ]
 
 MessageClass = Any
-"""A message class, or None; untyped, because third-party .bmr files handle such classes without types."""
+"""A message class, or None. It is untyped because third-party .bmr files use such classes without type annotations."""
 
 Key = tuple[str, str]
 
 
 class BagMigrationException(Exception):
-    """A migration is not possible, or a rule is used incorrectly."""
+    """The migration is not possible, or a rule is used incorrectly."""
 
 
 class _Step(Protocol):
-    """A step of a migration path."""
+    """A step on a migration path."""
 
     @property
     def rule(self) -> MessageUpdateRule:
@@ -52,7 +52,7 @@ class _Step(Protocol):
 
 
 class Migrator(Protocol):
-    """The methods that a rule needs of :class:`minirospy.ros.rosbag.migration.rules_files.MessageMigrator`."""
+    """The methods in :class:`minirospy.ros.rosbag.migration.rules_files.MessageMigrator` that a rule needs."""
 
     rename_map: dict[str, set[str]]
 
@@ -72,7 +72,8 @@ class Migrator(Protocol):
 class MessageUpdateRule:
     """The base class of all rules: subclasses set the class attributes and override :meth:`update`.
 
-    ``order`` sorts the rules of a type; ``migrated_types`` has the pairs (old, new) of field types that update() migrates.
+    ``order`` sorts the rules for a type; ``migrated_types`` contains the pairs (old, new) of field types that update()
+    migrates.
     """
 
     old_type = ""
@@ -96,7 +97,7 @@ class MessageUpdateRule:
         self.sub_rules: list[MessageUpdateRule] = []
 
     def find_sub_paths(self) -> None:
-        """Find the rules for the migrated field types; print a warning for each type without one."""
+        """Find the rules for the migrated field types; print a warning for each type that has no rule."""
         self.sub_rules_valid = True
         for old_name, new_name in self.migrated_types:
             try:
@@ -122,22 +123,29 @@ class MessageUpdateRule:
         self.sub_rules_done = True
 
     def get_new_class(self, t: str) -> MessageClass:
-        """Return the class of a field's type in the new message. Raise KeyError."""
+        """Return the class for a field's type in the new message. Raise KeyError if the message has no field with this type."""
         return _class_named(t, self.new_types, self.new_type)
 
     def get_old_class(self, t: str) -> MessageClass:
-        """Return the class of a field's type in the old message. Raise KeyError."""
+        """Return the class for a field's type in the old message. Raise KeyError if the message has no field with this type."""
         return _class_named(t, self.old_types, self.old_type)
 
     def migrate(self, msg_from: Message, msg_to: Message) -> None:
-        """Fill a message field from the old one; called in update(). Raise BagMigrationException."""
+        """Fill a message field from the old one; called in update().
+
+        Raise BagMigrationException if the field's types are not in ``migrated_types``.
+        """
         self._check_migrated(msg_from._type, msg_to._type)
         self.migrator.migrate(msg_from, msg_to)
 
     def migrate_array(
         self, msg_from_array: Sequence[Message], msg_to_array: list[Message], msg_to_name: str
     ) -> None:
-        """Fill an array of messages from the old one; called in update(). Raise BagMigrationException, KeyError."""
+        """Fill an array of messages from the old one; called in update().
+
+        Raise BagMigrationException if the types are not in ``migrated_types``, KeyError if the new message does not use
+        the type.
+        """
         msg_to_class = self.get_new_class(msg_to_name)
         msg_to_array[:] = [msg_to_class() for _ in msg_from_array]
         if msg_from_array:
@@ -145,11 +153,14 @@ class MessageUpdateRule:
             self.migrator.migrate_array(msg_from_array, msg_to_array)
 
     def get_class_def(self) -> str | None:
-        """Return the source code of a generated rule for a .bmr file; None for other rules."""
+        """Return a generated rule's source code for a .bmr file, or None for other rules."""
         return None
 
     def apply(self, old_msg: Message) -> Message:
-        """Return a new message converted from an old one. Raise BagMigrationException."""
+        """Return a new message converted from an old one.
+
+        Raise BagMigrationException if the rule or the message's class is invalid.
+        """
         if not self.valid:
             raise BagMigrationException("Attempted to apply an invalid rule")
         if not self.sub_rules_done:
@@ -165,7 +176,7 @@ class MessageUpdateRule:
         return new_msg
 
     def update(self, old_msg: Message, new_msg: Message) -> None:
-        """Fill the new message; subclasses override it. Raise BagMigrationException."""
+        """Fill the new message; subclasses override this method. The base class raises BagMigrationException."""
         raise BagMigrationException("Tried to use rule without update overidden")
 
     def _check_migrated(self, old_type: str, new_type: str) -> None:
@@ -182,7 +193,7 @@ class MessageUpdateRule:
 
 
 def clean_name(name: str, top_name: str) -> str:
-    """Remove the package from a type's name if it is std_msgs, or that of the enclosing message ``top_name``."""
+    """Remove the package from a type's name if the package is std_msgs, or that of the enclosing message ``top_name``."""
     parts = name.split("/")
     for package in ("std_msgs", top_name.split("/", maxsplit=1)[0]):
         if package in parts:
@@ -199,7 +210,7 @@ def qualified_name(name: str, top_name: str) -> str:
 
 
 def get_message_key(c: MessageClass) -> Key | None:
-    """Return the key of a message class: its type and md5sum; None if it is not a message class."""
+    """Return a message class's key, which is its type and md5sum, or None if ``c`` is not a message class."""
     try:
         return c._type, c._md5sum
     except AttributeError:
@@ -207,19 +218,19 @@ def get_message_key(c: MessageClass) -> Key | None:
 
 
 def get_path_key(c1: MessageClass, c2: MessageClass) -> tuple[Key | None, Key | None]:
-    """Return the key of a migration from one class to another."""
+    """Return the key for a migration from one class to another."""
     return get_message_key(c1), get_message_key(c2)
 
 
 def copy_message(msg_from: Message, msg_to: Message) -> None:
-    """Fill a message from one with the same fields."""
+    """Fill a message from another one that has the same fields."""
     buffer = io.BytesIO()
     msg_from.serialize(buffer)
     msg_to.deserialize(buffer.getvalue())
 
 
 def migration_default_value(field_type: str) -> str:
-    """Return the source code of a new field's default value in a .bmr file."""
+    """Return the source code for a new field's default value in a .bmr file."""
     type_ = _parsed(field_type)
     if type_.is_array:
         if type_.base in ("byte", "uint8"):
@@ -237,7 +248,7 @@ def migration_default_value(field_type: str) -> str:
 
 
 def constants_from_def(core_type: str, msg_def: str) -> set[tuple[str, object, str]]:
-    """Return the constants of a full message definition: name, value and type."""
+    """Return the constants in a full message definition: name, value and type."""
     from minirospy.core.idl.load import specs_of_text
 
     spec = specs_of_text(core_type, msg_def)[core_type]
@@ -250,7 +261,7 @@ Step = Callable[[MessageUpdateRule, "Message", "Message"], None]
 def make_update_rule(
     migrator: Migrator, old_class: MessageClass, new_class: MessageClass
 ) -> type[MessageUpdateRule]:
-    """Return a rule that copies the fields of equal name; it is valid if no field is lost or needs an invented value."""
+    """Return a rule that copies fields with equal names; it is valid if no field is lost or needs an invented value."""
     lines: list[str] = []
     steps: list[Step] = []
     migrated: list[tuple[str, str]] = []
@@ -294,13 +305,13 @@ def make_update_rule(
 
 
 def make_old_half_rule(old_class: MessageClass) -> type[MessageUpdateRule]:
-    """Return an invalid rule from a type whose new type is unknown."""
+    """Return an invalid rule from an old type whose new type is unknown."""
     name = f"update__{old_class._type.replace('/', '_')}__{old_class._md5sum}"
     return _rule(name, old_class, None, ["pass"], [], valid=False)
 
 
 def make_new_half_rule(new_class: MessageClass) -> type[MessageUpdateRule]:
-    """Return an invalid rule to a type whose old type is unknown."""
+    """Return an invalid rule to a new type whose old type is unknown."""
     name = f"update_to_{new_class._type.replace('/', '_')}_{new_class._md5sum}"
     return _rule(name, None, new_class, ["pass"], [], valid=False)
 
@@ -315,7 +326,7 @@ def _rule(
     valid: bool,
     update: Step | None = None,
 ) -> type[MessageUpdateRule]:
-    """Return a rule class that also has its own source code for a .bmr file."""
+    """Return a rule class that also contains its own source code for a .bmr file."""
     old_type, old_text = (old_class._type, old_class._full_text.strip()) if old_class else ("", "")
     new_type, new_text = (new_class._type, new_class._full_text.strip()) if new_class else ("", "")
     pairs = "".join(f'\n\t\t("{old}","{new}"),' for old, new in migrated)
@@ -343,12 +354,12 @@ def _rule(
 
 
 def _quoted(text: str) -> str:
-    """Return a definition escaped for a triple-quoted string."""
+    """Return a definition escaped for use in a triple-quoted string."""
     return text.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
 
 
 def _mismatch(old_type: str | None, new_type: str) -> str:
-    """Return the reason why a field cannot be copied, judged by array form and primitive type; "" if it can."""
+    """Return the reason why a field cannot be copied, from its array form and primitive type; "" if it can be copied."""
     if old_type is None:
         return "No matching field name in old message"
     old, new = _parsed(old_type), _parsed(new_type)
@@ -366,9 +377,9 @@ def _mismatch(old_type: str | None, new_type: str) -> str:
 
 
 def _message_pair(migrator: Migrator, old: tuple[str, str], new: tuple[str, str]) -> tuple[str, str] | str:
-    """Return the names of two fields' message types, or the reason why there is no migration between them.
+    """Return the names of two fields' message types, or the reason why there is no migration between these types.
 
-    ``old`` and ``new`` are pairs: the field's type, and the type of its message.
+    ``old`` and ``new`` are pairs: the field's type, and the type of the message that contains the field.
     """
     old_base, new_base = _parsed(old[0]).base, _parsed(new[0]).base
     pair = clean_name(old_base, old[1]), clean_name(new_base, new[1])
@@ -412,7 +423,10 @@ def _class_named(name: str, classes: Mapping[str, MessageClass], top_name: str) 
 
 
 def _classes(type_: str, text: str) -> tuple[Mapping[str, MessageClass], MessageClass]:
-    """Return the classes of a full definition, and the first of them; ({}, None) without a type, or for a bad definition."""
+    """Return the classes in a full definition, and the first of them.
+
+    Return ({}, None) if there is no type or the definition is invalid.
+    """
     from minirospy.core.idl.load import classes_from_text
 
     if not type_:

@@ -1,4 +1,4 @@
-"""Migration of stored messages to the installed types: a path of rules from each old type to its newest version.
+"""Migrates stored messages to the installed types: builds a path of rules from each old type to its newest version.
 
 Explicit rules come from .bmr files, ordered by type. The rules between them, and those for types that keep their name, are
 generated from the two types. Source: http://wiki.ros.org/rosbag/migration.
@@ -40,7 +40,7 @@ __all__ = [
 
 
 class RuleChain:
-    """The explicit rules of one type: its updates by ``order``, then the rule that renames it, if there is one."""
+    """A type's explicit rules: its updates sorted by ``order``, then the rule that renames the type, if there is one."""
 
     def __init__(self) -> None:
         self.chain: list[MessageUpdateRule] = []
@@ -53,7 +53,7 @@ class RuleChain:
 
 
 class ScaffoldNode:
-    """A step of a path: converts one class to another by a rule; ``next`` is the following step."""
+    """A step on a path: converts one class to another with a rule; ``next`` is the following step."""
 
     def __init__(
         self, old_class: MessageClass, new_class: MessageClass, rule: MessageUpdateRule | None
@@ -65,7 +65,7 @@ class ScaffoldNode:
 
     @property
     def rule(self) -> MessageUpdateRule:
-        """The rule of this step."""
+        """Return the rule for this step."""
         assert self._rule is not None
         return self._rule
 
@@ -79,14 +79,14 @@ class ScaffoldNode:
 
 
 class Migration(NamedTuple):
-    """A type that needs migration: the path, and the rules on it that are missing."""
+    """A type that needs migration: the path, and the missing rules on it."""
 
     path: list[ScaffoldNode]
     missing: list[MessageUpdateRule]
 
 
 class MessageMigrator:
-    """Migrates messages by the rules of .bmr files, and of packages that export rules (``plugins``).
+    """Migrates messages with the rules in .bmr files, and with those that packages export (``plugins``).
 
     Raise BagMigrationException if a rule is marked as not valid.
     """
@@ -116,17 +116,17 @@ class MessageMigrator:
         }
 
     def lookup_type(self, key: Key) -> MessageClass:
-        """Return the class with this type and md5sum from the rules' definitions, or None."""
+        """Return the class with this type and md5sum from the rules' definitions, or None if there is none."""
         return self.class_dict.get(key)
 
     def add_update_rule(self, r: MessageUpdateRule) -> None:
-        """Add an explicit rule; report and ignore a rule that conflicts with others."""
+        """Add an explicit rule. Report and ignore a rule that conflicts with others."""
         if not r.valid:
             print(f"ERROR: Update rule [{r.location}] has valid set to False.", file=sys.stderr)
             self.false_rule_loaded = True
             return
         if r.old_class is None or r.new_class is None:
-            return  # its definitions are invalid, which has been reported
+            return  # the rule's definitions are invalid, which has been reported
         why = self._why_renaming_fails(r) if r.rename_rule else self._why_updating_fails(r)
         if why:
             print(f"WARNING: {why}", file=sys.stderr)
@@ -145,7 +145,7 @@ class MessageMigrator:
         return not self.get_invalid_rules()
 
     def get_invalid_rules(self) -> list[MessageUpdateRule]:
-        """Return the rules that are missing."""
+        """Return the missing rules."""
         rules = [node.rule for node in (*self.base_nodes, *self.extra_nodes) if not node.rule.valid]
         return self.filter_rules_unique(rules)
 
@@ -157,7 +157,7 @@ class MessageMigrator:
         return list(found.values())
 
     def expand_rules(self, rules: Sequence[MessageUpdateRule]) -> list[MessageUpdateRule]:
-        """Return the rules and the rules that they depend on, without duplicates."""
+        """Return the rules and the rules that these depend on, without duplicates."""
         expanded = []
         for rule in self.filter_rules_unique(rules):
             expanded += [rule, *self.expand_rules(rule.sub_rules)]
@@ -180,7 +180,7 @@ class MessageMigrator:
         return found
 
     def find_target(self, old_class: MessageClass) -> MessageClass:
-        """Return the installed class to which messages of this class are migrated, or None."""
+        """Return the installed class to which messages with this class are migrated, or None if there is none."""
         from minirospy.core.idl.load import get_message_class
 
         key = get_message_key(old_class)
@@ -212,7 +212,10 @@ class MessageMigrator:
         msg_from: tuple[str, bytes, str, object, MessageClass],
         msg_to: tuple[str, object, str, object, MessageClass],
     ) -> tuple[str, bytes, str, object, MessageClass]:
-        """Return a raw message (type, bytes, md5sum, position, class) converted to the new type. Raise BagMigrationException."""
+        """Return a raw message (type, bytes, md5sum, position, class) converted to the new type.
+
+        Raise BagMigrationException if there is no valid path.
+        """
         path = self._valid_path(msg_from[4], msg_to[4], msg_from[0], msg_to[0])
         body = msg_from[1]
         if path and msg_from[2] != msg_to[2]:
@@ -224,7 +227,7 @@ class MessageMigrator:
         return msg_to[0], body, msg_to[2], msg_to[3], msg_to[4]
 
     def migrate(self, msg_from: Message, msg_to: Message) -> None:
-        """Fill a message of a new type from one of an old type. Raise BagMigrationException."""
+        """Fill a message with a new type from one with an old type. Raise BagMigrationException if there is no valid path."""
         path = self._valid_path(type(msg_from), type(msg_to), msg_from._type, msg_to._type)
         if not path or msg_from._md5sum == msg_to._md5sum:
             copy_message(msg_from, msg_to)
@@ -234,22 +237,25 @@ class MessageMigrator:
         copy_message(self._apply(path, message), msg_to)
 
     def migrate_array(self, msg_from_array: Sequence[Message], msg_to_array: Sequence[Message]) -> None:
-        """Fill messages of a new type from the same number of messages of an old type. Raise BagMigrationException."""
+        """Fill messages with a new type from as many messages with an old type.
+
+        Raise BagMigrationException if the lengths differ, or there is no valid path.
+        """
         if len(msg_from_array) != len(msg_to_array):
             raise BagMigrationException("Migrate array called on on arrays of unequal length.")
         for old, new in zip(msg_from_array, msg_to_array, strict=True):
             self.migrate(old, new)
 
     def make_update_rule(self, old_class: MessageClass, new_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return a rule that copies the fields of equal name."""
+        """Return a rule that copies fields with equal names."""
         return make_update_rule(self, old_class, new_class)
 
     def make_old_half_rule(self, old_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return an invalid rule from a type whose new type is unknown."""
+        """Return an invalid rule from an old type whose new type is unknown."""
         return make_old_half_rule(old_class)
 
     def make_new_half_rule(self, new_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return an invalid rule to a type whose old type is unknown."""
+        """Return an invalid rule to a new type whose old type is unknown."""
         return make_new_half_rule(new_class)
 
     # -- loading
@@ -259,7 +265,7 @@ class MessageMigrator:
         scope: dict[str, object] = {"MessageUpdateRule": MessageUpdateRule}
         try:
             exec(compile(path.read_text(encoding="utf-8"), name, "exec"), scope)
-        except Exception as error:  # noqa: BLE001 the program of a user: what it raises concerns this file alone
+        except Exception as error:  # noqa: BLE001 - a user's program: its error affects only this file
             print(f"Cannot load rule file [{name}] in local package: {error}", file=sys.stderr)
             return
         for each, value in list(scope.items()):
@@ -311,7 +317,7 @@ class MessageMigrator:
     # -- the scaffold
 
     def _build(self) -> None:
-        """Link the explicit rules of each type, and the last of them to the next type name or the installed class."""
+        """Link each type's explicit rules, and the last of them to the next type name or the installed class."""
         ends = []
         for type_, chain in list(self.rulechains.items()):
             self.rename_map[type_] = self._names_of(type_)
@@ -346,7 +352,7 @@ class MessageMigrator:
         return names
 
     def _connect(self, end: ScaffoldNode) -> None:
-        """Link the last rule of a type to the step that follows."""
+        """Link a type's last rule to the step that follows."""
         from minirospy.core.idl.load import get_message_class
 
         installed = get_message_class(end.new_class._type)
@@ -377,7 +383,7 @@ class MessageMigrator:
             end.next = self._node(end.new_class, None, rule)
 
     def _path_to_nowhere(self, old_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the path of a type that is not installed; it ends with a rule for the user to write."""
+        """Return the path for a type that is not installed; the path ends with a rule for the user to write."""
         steps = self.scaffold_range(old_class._type, "")
         steps = self._from_start(steps, old_class) or steps
         last = steps[-1].new_class if steps else old_class
@@ -402,7 +408,7 @@ class MessageMigrator:
         return [self._extra(old_class, first, self._made_whole(old_class, first)), *steps]
 
     def _to_end(self, steps: list[ScaffoldNode], new_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps up to the new class, adding a generated step if none leads to it."""
+        """Return the steps up to the new class, adding a generated step if none leads to this class."""
         candidates = []
         for number, node in reversed(list(enumerate(steps))):
             if node.new_class is None or node.new_class._type != new_class._type:
@@ -426,7 +432,7 @@ class MessageMigrator:
         return []
 
     def _from_start(self, steps: list[ScaffoldNode], old_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps from the old class, adding a generated step if none starts there; [] if no valid one exists."""
+        """Return the steps from the old class, adding a generated step if none starts there; [] if there is no valid one."""
         if exact := self._exact_start(steps, old_class):
             return exact
         for number, node in reversed(list(enumerate(steps))):

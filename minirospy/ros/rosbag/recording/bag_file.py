@@ -1,4 +1,4 @@
-"""One file of a recording: written as ``NAME.active`` by the disk thread, renamed when complete."""
+"""One file in a recording: the disk thread writes it as ``NAME.active``, and renames it when it is complete."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ __all__ = ["BagFile", "FileWriter"]
 _UNLIMITED = 2**31
 _KNOWN_HEADERS = 10_000
 _DEFAULTS = {"message_definition": "", "md5sum": "*", "type": "*"}
-"""Fields that a bag requires, and that third-party publishers may omit from their connection headers."""
+"""Fields that a bag requires, but that third-party publishers may omit from their connection headers."""
 
 
 class FileWriter(Protocol):
-    """The common interface of the writers of bags and of MCAP files."""
+    """The interface that the writers for bags and for MCAP files share."""
 
     @property
     def size(self) -> int:
-        """Size of the file in bytes so far."""
+        """Return the current file size in bytes."""
 
     @property
     def gathered(self) -> int:
-        """Bytes in memory that have not been passed to the stream yet."""
+        """Return the number of bytes in memory that have not been passed to the stream yet."""
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
         """Add a connection and return its number."""
@@ -82,35 +82,38 @@ class BagFile:
 
     @property
     def active_name(self) -> str:
-        """The file's name while it is being written."""
+        """Return the file's name while it is being written."""
         return str(self._active)
 
     @property
     def size(self) -> int:
-        """Size of the file in bytes so far."""
+        """Return the current file size in bytes."""
         return self._writer.size
 
     @property
     def gathered(self) -> int:
-        """Bytes in memory, not counting those in the disk thread's queue."""
+        """Return the number of bytes in memory, not counting those in the disk thread's queue."""
         return self._writer.gathered
 
     def write(self, topic: str, header: Mapping[str, str], time: int, body: Buffer, tail: Buffer) -> None:
-        """Write a message that arrived with this connection header. Raise BagFormatError."""
+        """Write a message that arrived with this connection header.
+
+        Raise BagFormatError if the bag format cannot store the message.
+        """
         if self._is_closed:
             return
-        # All messages of a connection share the same header object.
+        # All messages on a connection share the same header object.
         known = self._by_identity.get(id(header))
         number = known[1] if known and known[0] is header else self._connection(topic, header)
         try:
             self._writer.write(number, time, body, tail)
         except BagFormatError:
             raise
-        except Exception as error:  # noqa: BLE001 - whatever ended a compression
+        except Exception as error:  # noqa: BLE001 - a compression may fail with any exception
             self._give_up(error)
 
     def write_ready(self) -> None:
-        """Write chunks whose compression has finished since the last message."""
+        """Write the chunks whose compression has finished since the last message."""
         if not self._is_closed:
             try:
                 self._writer.write_ready()
@@ -122,7 +125,7 @@ class BagFile:
         self._disk.submit(self._finish)
 
     def _connection(self, topic: str, header: Mapping[str, str]) -> int:
-        # A publisher that reconnects keeps its connection number.
+        # A publisher that reconnects with the same header keeps its connection number.
         key = topic, frozenset(header.items())
         number = self._by_content.get(key)
         if number is None:
@@ -142,7 +145,7 @@ class BagFile:
             self._writer.close()
             self._stream.close_file()
             private_files.replace_file(self._active, self._path)
-        except Exception as error:  # noqa: BLE001 - also of a chunk's compression: MemoryError, for example
+        except Exception as error:  # noqa: BLE001 - compressing a chunk may fail too, e.g. with MemoryError
             self._salvage(error)
 
     def _give_up(self, error: Exception) -> None:
@@ -154,7 +157,7 @@ class BagFile:
         with self._lock:
             if self._is_closed:
                 return
-            # This stops further writes.
+            # Stop further writes.
             self._is_closed = True
         self._salvage(error)
 

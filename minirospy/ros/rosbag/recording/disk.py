@@ -1,4 +1,4 @@
-"""Files that are written by a thread, so that the caller does not wait for the disk.
+"""Files that a thread writes, so that the caller does not wait for the disk.
 
 :attr:`DiskThread.pending` counts the queued bytes; the caller decides how to limit them.
 """
@@ -21,29 +21,29 @@ Buffer = bytes | bytearray | memoryview
 class DiskThread:
     """Runs queued calls in order, in a thread that it starts. ``close`` waits until the queue is empty.
 
-    If a call raises an exception, ``on_error(error)`` is called in that thread, and the next call follows.
+    If a call raises an exception, ``on_error(error)`` is called in that thread, and then the next call runs.
     """
 
     def __init__(self, on_error: Callable[[Exception], object]) -> None:
         self._on_error = on_error
         self._queue: queue.SimpleQueue[tuple[Callable[[], object], int] | None] = queue.SimpleQueue()
-        # Each counter is written by one side only, so no lock is needed.
+        # Each counter is written by one thread only, so no lock is needed.
         self._queued = self._done = 0
         self._thread = threading.Thread(target=self._run, name="rosbag-disk")
         self._thread.start()
 
     @property
     def pending(self) -> int:
-        """Bytes that are queued and not yet written."""
+        """Return the number of bytes that are queued but not yet written."""
         return self._queued - self._done
 
     @property
     def is_current(self) -> bool:
-        """Return whether the calling thread is this one."""
+        """Return whether the calling thread is the disk thread."""
         return threading.current_thread() is self._thread
 
     def submit(self, function: Callable[[], object], size: int = 0) -> None:
-        """Queue a call, which writes ``size`` bytes. Not thread-safe: callers must serialize their calls."""
+        """Queue a call that writes ``size`` bytes. Not thread-safe: callers must serialize their calls."""
         self._queued += size
         self._queue.put((function, size))
 
@@ -57,7 +57,7 @@ class DiskThread:
             function, size = item
             try:
                 function()
-            except Exception as error:  # noqa: BLE001 - the files behind the call have to be completed
+            except Exception as error:  # noqa: BLE001 - later calls must still complete their files
                 self._on_error(error)
             self._done += size
 
@@ -67,7 +67,7 @@ class QueuedFile:
 
     Calls are queued; a call from the disk thread itself runs immediately.
 
-    ``on_error(error)`` is called in that thread at the first error; the file's other queued calls are then dropped.
+    At the first error, ``on_error(error)`` is called in the disk thread, and the file's other queued calls are dropped.
     Raise OSError if the file cannot be created.
     """
 
@@ -77,12 +77,12 @@ class QueuedFile:
         self._on_error = on_error
         self._position = 0
         self.failed = False
-        # The name contains the time, so it can be guessed: open_file does not follow a symbolic link placed there.
+        # The name contains the time, so an attacker can guess it: open_file follows no symbolic link.
         opened = open_file(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         self._file = os.fdopen(opened, "r+b", buffering=0)
 
     def write(self, data: Buffer) -> int:
-        """Write all of ``data``, which must not change afterwards."""
+        """Write all of ``data``, which must not change after the call."""
         size = len(data)
         self._position += size
         self._do(lambda: self._write_all(data), size)
@@ -97,7 +97,7 @@ class QueuedFile:
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """Seek from the start, or to the end."""
         if whence == os.SEEK_END:
-            # The writer seeks only to the header and then back to the end, without writing after that.
+            # No seek is needed: the writer seeks to the header and then back to the end, without writing after that.
             return self._position
         self._position = offset
         self._do(lambda: self._file.seek(offset))
@@ -117,7 +117,7 @@ class QueuedFile:
         """Do nothing: the file is unbuffered."""
 
     def written(self) -> int:
-        """Return the size of the file in bytes. Call only in the disk thread."""
+        """Return the file size in bytes. Call only in the disk thread."""
         return os.fstat(self._file.fileno()).st_size
 
     def close_file(self) -> None:
@@ -135,7 +135,7 @@ class QueuedFile:
             return
         try:
             call()
-        except Exception as error:  # noqa: BLE001 - reported, and the next file is written
+        except Exception as error:  # noqa: BLE001 - reported; the next file is still written
             self.failed = True
             self._on_error(error)
 

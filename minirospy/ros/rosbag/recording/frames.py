@@ -1,4 +1,4 @@
-"""Message classes that carry serialized bytes unchanged, for recording and playing."""
+"""Message classes that contain serialized bytes unchanged, for recording and playing."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["ReceivedFrame", "frame_class", "parts_of"]
 
 
 class ReceivedFrame(AnyMsg):
-    """A received message of any type: ``frame`` has its bytes, valid only during the callback unless it is ``bytes``."""
+    """A received message of any type: ``frame`` contains its bytes, valid only during the callback unless it is ``bytes``."""
 
     __slots__ = ["frame"]
     frame: Buffer
@@ -24,12 +24,12 @@ class ReceivedFrame(AnyMsg):
 def parts_of(frame: Buffer) -> tuple[Buffer, bytes]:
     """Return a frame's bytes in two parts; the second is empty unless a large message was received in two parts."""
     if isinstance(frame, SplitFrame):
-        # A memoryview of it contains the first part only.
+        # A memoryview on the frame contains only the first part.
         return memoryview(frame), frame.tail
     return frame, b""
 
 
 def frame_class(type_: str, md5sum: str, definition: str) -> type[AnyMsg]:
-    """Return a message class of this type that is published from its serialized bytes, ``_buff``."""
+    """Return a message class with this type that is published from its serialized bytes, ``_buff``."""
     fields = {"_type": type_, "_md5sum": md5sum, "_full_text": definition, "__slots__": []}
     return type("StoredFrame", (AnyMsg,), fields)

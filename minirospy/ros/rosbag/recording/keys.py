@@ -1,4 +1,4 @@
-"""Single keys from the terminal, or characters from a pipe, while a program runs."""
+"""Reads single keys from the terminal, or characters from a pipe, while a program runs."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _POLL_SECONDS = 0.05
 
 @contextlib.contextmanager
 def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
-    """Call ``on_key`` from a thread with each key typed while the block runs. Ctrl-C remains a signal.
+    """Call ``on_key`` from a thread with each key typed while the block runs. Ctrl-C still sends a signal.
 
-    Read nothing if there is no standard input; do not touch the terminal while the process is in the background.
+    Read nothing if there is no standard input. Do not change the terminal while the process is in the background.
     """
     stop = threading.Event()
     reader: Callable[[Callable[[str], object], threading.Event], None] | None = None
@@ -68,7 +68,7 @@ class _Terminal:
         self._before: list[object] | None = None
 
     def set_up(self) -> bool:
-        """Switch the terminal to single keys; return False in the background, where a read would stop the process."""
+        """Switch the terminal to single keys. Return False in the background, because a read there would stop the process."""
         if os.tcgetpgrp(self._number) != os.getpgrp():
             self._before = None
             return False

@@ -1,4 +1,4 @@
-"""The options of `rosbag record`, and the parsers of their values: sizes, durations, topics.
+"""The options for `rosbag record`, and parsers for their values: sizes, durations, topics.
 
 Source: http://wiki.ros.org/rosbag/Commandline#record.
 """
@@ -30,7 +30,7 @@ class RecordOptions(NamedTuple):
     regex: bool = False
     exclude: str = ""
     node: str = ""
-    prefix: str = ""  # file name without .bag, or its part before the date
+    prefix: str = ""  # file name without .bag, or the part of the name before the date
     append_date: bool = True
     split: bool = False
     max_splits: int = 0
@@ -49,17 +49,17 @@ class RecordOptions(NamedTuple):
 
     @property
     def follows_master(self) -> bool:
-        """Return whether topics may be added during the recording: the master is then queried every second."""
+        """Return whether topics may be added during the recording, so that the master must be queried every second."""
         return self.all_topics or self.regex or bool(self.node)
 
     @property
     def extension(self) -> str:
-        """The extension of the files."""
+        """Return the file name extension."""
         return ".mcap" if self.mcap else ".bag"
 
 
 def parse_duration(text: str) -> int:
-    """Return the nanoseconds of a duration such as ``30``, ``30s``, ``5m`` or ``1.5h``. Raise UsageError."""
+    """Return the nanoseconds in a duration such as ``30``, ``30s``, ``5m`` or ``1.5h``. Raise UsageError if it is invalid."""
     number = _NUMBER.match(text)
     if not number:
         raise UsageError("Duration must start with a floating point number.")
@@ -73,7 +73,10 @@ def parse_duration(text: str) -> int:
 
 
 def parse_size(text: str) -> int:
-    """Return the bytes of a size such as ``1G``, ``500M``, ``20k`` or ``1000``; units are powers of 1024. Raise UsageError."""
+    """Return the bytes in a size such as ``1G``, ``500M``, ``20k`` or ``1000``; units are powers of 1024.
+
+    Raise UsageError if the size is invalid.
+    """
     number = re.match(r"\s*\d+", text)
     multiplier = _MULTIPLIERS.get(text[number.end() :].lower()) if number else None
     if not number or not multiplier:
@@ -82,10 +85,10 @@ def parse_size(text: str) -> int:
 
 
 def topic_filter(options: RecordOptions, subscribed_by_node: bool = False) -> Callable[[str], bool]:
-    """Return a predicate for global topic names: whether to record the topic. Raise UsageError on a bad expression.
+    """Return a predicate that tells whether to record a topic, given its global name.
 
     ``subscribed_by_node``: for topics found by ``--node``, which need not match the expressions. Expressions match whole
-    names.
+    names. Raise UsageError if an expression is invalid.
     """
     exclude = _compiled(options.exclude) if options.exclude else None
     patterns = [_compiled(topic) for topic in options.topics] if options.regex else []

@@ -1,4 +1,4 @@
-"""The output of a player: this process's node for `rosbag play`; another one for a player inside a program."""
+"""A player's output: this process's node for `rosbag play`; another output for a player inside a program."""
 
 from __future__ import annotations
 
@@ -24,43 +24,44 @@ if TYPE_CHECKING:
 __all__ = ["CLOCK", "Controls", "NodeOutput", "Output"]
 
 _SECOND = 10**9
-_SWITCH_SECONDS = 0.00005  # GIL switch interval: the reading thread may delay a due message by this
+# GIL switch interval in seconds: the reading thread may delay a due message by this
+_SWITCH_SECONDS = 0.00005
 
-_STAMP = struct.Struct("<4xII")  # start of a Header: sequence number (skipped), then the stamp
+_STAMP = struct.Struct("<4xII")  # start of a Header: sequence number (skipped), then the time stamp
 
 CLOCK = struct.Struct("<II")  # a serialized rosgraph_msgs/Clock: secs, nsecs
 
 
 class Controls(Protocol):
-    """The player's methods that an output uses. Thread-safe."""
+    """The player's methods that an output calls. Thread-safe."""
 
     def end(self) -> None:
         """Stop playing."""
 
     def set_paused(self, paused: bool) -> bool:
-        """Pause or resume; return whether that changed the state."""
+        """Pause or resume; return whether the state has changed."""
 
     def control_rate(self, stamp: int) -> None:
-        """Store the stamp of the last message on the rate control topic."""
+        """Store the time stamp of the last message on the rate control topic."""
 
 
 class Output(Protocol):
     """The destination of a player's messages. Its methods are called in the player's thread."""
 
     def open(self, player: Controls) -> None:
-        """Stop the player when the graph connection shuts down. Called first."""
+        """Stop the player when the connection to the graph shuts down. This method is called first."""
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """Advertise the topics to be played: the connections, each with the number of its bag."""
+        """Advertise the topics to be played: the connections, each with its bag's number."""
 
     def offer(self, player: Controls) -> None:
-        """Offer the means to control the player, such as a service."""
+        """Offer ways to control the player, such as a service."""
 
     def has_all_subscribers(self) -> bool:
         """Return whether each topic has a subscriber."""
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """Return the context in which messages are played; meanwhile ``on_key`` is called with each typed key."""
+        """Return the context in which messages are played; while in it, ``on_key`` is called with each typed key."""
 
     def publish(self, number: int, message: StoredMessage) -> None:
         """Publish a message from the bag with this number."""
@@ -76,7 +77,7 @@ class Output(Protocol):
 
 
 class _Outlet:
-    """One recorded publisher of a topic: its messages are sent by the publisher that all of them share."""
+    """A recorded publisher. Its messages are sent by one publisher that all recorded publishers of the topic share."""
 
     def __init__(self, publisher: client.Publisher[client.AnyMsg], is_latched: bool) -> None:
         self.publisher = publisher
@@ -92,7 +93,7 @@ class _Outlet:
 
 
 class _LateSubscribers(client.SubscribeListener):
-    """Sends the last message of each latched recorded publisher to late subscribers: a topic itself stores only one."""
+    """Sends the last message of each latched recorded publisher to late subscribers, because a topic stores only one message."""
 
     def __init__(self) -> None:
         self.outlets: list[_Outlet] = []
@@ -110,7 +111,7 @@ class _LateSubscribers(client.SubscribeListener):
 
 
 class NodeOutput:
-    """An output that publishes by this process's node (init_node has been called) and prints to the terminal."""
+    """An output that publishes with this process's node and prints to the terminal; init_node() must have been called."""
 
     def __init__(self, options: PlayOptions) -> None:
         self._options = options
@@ -155,7 +156,7 @@ class NodeOutput:
         """Shorten the GIL switch interval, and read keys, while the block runs."""
         interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_SECONDS)
-        # A garbage collection that visits all imported modules takes milliseconds.
+        # Exclude existing objects from garbage collection: visiting all imported modules takes milliseconds.
         gc.freeze()
         try:
             with read_keys(on_key):
@@ -185,7 +186,7 @@ class NodeOutput:
         """See :meth:`Output.print`."""
         with contextlib.suppress(OSError, ValueError):
             if text.startswith("\r") and isinstance(sys.stdout, SafeTerminal):
-                # The status line, which is rewritten in place.
+                # The status line is rewritten in place, so its control characters must not be escaped.
                 sys.stdout.write_own(text)
                 text = ""
             print(text, end=end, flush=True)

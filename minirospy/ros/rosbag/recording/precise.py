@@ -1,4 +1,4 @@
-"""Waiting until a point in time with a precision of microseconds; the wait can be interrupted."""
+"""Waits until a point in time, with microsecond precision; the wait can be interrupted."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ from minirospy.base.clock import SignalSafeEvent
 
 __all__ = ["PreciseWait"]
 
-_EVENT_NS = 5_000_000  # wait on the event, which is imprecise, until this close to the deadline, then sleep
+# how close to the deadline to switch from waiting on the event, which is imprecise, to sleeping
+_EVENT_NS = 5_000_000
 
-_TIMER_SLACK = 29  # Linux's PR_SET_TIMERSLACK: how late the kernel may wake a thread; 50 us by default
+_TIMER_SLACK = 29  # Linux's PR_SET_TIMERSLACK: sets how late the kernel may wake a thread; 50 us by default
 
 
 class PreciseWait:
-    """Waits on ``time.perf_counter_ns()``, which is precise on every OS.
+    """Waits until a time on ``time.perf_counter_ns()``, which is precise on every OS.
 
     Only the thread that creates it may wait; any thread, and a signal handler, may call ``wake``.
     """
 
     def __init__(self) -> None:
-        # A signal handler may set it in the thread that waits on it.
+        # A signal handler may set the event in the thread that waits on it.
         self._event = SignalSafeEvent()
         self._spin_ns = 150_000
         if sys.platform.startswith("linux"):
@@ -33,7 +34,7 @@ class PreciseWait:
                     self._spin_ns = 40_000
 
     def wake(self) -> None:
-        """Interrupt the current wait, or the next one, if it is longer than 5 ms."""
+        """Interrupt the current wait, or the next one, if that wait is longer than 5 ms."""
         self._event.set()
 
     def until(self, wall: int) -> int:
@@ -50,5 +51,5 @@ class PreciseWait:
             elif rest > self._spin_ns:
                 time.sleep((rest - self._spin_ns) / 1e9)
             else:
-                # Busy-poll, but release the GIL for the threads that send.
+                # Busy-poll, but release the GIL for the threads that send messages.
                 time.sleep(0)

@@ -1,7 +1,7 @@
 """The node that records topics: `rosbag record`. Messages are written as received, without deserializing.
 
 The workers that receive messages write them into the current chunk; complete chunks are queued for the disk thread. So only
-the disk limits the recording. If it is too slow, messages are dropped and counted per topic.
+the disk limits the recording. If the disk is too slow, messages are dropped and counted per topic.
 Source: http://wiki.ros.org/rosbag/Commandline#record.
 """
 
@@ -50,7 +50,7 @@ class _Topic:
 
 
 class Recorder:
-    """Records topics in :meth:`run`, on this process's node (init_node has been called).
+    """Records topics in :meth:`run`, using this process's node; init_node() must have been called.
 
     Raise UsageError if an expression in ``options`` is invalid.
     """
@@ -78,7 +78,7 @@ class Recorder:
         self._stop.set()
 
     def run(self) -> int:
-        """Record until the node shuts down or a limit of the options is reached; return the exit status."""
+        """Record until the node shuts down or one of the limits in the options is reached; return the exit status."""
         client.on_shutdown(self.stop)
         if self.options.publish:
             from std_msgs.msg import String
@@ -93,7 +93,7 @@ class Recorder:
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
         self._disk = DiskThread(self._disk_thread_failed)
         self._splits = Splits(self.options, self._clock())
-        # In a thread: Ctrl-C does not interrupt it, and the process waits for it before it exits.
+        # Complete the file in a thread: Ctrl-C does not interrupt it, and the process exits only after it.
         finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
         finisher.start()
         is_interrupted = False
@@ -103,14 +103,14 @@ class Recorder:
             if self._file and self._check_space():
                 self._record()
         except KeyboardInterrupt:
-            # A second Ctrl-C, or the shutdown interrupted a registration.
+            # This is a second Ctrl-C, or the shutdown has interrupted a registration.
             is_interrupted = True
         finally:
             self._stop.set()
             self._wait_until_complete(is_interrupted)
         return self.status
 
-    # --- the main thread
+    # --- called in the main thread
 
     def _wait_for_time(self) -> bool:
         """Wait until ROS time is valid; return False at shutdown."""
@@ -167,7 +167,7 @@ class Recorder:
         )
 
     def _follow_master(self) -> None:
-        """Subscribe to topics that have appeared on the master."""
+        """Subscribe to topics that are new on the master."""
         master = current_session().master
         try:
             state = master.get_system_state()
@@ -184,7 +184,7 @@ class Recorder:
                     self._subscribe(name)
 
     def _check_space(self) -> bool:
-        """Warn when the disk is nearly full, and stop recording before it is full; return whether there is room."""
+        """Warn if the disk is nearly full, and stop recording before it is full; return whether there is space left."""
         file, least, text = self._file, self.options.min_space, self.options.min_space_text
         if not file:
             return False
@@ -216,7 +216,7 @@ class Recorder:
             client.logwarn("rosbag record buffer exceeded.  Dropped messages: %s", _counts(new))
 
     def _end_finished(self) -> None:
-        """Unsubscribe from topics that have reached their message limit; stop when all have."""
+        """Unsubscribe from topics that have reached their message limit. Stop when all topics have."""
         for topic in self._topics.values():
             if not topic.left and topic.subscriber:
                 topic.subscriber.unregister()
@@ -225,15 +225,15 @@ class Recorder:
             self._stop.set()
 
     def _wait_until_complete(self, is_interrupted: bool) -> None:
-        """Wait until the file is complete. A second Ctrl-C does not interrupt this; a third terminates the process.
+        """Wait until the file is complete. A second Ctrl-C does not interrupt the wait; a third terminates the process.
 
-        At each Ctrl-C, and once if it takes long, log how much is still to be written.
+        Log how much is still to be written: on each Ctrl-C, and once if the wait is long.
         """
         patience = time.monotonic() + _PATIENCE_SECONDS
-        # Do not join() the thread: on Python 3.10 and 3.11 an interrupted join() marks it as finished.
+        # Do not join() the thread: on Python 3.10 and 3.11 an interrupted join() marks the thread as finished.
         while not self._finished.is_set():
             try:
-                # This wait is the thread's clean-up: calling is_shutdown() keeps the shutdown from interrupting it.
+                # Calling is_shutdown() marks this wait as clean-up, which the shutdown does not interrupt.
                 client.is_shutdown()
                 if is_interrupted or time.monotonic() > patience:
                     is_interrupted, patience = False, math.inf
@@ -242,7 +242,7 @@ class Recorder:
             except KeyboardInterrupt:
                 is_interrupted = True
 
-    # --- the finisher's thread
+    # --- called in the finisher thread
 
     def _finish(self) -> None:
         """Wait for the recording to stop, and complete the file."""
@@ -263,7 +263,7 @@ class Recorder:
         if self.dropped:
             client.logwarn("The bag lacks messages that were dropped: %s", _counts(self.dropped))
 
-    # --- with the lock
+    # --- called with the lock held
 
     def _open(self, now: int) -> None:
         if self._is_complete:
@@ -282,7 +282,7 @@ class Recorder:
             return
 
         client.loginfo("Recording to '%s'.", name)
-        # Stamp latched messages with the time of this file's first message, because they are written before it.
+        # Stamp latched messages with the time of this file's first message, because they are written first.
         for (topic, _), (header, body, tail) in self._latched.items():
             self._file.write(topic, header, now, body, tail)
         if self._announcement:
@@ -313,7 +313,7 @@ class Recorder:
                 self._disk.submit(partial(_remove, surplus))
             self._open(now)
 
-    # --- the workers that receive
+    # --- called in the workers that receive messages
 
     def _receive(self, message: ReceivedFrame, topic: _Topic) -> None:
         now = self._clock()
@@ -334,7 +334,7 @@ class Recorder:
             most = self.options.buffer_size
             size = len(body) + len(tail)
             if most and self._waiting(self._file) + size > most:
-                # Free memory: compressed chunks are otherwise written at the next message.
+                # Free memory: otherwise, compressed chunks are written only when the next message arrives.
                 self._file.write_ready()
                 if (waiting := self._waiting(self._file)) and waiting + size > most:
                     self.dropped[topic.name] += 1
@@ -345,7 +345,7 @@ class Recorder:
                 self.dropped[topic.name] += 1
                 client.logerr("%s", error)
 
-    # --- the disk's thread
+    # --- called in the disk thread
 
     def _disk_thread_failed(self, error: Exception) -> None:
         client.logerr("Error writing: %s. Recording ends", _reason(error))

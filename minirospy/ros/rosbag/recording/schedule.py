@@ -1,6 +1,6 @@
 """The timing of `rosbag play`: when to publish each message, and which time /clock shows. Pure: wall times are arguments.
 
-All times are integers in nanoseconds: either bag time, or the wall time of any monotonic clock.
+All times are integers in nanoseconds: either bag time, or wall time from any monotonic clock.
 Source: http://wiki.ros.org/rosbag/Commandline#play.
 """
 
@@ -16,7 +16,7 @@ _SECOND = 10**9
 
 
 class PlayOptions(NamedTuple):
-    """The options of `rosbag play`. Times are in nanoseconds, of bag time if they refer to the bag."""
+    """The options for `rosbag play`. Times are in nanoseconds; those that refer to the bag are in bag time."""
 
     prefix: str = ""
     immediate: bool = False
@@ -27,11 +27,11 @@ class PlayOptions(NamedTuple):
     delay: int = _SECOND // 5
     rate: float = 1.0
     start: int = 0
-    duration: int = 0  # 0: all
+    duration: int = 0  # 0 means no limit
     skip_empty: int | None = None
     loop: bool = False
     keep_alive: bool = False
-    topics: frozenset[str] = frozenset()  # empty: all
+    topics: frozenset[str] = frozenset()  # empty means all topics
     pause_topics: frozenset[str] = frozenset()
     wait_for_subscribers: bool = False
     rate_control_topic: str = ""
@@ -40,7 +40,7 @@ class PlayOptions(NamedTuple):
 
 
 class State(enum.Enum):
-    """The state of a player."""
+    """A player's state."""
 
     RUNNING = "RUNNING"
     PAUSED = "PAUSED"
@@ -54,18 +54,24 @@ class Status(NamedTuple):
     time: int
     played: int
     length: int
-    delay: int  # delay of the rate control topic, used if DELAYED
+    delay: int  # delay of the rate control topic; used in state DELAYED
 
 
 class Schedule:
-    """Decides when to publish each message: ``offer`` it, then ``poll`` until that returns None, then publish it."""
+    """Decides when to publish each message.
+
+    ``offer`` a message, call ``poll`` until it returns None, then publish the message.
+    """
 
     def __init__(self, options: PlayOptions, first: int, last: int, wall: int) -> None:
-        """``first`` and ``last`` are the bag times of its messages; ``wall`` is the wall time at which the first is due."""
+        """Create a schedule. ``first`` and ``last`` are the bag times of the first and last message.
+
+        ``wall`` is the wall time at which the first message is due.
+        """
         self._options = options
         self._first = first
         self._last = last
-        self._origin = wall  # wall time of bag time ``first``; shifted by each pause
+        self._origin = wall  # wall time that corresponds to bag time ``first``; shifted by each pause
         self._message = first
         self._is_due = False
         self._clock = first
@@ -81,12 +87,12 @@ class Schedule:
 
     @property
     def is_paused(self) -> bool:
-        """Return whether it is paused."""
+        """Return whether playing is paused."""
         return self._paused
 
     @property
     def rate(self) -> float:
-        """Return the rate of bag time relative to wall time."""
+        """Return the ratio of bag time to wall time."""
         return self._rate
 
     def set_rate(self, rate: float, wall: int) -> None:
@@ -101,7 +107,7 @@ class Schedule:
         self._next_tick = wall
 
     def seek(self, time: int, wall: int, *, keeps_steps: bool = False) -> None:
-        """Continue at another bag time; offer the next message again. Pending steps are dropped unless ``keeps_steps``."""
+        """Continue at another bag time; the next message must be offered again. Drop pending steps unless ``keeps_steps``."""
         self._clock = self._message = time
         self._is_due = False
         self._delayed = False
@@ -130,9 +136,9 @@ class Schedule:
                 self._delayed = True
 
     def poll(self, wall: int) -> int | None:
-        """Return None if the message is due now, else the wall time until which to wait before the next poll.
+        """Return None if the message is due now, or the wall time until which to wait before the next poll.
 
-        Poll earlier if another method is called meanwhile.
+        Poll earlier if another method is called in the meantime.
         """
         if self._is_due:
             self._clock = self._message
@@ -156,7 +162,7 @@ class Schedule:
         return min(wait, self._next_tick) if self._period else wait
 
     def set_paused(self, paused: bool, wall: int) -> bool:
-        """Pause or resume; return whether that changed the state."""
+        """Pause or resume; return whether the state has changed."""
         if paused == self._paused:
             return False
         self._advance(wall)
@@ -169,16 +175,16 @@ class Schedule:
         return True
 
     def step(self) -> None:
-        """If paused, make the current message due now, or the next one offered."""
+        """If paused, make the current message due now, or the next one to be offered."""
         if self._paused:
             self._steps += 1
 
     def toggle_pause_topics(self) -> None:
-        """Ignore the topics to pause at, or respect them again."""
+        """Switch between ignoring and respecting the topics to pause at."""
         self._pauses_at = () if self._pauses_at else self._options.pause_topics
 
     def control_rate(self, stamp: int) -> None:
-        """Store the stamp of the last message on the rate control topic."""
+        """Store the time stamp of the last message on the rate control topic."""
         self._controlled = stamp
 
     def tick(self, wall: int) -> int | None:
@@ -186,7 +192,7 @@ class Schedule:
         if not self._period or wall < self._next_tick:
             return None
         self._advance(wall)
-        # Publish no burst after the whole process was suspended.
+        # Skip the messages for the time while the process was suspended, instead of publishing them in a burst.
         self._next_tick = max(self._next_tick + self._period, wall)
         return self._clock
 
@@ -215,12 +221,12 @@ class Schedule:
         return span if self._rate == 1.0 else round(span * factor)
 
     def _start_from(self, time: int, wall: int) -> None:
-        """Set the origin so that bag time is ``time`` at wall time ``wall``."""
+        """Set the origin so that wall time ``wall`` corresponds to bag time ``time``."""
         self._origin = wall - self._scaled(time - self._first, 1 / self._rate)
         self._since = wall
 
     def _advance(self, wall: int) -> None:
-        """Advance bag time, at most to the time of the current message."""
+        """Advance bag time, but not past the current message."""
         if not (self._paused or self._delayed):
             self._clock = max(self._clock, min(self._message, self._bag_time(wall)))
 

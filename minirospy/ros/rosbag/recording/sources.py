@@ -1,6 +1,6 @@
-"""The messages of several bags in time order, read ahead by a thread.
+"""Reads messages from several bags in time order; a thread reads them ahead.
 
-So neither reading nor decompressing delays a message that is due.
+Therefore neither reading nor decompressing delays a message that is due.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _BATCHES = 8
 
 
 class Selection(NamedTuple):
-    """The messages to play: of these topics (empty: all), from ``start`` to ``end`` (None: no limit)."""
+    """The messages to play: on these topics (empty: all), from ``start`` to ``end`` (None: no limit)."""
 
     topics: Collection[str] = ()
     start: int | None = None
@@ -62,7 +62,7 @@ class Bags:
         self._files.close()
 
     def connections(self, selection: Selection) -> list[tuple[int, Connection]]:
-        """Return the connections with messages to play, each with the number of its bag."""
+        """Return the connections with messages to play, each with its bag's number."""
         return [
             (number, connection)
             for number, reader in enumerate(self.readers)
@@ -71,23 +71,23 @@ class Bags:
         ]
 
     def times(self) -> tuple[int, int] | None:
-        """Return the times of the first and the last message of all bags; None if there are no messages."""
+        """Return the times of the first and the last message in all bags, or None if there are no messages."""
         spans = [span for reader in self.readers if (span := _span(reader))]
         return (min(start for start, _ in spans), max(end for _, end in spans)) if spans else None
 
     def last_time(self, selection: Selection) -> int:
-        """Return the time of the last message of a non-empty selection. This reads only a few chunks."""
+        """Return the time of the last message in a non-empty selection. This reads only a few chunks."""
         return max(_last_time(reader, selection) for reader in self.readers)
 
     def messages(self, selection: Selection) -> Iterator[tuple[int, StoredMessage]]:
-        """Yield the messages in time order, each with the number of its bag. Raise BagFormatError."""
+        """Yield the messages in time order, each with its bag's number. Raise BagFormatError if a bag is damaged."""
         return heapq.merge(
             *(_numbered(number, reader, selection) for number, reader in enumerate(self.readers)),
             key=_time,
         )
 
     def last_latched(self, selection: Selection) -> list[tuple[int, StoredMessage]]:
-        """Return the last message of each latched connection before the start of the selection."""
+        """Return each latched connection's last message before the start of the selection."""
         found: list[tuple[int, StoredMessage]] = []
         for number, connection in self.connections(selection):
             if not connection.latching or not selection.start:
@@ -99,7 +99,10 @@ class Bags:
 
 
 def open_reader(path: Path, opened: ExitStack) -> BagReader:
-    """Return a reader of a bag or an MCAP file, and register its closing with ``opened``. Raise OSError, BagError."""
+    """Return a reader for a bag or an MCAP file; ``opened`` closes the reader.
+
+    Raise OSError if the file cannot be read, BagError if it is invalid.
+    """
     stream = opened.enter_context(path.open("rb"))
     reader = open_bag_or_mcap(stream)
     opened.callback(reader.close)
@@ -108,7 +111,7 @@ def open_reader(path: Path, opened: ExitStack) -> BagReader:
 
 
 class ReadAhead:
-    """Iterates over messages that a thread reads some thousands ahead. Iterate once, then close."""
+    """Iterates over messages that a thread reads ahead, some thousands at most. Iterate once, then close."""
 
     def __init__(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
         self._ready: queue.Queue[list[tuple[int, StoredMessage]] | Exception | None] = queue.Queue(_BATCHES)
@@ -120,14 +123,14 @@ class ReadAhead:
         self._thread.start()
 
     def __iter__(self) -> Iterator[tuple[int, StoredMessage]]:
-        """Yield what the iterator yields; raise what it raises."""
+        """Yield the messages; re-raise an exception that reading them raised."""
         while (item := self._ready.get()) is not None:
             if isinstance(item, Exception):
                 raise item
             yield from item
 
     def wait(self) -> None:
-        """Wait until the first messages have been read, or the end was reached."""
+        """Wait until the first messages have been read, or the end has been reached."""
         self._first.wait()
 
     def close(self) -> None:
@@ -135,7 +138,7 @@ class ReadAhead:
         self._stop.set()
 
     def join(self) -> None:
-        """Wait until the thread has stopped, after :meth:`close`: from then on the caller may use the files again."""
+        """Wait, after :meth:`close`, until the thread has stopped; the caller may then use the files again."""
         self._thread.join()
 
     def _read(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
@@ -152,7 +155,7 @@ class ReadAhead:
                         return
             self._put(batch)
             self._put(None)
-        except Exception as error:  # noqa: BLE001 - raised again in the reading thread
+        except Exception as error:  # noqa: BLE001 - re-raised by __iter__
             self._put(batch)
             self._put(error)
 
@@ -183,7 +186,7 @@ def _last_time(reader: BagReader, selection: Selection) -> int:
     wanted = _wanted(reader, selection)
     end = selection.end
     found = {chunk.start_time for chunk in reader.chunks if end is None or chunk.start_time <= end}
-    # In a bag without chunks, read all messages.
+    # A bag without chunks has no chunk start times, so read all its messages.
     starts: list[int | None] = [*sorted(found, reverse=True)] or [selection.start]
     for start in starts:
         newest = deque(reader.messages(wanted, start, end), maxlen=1) if wanted else ()
@@ -194,7 +197,7 @@ def _last_time(reader: BagReader, selection: Selection) -> int:
 
 
 def _wanted(reader: BagReader, selection: Selection) -> list[int]:
-    """Return the IDs of the connections of the selected topics."""
+    """Return the connection IDs for the selected topics."""
     return [
         connection.id
         for connection in reader.connections.values()

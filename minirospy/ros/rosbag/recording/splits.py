@@ -1,4 +1,4 @@
-"""Splitting a recording: when the next file starts, the names of the files, and which of them to delete. Pure."""
+"""Splits a recording: decides when the next file starts, how the files are named, and which of them to delete. Pure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from minirospy.ros.rosbag.recording.options import RecordOptions
 __all__ = ["Next", "Splits", "file_name"]
 
 
-_MAX_EMPTY = 100  # at most this many files without messages after a long silence, as in ROS
+_MAX_EMPTY = 100  # maximum number of empty files written after a long silence, as in ROS
 
 
 class Next(enum.Enum):
@@ -22,25 +22,25 @@ class Next(enum.Enum):
 
 
 class Splits:
-    """The files of a recording that started at ``start``; times are ROS times in nanoseconds."""
+    """The files in a recording that started at ``start``; times are ROS times in nanoseconds."""
 
     def __init__(self, options: RecordOptions, start: int) -> None:
         self._options = options
         self._start = start
         self._kept: list[str] = []
-        self.count = 0  # number of files closed
+        self.count = 0  # number of closed files
 
     def check(self, size: int, now: int) -> Next:
-        """Return the action for a file of ``size`` bytes.
+        """Return the action for a file with ``size`` bytes.
 
-        After SPLIT, call it again: several splits may be due after a silence.
+        After SPLIT, call this method again: several splits may be due after a silence.
         """
         options = self._options
         if options.max_size and size > options.max_size:
             return self._full()
         if options.max_duration and now - self._start > options.max_duration:
             if now - self._start > _MAX_EMPTY * options.max_duration:
-                # The clock has jumped: a simulator was restarted, or the system time was set.
+                # The clock has jumped, because a simulator was restarted or the system time was set.
                 self._start = now - options.max_duration
             self._start += options.max_duration
             return self._full()
@@ -52,7 +52,7 @@ class Splits:
         if not self._options.max_splits:
             return []
         self._kept.append(name)
-        # The file being written is not among them.
+        # The list does not contain the file that is being written.
         surplus = len(self._kept) - self._options.max_splits
         removed, self._kept = self._kept[: max(0, surplus)], self._kept[max(0, surplus) :]
         return removed

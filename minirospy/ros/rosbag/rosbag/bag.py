@@ -1,6 +1,6 @@
 """rosbag.bag: read and write bags. Source: http://wiki.ros.org/rosbag/Code%20API.
 
-Compared with the real module: opening a bag reads only its chunk infos, the index takes 16 bytes per message, and messages
+Differences from the real module: opening a bag reads only its chunk infos, the index takes 16 bytes per message, and messages
 are read in time order regardless of their order in the file. Two types on one topic get two connections.
 """
 
@@ -72,11 +72,11 @@ __all__ = [
     "found_lz4",
 ]
 
-found_lz4 = True  # whether LZ4 is available, for programs that check it
+found_lz4 = True  # whether LZ4 is available; programs check this name
 
 
 class Compression:
-    """The chunk compressions of bags."""
+    """The chunk compressions that bags support."""
 
     NONE = compressions.NONE
     BZ2 = compressions.BZ2
@@ -89,14 +89,14 @@ TypesAndTopicsTuple = namedtuple("TypesAndTopicsTuple", ["msg_types", "topics"])
 
 
 class _Pieces(list[bytes]):
-    """The buffer to which a message's ``serialize`` writes."""
+    """The buffer into which a message's ``serialize`` writes."""
 
     __slots__ = ()
     write = list.append
 
 
 class Options(TypedDict, total=False):
-    """The compression and size of the chunks written next."""
+    """The compression and size for chunks that are written from now on."""
 
     compression: str
     chunk_threshold: int
@@ -107,7 +107,8 @@ class Bag(OpenedBag):
 
     ``f`` is a path or an open binary file, which close() closes; ``mode`` is r, w or a; ``chunk_threshold`` is in bytes.
     ``allow_unindexed``: open a bag that was not closed, so that reindex() can be called. ``options`` may contain compression
-    and chunk_threshold. ``skip_index``: the info text shows no rates. Raise ValueError, ROSBagException, OSError.
+    and chunk_threshold. ``skip_index``: the info text shows no rates. Raise ValueError if an argument is invalid,
+    ROSBagException if the bag is, OSError if the file cannot be opened.
     """
 
     def __init__(
@@ -129,7 +130,7 @@ class Bag(OpenedBag):
         self._skip_index = skip_index
         self._written: dict[
             tuple[str, str], int
-        ] = {}  # connection numbers of the written messages, by topic and md5sum
+        ] = {}  # connection numbers of written messages, by topic and md5sum
         self._pieces = _Pieces()
 
         if not f:
@@ -141,7 +142,7 @@ class Bag(OpenedBag):
             with as_ros_errors():
                 opening[mode](f, allow_unindexed)
             self._create_reader()
-            # minirospy reads the index when needed; a program's subclass may read it now, to show its progress.
+            # minirospy reads the index on demand, but a program's subclass may read it now, to show the progress.
             if mode == "r" and not skip_index and isinstance(self._reader, _BagReader200):
                 self._reader.prepare()
             self._connection_indexes_read = not skip_index
@@ -163,17 +164,17 @@ class Bag(OpenedBag):
 
     @property
     def options(self) -> Options:
-        """The compression and the chunk threshold."""
+        """Return the compression and the chunk threshold."""
         return {"compression": self._compression, "chunk_threshold": self._chunk_threshold}
 
     @property
     def filename(self) -> str | os.PathLike[str] | None:
-        """The path that was given, or None for a file object."""
+        """Return the path that was given, or None for a file object."""
         return self._filename
 
     @property
     def version(self) -> int | None:
-        """The version of the bag format: 200 for 2.0."""
+        """Return the bag format version: 200 for 2.0."""
         return self._version
 
     @property
@@ -183,7 +184,7 @@ class Bag(OpenedBag):
 
     @property
     def size(self) -> int:
-        """The size of the file in bytes. Raise ValueError if the bag is closed."""
+        """Return the file size in bytes. Raise ValueError if the bag is closed."""
         stream = self._open_file()
         position = stream.tell()
         size = stream.seek(0, os.SEEK_END)
@@ -192,7 +193,7 @@ class Bag(OpenedBag):
 
     @property
     def compression(self) -> str:
-        """Return the compression of the next chunks. Raise ValueError."""
+        """Return the compression for later chunks. Setting an unknown one raises ValueError."""
         return self._compression
 
     @compression.setter
@@ -205,7 +206,10 @@ class Bag(OpenedBag):
 
     @property
     def chunk_threshold(self) -> int:
-        """Size in bytes, before compression, at which a chunk is complete. Raise ValueError."""
+        """Return the size in bytes, before compression, at which a chunk is complete.
+
+        Setting a negative size raises ValueError.
+        """
         return self._chunk_threshold
 
     @chunk_threshold.setter
@@ -257,7 +261,8 @@ class Bag(OpenedBag):
         """Write a message received at ``t``, by default now.
 
         ``raw``: the message is a tuple of type, bytes, md5sum, (position,) and class. ``connection_header`` is stored
-        with the first message of a topic and type. Raise ValueError, ROSBagException, OSError.
+        with the first message for a topic and type. Raise ValueError if the bag is closed or an argument is invalid,
+        ROSBagException if the message cannot be stored, OSError if writing fails.
         """
         if self._file is None:
             raise ValueError(CLOSED)
@@ -283,7 +288,7 @@ class Bag(OpenedBag):
             body = pieces[0] if len(pieces) == 1 else b"".join(pieces)
             md5sum = msg._md5sum
         if type(body) is not bytes:
-            # Fail for an unsuitable body before part of it is in the chunk.
+            # Raise an error for an unsuitable body before part of it is written to the chunk.
             body = body.encode() if isinstance(body, str) else bytes(memoryview(body))
 
         number = self._written.get((topic, md5sum))
@@ -295,16 +300,16 @@ class Bag(OpenedBag):
                 number = writer.add_connection(topic, header)
                 self._written[topic, md5sum] = number
             if self._is_read:
-                # A read since the last write has moved the position.
+                # A read since the last write may have moved the position.
                 self._file.seek(0, os.SEEK_END)
             writer.write(number, nanoseconds, body)
         except BagError as error:
             raise_as_ros(error)
 
     def reindex(self) -> Iterator[int]:
-        """Rebuild the index; yield the positions as they are read, to show the progress.
+        """Rebuild the index. Yield the file positions while reading, so that the caller can show the progress.
 
-        If the bag was opened to append, the data that cannot be recovered is cut off.
+        If the bag was opened to append, data that cannot be recovered is cut off.
         """
         if self._version and self._version < 200:
             reader = self._source
@@ -324,7 +329,7 @@ class Bag(OpenedBag):
                 self._start_appending(repair.connections, repair.chunks, repair.end)
 
     def close(self) -> None:
-        """Close the bag. Closing it again has no effect. Raise OSError."""
+        """Close the bag. Closing it again has no effect. Raise OSError if writing the end of the file fails."""
         if self._file is None:
             return
         try:
@@ -345,18 +350,18 @@ class Bag(OpenedBag):
         )
 
     def get_message_count(self, topic_filters: str | list[str] | None = None) -> int:
-        """Return the number of messages, on all topics or on the given ones."""
+        """Return the number of messages on all topics, or on the given ones."""
         if topic_filters is not None:
             topics = self.get_type_and_topic_info(topic_filters).topics.values()
             return sum(topic.message_count for topic in topics)
         return self._summary(frequencies=False).messages
 
     def get_start_time(self) -> float:
-        """Return the time of the first message in seconds. Raise ROSBagException if there is none."""
+        """Return the time of the first message in seconds. Raise ROSBagException if there are no messages."""
         return self._times()[0]
 
     def get_end_time(self) -> float:
-        """Return the time of the last message in seconds. Raise ROSBagException if there is none."""
+        """Return the time of the last message in seconds. Raise ROSBagException if there are no messages."""
         return self._times()[1]
 
     def get_type_and_topic_info(self, topic_filters: str | list[str] | None = None) -> TypesAndTopicsTuple:
@@ -389,7 +394,7 @@ class Bag(OpenedBag):
         return info.as_text(self._summary(frequencies=not self._skip_index))
 
     def _get_yaml_info(self, key: str | None = None) -> str | None:
-        """Return the info as YAML, or the value of a key such as ``topics[0].type``; None if there is no such key."""
+        """Return the info as YAML, or the value for a key such as ``topics[0].type``; None if there is no such key."""
         text = info.as_yaml(self._summary(frequencies=not self._skip_index))
         if not key:
             return text
@@ -414,7 +419,7 @@ class Bag(OpenedBag):
         raw: bool,
         with_header: bool,
     ) -> Iterator[Any]:
-        """Yield the messages of these connections."""
+        """Yield the messages on these connections."""
         from minirospy.client.time import Time
 
         kinds: list[type[Message] | None] = [None] * len(connections)
@@ -427,7 +432,7 @@ class Bag(OpenedBag):
                     kind = kinds[rank]
                     if kind is None:
                         kind = kinds[rank] = _get_message_type(connection)
-                    # Create the message without its constructor, which is slow: deserialize sets every field.
+                    # Create the message without calling its constructor, which is slow: deserialize sets every field.
                     if raw:
                         position = at if chunk is None else (chunk, at)
                         message = connection.datatype, data[body:after], connection.md5sum, position, kind
@@ -446,7 +451,7 @@ class Bag(OpenedBag):
             raise_as_ros(error)
 
     def _summary(self, *, frequencies: bool) -> info.Summary:
-        # The real module still has the data in memory after close(); here the bag is opened again.
+        # The real module still has the data in memory after close(); minirospy opens the bag again.
         if self._file is None and self._filename is not None:
             with Bag(self._filename, skip_index=True) as bag:
                 return bag._summary(frequencies=frequencies)

@@ -1,4 +1,4 @@
-"""rosbag's exceptions, and the conversion of minirospy's bag errors to them."""
+"""rosbag's exceptions, and the conversion from minirospy's bag errors to them."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ class ROSBagException(Exception):
 
 
 class ROSBagFormatException(ROSBagException):
-    """The bytes of a bag violate the format."""
+    """The bag's bytes violate the format."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)
 
 
 class ROSBagUnindexedException(ROSBagException):
-    """A bag was not closed, or its index is damaged."""
+    """The bag was not closed, or its index is damaged."""
 
     def __init__(self, *args: object) -> None:
         super().__init__("Unindexed bag")
 
 
 class ROSBagEncryptNotSupportedException(ROSBagException):
-    """A bag is encrypted, or encryption was requested: this is not supported."""
+    """The bag is encrypted, or encryption was requested; neither is supported."""
 
     def __init__(self, value: str) -> None:
         super().__init__(value)

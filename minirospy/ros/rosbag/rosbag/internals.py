@@ -1,4 +1,4 @@
-"""The private parts of rosbag.bag: records as objects, which rqt_bag and other programs read by private names."""
+"""The private parts of rosbag.bag: records as objects, which rqt_bag and other programs access by their private names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Header = dict[str, bytes] | dict[str, str]
 
 
 def make_time() -> Callable[[int], Time]:
-    """Return a function that creates a rospy.Time from nanoseconds, faster than its constructor."""
+    """Return a function that creates a rospy.Time from nanoseconds faster than the constructor does."""
     from minirospy.client.time import Time
 
     new = Time.__new__
@@ -37,7 +37,7 @@ def make_time() -> Callable[[int], Time]:
 
 
 class _ConnectionInfo:
-    """A connection: ``id``, ``topic``, the fields of its header, and ``header`` itself."""
+    """A connection: ``id``, ``topic``, the header's fields, and ``header`` itself."""
 
     def __init__(self, id: int, topic: str, header: Header) -> None:
         fields = {
@@ -92,7 +92,7 @@ class _ChunkInfo:
 
 
 class _ChunkHeader:
-    """The header of a chunk, and the position of its data."""
+    """A chunk's header, and the position of the chunk's data."""
 
     def __init__(
         self, compression: str, compressed_size: int, uncompressed_size: int, data_pos: int = 0
@@ -117,7 +117,7 @@ class _ChunkHeader:
 
 
 class _IndexEntry:
-    """The time and position of a message; compares by time. ``chunk_pos`` is None in bags of version 1.2."""
+    """A message's time and position; entries compare by time. ``chunk_pos`` is None in version 1.2 bags."""
 
     __slots__ = ["chunk_pos", "offset", "time"]
 
@@ -128,7 +128,7 @@ class _IndexEntry:
 
     @property
     def position(self) -> int | tuple[int, int]:
-        """Return the position in the form that Bag._read_message expects."""
+        """Return the position in the format that Bag._read_message expects."""
         return self.offset if self.chunk_pos is None else (self.chunk_pos, self.offset)
 
     def __eq__(self, other: object) -> bool:
@@ -155,7 +155,7 @@ class _IndexEntry:
 
 
 class _Index(Sequence[_IndexEntry]):
-    """The index entries of a connection as objects, which are created on access."""
+    """A connection's index entries as objects, which are created on access."""
 
     def __init__(self, index: ConnectionIndex) -> None:
         self.source = index
@@ -177,11 +177,14 @@ class _Index(Sequence[_IndexEntry]):
 
 
 _message_types: dict[str, type[Message]] = {}
-"""Message classes by md5sum; rosbag has a dict of this name."""
+"""Message classes by md5sum; rosbag has a dict with this name."""
 
 
 def _get_message_type(info: _ConnectionInfo) -> type[Message]:
-    """Return the class of a connection's messages, built from the definition in the bag. Raise ROSBagException."""
+    """Return the class for a connection's messages, built from the definition in the bag.
+
+    Raise ROSBagException if the definition is invalid.
+    """
     found = _message_types.get(info.md5sum)
     if found is None:
         found = _message_types[info.md5sum] = _make_message_type(info)

@@ -43,23 +43,32 @@ __all__ = [
 
 
 def checkbag(migrator: MessageMigrator, inbag: str) -> list[Migration]:
-    """Return the path of each type in a bag that needs migration, and its missing rules. Raise ROSBagException."""
+    """Return the path for each type in a bag that needs migration, and its missing rules.
+
+    Raise ROSBagException if the bag cannot be read.
+    """
     with as_ros_errors():
         return check_bag(migrator, inbag, _warn)
 
 
 def checkmessages(migrator: MessageMigrator, messages: Iterable[type[Message]]) -> list[Migration]:
-    """Return the path of each message class that needs migration, and its missing rules."""
+    """Return the path for each message class that needs migration, and its missing rules."""
     return check_classes(migrator, messages)
 
 
 def fixbag(migrator: MessageMigrator, inbag: str, outbag: str) -> bool:
-    """Write a bag with its messages migrated; return whether all could be. Raise ROSBagException."""
+    """Write a bag with its messages migrated; return whether all could be migrated.
+
+    Raise ROSBagException if the bag cannot be read.
+    """
     return not fixbag2(migrator, inbag, outbag)
 
 
 def fixbag2(migrator: MessageMigrator, inbag: str, outbag: str, force: bool = False) -> list[Migration]:
-    """Write a bag with its messages migrated; return the migrations without a rule. Raise ROSBagException."""
+    """Write a bag with its messages migrated; return the migrations without a rule.
+
+    Raise ROSBagException if the bag cannot be read.
+    """
     with as_ros_errors():
         return fix_bag(migrator, inbag, outbag, _warn, force=force)
 

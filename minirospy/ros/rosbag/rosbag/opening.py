@@ -1,4 +1,4 @@
-"""The file of a rosbag.Bag, opened to read, write or append, and its reader and writer."""
+"""The file behind a rosbag.Bag, opened to read, write or append, and its reader and writer."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from minirospy.ros.rosbag.rosbag.private import PrivateBag
 __all__ = ["CLOSED", "FileArgument", "OpenedBag"]
 
 FileArgument: TypeAlias = str | os.PathLike[str] | BinaryIO
-"""The source or target of a bag: a path or an open file."""
+"""A bag's source or target: a path or an open file."""
 
 CLOSED = "I/O operation on closed bag"
 
 
 class OpenedBag(PrivateBag):
-    """The state of a bag: its file, and its reader or writer."""
+    """A bag's state: its file, and its reader or writer."""
 
     def __init__(self, mode: str, compression: str, chunk_threshold: int) -> None:
         self._compression = compression
@@ -35,7 +35,7 @@ class OpenedBag(PrivateBag):
         self._version: int | None = None
         self._mode = mode
         self._source: BagReader | None = None
-        """The reader of the file. Not ``_reader``: programs may replace that attribute, which the real module has."""
+        """The file's reader. It is not named ``_reader``, because programs may replace that attribute of the real module."""
         self._writer: BagWriter | None = None
         self._is_read = False  # whether a read may have moved the file's position since the last write
 
@@ -103,7 +103,7 @@ class OpenedBag(PrivateBag):
         self._source = None
 
     def _take(self, f: Any, mode: str) -> BinaryIO:
-        """Return ``f`` if it is an open file, else open it as a path."""
+        """Return ``f`` if it is an open file; otherwise, open it as a path."""
         if not isinstance(f, io.IOBase):
             self._filename = f
             return cast("BinaryIO", open(f, mode))

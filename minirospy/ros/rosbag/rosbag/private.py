@@ -1,4 +1,4 @@
-"""The names of rosbag.Bag that are private in the real module but used by rqt_bag and other programs."""
+"""The names in rosbag.Bag that are private in the real module but used by rqt_bag and other programs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ConnectionFilter = Callable[[str, str, str, str, Header], object]
 
 
 class BagMessage(NamedTuple):
-    """A message; with ``raw``, a tuple of its type, bytes, md5sum, position and class."""
+    """A message; with ``raw``, the message is a tuple: type, bytes, md5sum, position and class."""
 
     topic: str
     message: object
@@ -50,11 +50,11 @@ class BagMessageWithConnectionHeader(NamedTuple):
 
 
 class PrivateBag(ABC):
-    """The private names of rosbag.Bag."""
+    """The private names in rosbag.Bag."""
 
-    _connection_indexes_read = False  # whether the index has been read, or is read when needed
+    _connection_indexes_read = False  # True once the index has been read, or if it is read on demand
     _chunks_of_program: Iterable[_ChunkInfo] | None = None
-    """The program's replacement for the list of chunks, if any."""
+    """The list of chunks that a program has set in place of the bag's own, or None."""
 
     @abstractmethod
     def _current(self) -> BagReader:
@@ -67,7 +67,7 @@ class PrivateBag(ABC):
     @property
     @abstractmethod
     def size(self) -> int:
-        """The size of the file in bytes."""
+        """Return the file size in bytes."""
 
     @property
     def _connections(self) -> dict[int, _ConnectionInfo]:
@@ -106,7 +106,7 @@ class PrivateBag(ABC):
     def _read_message(
         self, position: Position, raw: bool = False, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
-        """Return the message at a position, given as in index entries and raw messages."""
+        """Return the message at a position, given in the format used in index entries and raw messages."""
         self.flush()
         with as_ros_errors():
             stored = self._current().message_at(position)
@@ -197,7 +197,10 @@ class PrivateBag(ABC):
 
 
 def nanoseconds_of(stamp: Time | None) -> int | None:
-    """Return a time limit in nanoseconds; None for time 0, as in the real module. Raise TypeError if it is not a rospy.Time."""
+    """Return a time limit in nanoseconds, or None for time 0, as in the real module.
+
+    Raise TypeError if it is not a rospy.Time.
+    """
     if not stamp:
         return None
     if not isinstance(stamp, Time):

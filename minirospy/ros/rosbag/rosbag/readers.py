@@ -1,4 +1,4 @@
-"""The classes of rosbag.Bag's ``_reader``: programs use it to read single messages, or to show the progress of indexing."""
+"""The classes used for rosbag.Bag's ``_reader``: programs use them to read single messages, or to show the indexing progress."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__: list[str] = []
 
 
 class _BagReader:
-    """The reader of ``bag``, for any version of the format."""
+    """The reader for ``bag``, for any format version."""
 
     def __init__(self, bag: Bag) -> None:
         self.bag = bag
@@ -27,7 +27,7 @@ class _BagReader:
     def seek_and_read_message_data_record(
         self, position: Position, raw: bool, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
-        """Return the message at the position of an index entry. Raise ROSBagException."""
+        """Return the message at an index entry's position. Raise ROSBagException if it cannot be read."""
         return self.bag._read_message(position, raw, return_connection_header)
 
     def read_messages(
@@ -39,23 +39,23 @@ class _BagReader:
         raw: bool,
         return_connection_header: bool = False,
     ) -> Iterator[Any]:
-        """Yield messages like Bag.read_messages."""
+        """Yield messages as Bag.read_messages does."""
         return self.bag.read_messages(
             topics, start_time, end_time, connection_filter, raw, return_connection_header
         )
 
 
 class _BagReader200(_BagReader):
-    """The reader of a bag of version 2.0."""
+    """The reader for a version 2.0 bag."""
 
     def prepare(self) -> None:
-        """Read the index now if a subclass overrides how it is read."""
+        """If a subclass overrides how the index is read, read it now."""
         if type(self)._read_connection_index_records is not _BagReader200._read_connection_index_records:
             self._read_connection_index_records()
 
     def _read_connection_index_records(self) -> None:
-        """Read the index. A subclass may replace the bag's ``_chunks`` by an iterable that counts."""
+        """Read the index. A subclass may first replace the bag's ``_chunks`` by an iterable that counts the chunks."""
         for _ in self.bag._chunks:
-            # The first iteration reads the whole index, in one pass over the file.
+            # The first iteration reads the whole index, in one pass through the file.
             if not self.bag._connection_indexes_read:
                 self.bag._connection_indexes_read = self.bag._connection_indexes is not None

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`rosrun rosbag fastrebag.py`, as ROS's package has it; see http://wiki.ros.org/rosbag."""
+"""`rosrun rosbag fastrebag.py`, as in ROS's package rosbag; see http://wiki.ros.org/rosbag."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""`rosrun`: run a program of a package. Source: http://wiki.ros.org/rosbash#rosrun."""
+"""`rosrun`: run a program from a package. Source: http://wiki.ros.org/rosbash#rosrun."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ _NO_EXECUTABLE = 3
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the program's exit status, or if it cannot be run, one of minirospy.command.command."""
+    """Run the command; return the program's exit status, or one defined in minirospy.command.command if it cannot be run."""
     words = list(sys.argv[1:] if argv is None else argv)
-    # The program decides how it handles signals.
+    # The program decides how to handle signals.
     return run("rosrun", lambda: _rosrun(words), heeds_interrupts=False)
 
 
 def _rosrun(words: list[str]) -> int:
     prefix: list[str] = []
     debug = False
-    # Parse by hand: words after EXECUTABLE belong to the program, even if they look like options of rosrun.
+    # Parse by hand: words after EXECUTABLE belong to the program, even if they look like options for rosrun.
     while words and words[0].startswith("-"):
         option, equals, value = words.pop(0).partition("=")
         if option in ("-h", "--help"):
@@ -80,7 +80,7 @@ def _rosrun(words: list[str]) -> int:
 
 
 def _what_there_is(words: list[str], packages: Packages) -> str:
-    """Return a hint for a missing program or package. Raise NotFoundError if nothing matches."""
+    """Return a hint for a missing program or package. Raise NotFoundError if nothing similar is found."""
     if not words:
         return " (`rosrun -h` shows more)"
     try:
@@ -95,7 +95,10 @@ def _what_there_is(words: list[str], packages: Packages) -> str:
 
 
 def _find(packages: Packages, package: str, program: str) -> list[list[str]]:
-    """Return the commands that run a program. Raise WordedError with the exit status of ROS's rosrun."""
+    """Return the commands that run a program.
+
+    Raise WordedError, with the exit status of ROS's rosrun, if there is none.
+    """
     try:
         folder = packages.find(package)
     except NotFoundError as error:
@@ -121,7 +124,7 @@ def _split(prefix: str) -> list[str]:
 
 
 def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> list[str]:
-    """Prompt for one of several programs of the same name, and return it. Raise UsageError at end of input."""
+    """Prompt the user to choose one of several programs with the same name, and return it. Raise UsageError at end of input."""
     paths = [command[-1] for command in commands]
     print("[rosrun] You have chosen a non-unique executable, please pick one of the following:", flush=True)
     for number, path in enumerate(paths, 1):
@@ -137,7 +140,7 @@ def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> 
 
 
 def become(command: list[str]) -> int:
-    """Replace this process by the program, which gets its signals and determines its exit status."""
+    """Replace this process by the program, which then receives its signals and determines its exit status."""
     if sys.platform == "win32":
         # On Windows, exec detaches the program from the console: wait for it instead, and leave Ctrl-C to it.
         try:
@@ -154,7 +157,7 @@ def become(command: list[str]) -> int:
         os.execvp(command[0], command)
     except OSError as error:
         if error.errno == errno.ENOEXEC:
-            # For a script without a `#!` line; shells do the same.
+            # Run a script without a `#!` line with sh, as shells do.
             os.execv("/bin/sh", ["/bin/sh", *command])
 
         why = error.strerror or str(error)

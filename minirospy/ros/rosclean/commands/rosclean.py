@@ -1,7 +1,7 @@
 """rosclean: show the disk usage of log files, and remove them.
 
-Source: http://wiki.ros.org/rosclean. The output is that of ROS; sizes are counted in disk blocks, as by du. Without an
-answer to the prompt (no terminal, an empty pipe) nothing is removed.
+Source: http://wiki.ros.org/rosclean. The output is identical to that of ROS; sizes are counted in disk blocks, as du does. If
+the prompt gets no reply (no terminal, an empty pipe), nothing is removed.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def _places() -> list[_Logs]:
 
 
 def _agreed(command: str) -> bool:
-    """Ask for confirmation of ``command`` until y or n is typed; return whether it was y."""
+    """Prompt for confirmation of ``command`` until y or n is typed; return whether it was y."""
     question = f"PLEASE BE CAREFUL TO VERIFY THE COMMAND BELOW!\nOkay to perform:\n\n{command}\n(y/n)?"
     while True:
         print(question, flush=True)
@@ -103,7 +103,7 @@ def _agreed(command: str) -> bool:
 
 
 def _remove_oldest(folder: Path, excess: int) -> None:
-    """Remove entries of a folder, oldest modification first, until ``excess`` bytes have been removed."""
+    """Remove entries in a folder, oldest modification first, until ``excess`` bytes have been removed."""
     entries = [path for path in folder.iterdir() if not path.is_symlink()]
     for path in sorted(entries, key=lambda path: path.stat().st_mtime):
         if excess <= 0:
@@ -127,7 +127,7 @@ def _remove(path: Path) -> None:
 
 
 def _statuses(path: Path) -> Iterator[os.stat_result]:
-    """Yield the stat result of a path and of everything below it; skip entries that disappear meanwhile."""
+    """Yield the stat results for a path and for everything below it; skip entries that disappear in the meantime."""
     for each in (path, *path.rglob("*")):
         try:
             yield each.lstat()
@@ -140,7 +140,7 @@ def _size(path: Path) -> int:
 
 
 def disk_usage(folder: Path) -> int:
-    """Return the size of a folder in disk blocks, as bytes; on Windows, with an assumed block size."""
+    """Return a folder's size in disk blocks, as bytes; on Windows, assume a block size."""
     return sum(
         status.st_blocks * 512
         if hasattr(status, "st_blocks")
@@ -150,7 +150,7 @@ def disk_usage(folder: Path) -> int:
 
 
 def human_size(size: float) -> str:
-    """Return a size as printed by `du -h`: 4.0K, 11M; rounded up."""
+    """Return a size as `du -h` prints it: 4.0K, 11M; rounded up."""
     if size < 1024:
         return f"{size:.0f}"
     for unit in "KMGT":

@@ -1,4 +1,4 @@
-"""rosclean: the disk usage of log files. Source: http://wiki.ros.org/rosclean."""
+"""rosclean: determines the disk usage of log files. Source: http://wiki.ros.org/rosclean."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ class CleanupException(Exception):
 
 
 def get_disk_usage(d: str) -> int:
-    """Return the disk usage of a folder in bytes. Raise CleanupException."""
+    """Return a folder's disk usage in bytes. Raise CleanupException if the folder does not exist."""
     if not isinstance(d, str | Path) or not Path(d).is_dir():
         raise CleanupException(f"[{d}] is not a folder")
     return disk_usage(Path(d))
 
 
 def get_human_readable_disk_usage(d: str) -> str:
-    """Return the disk usage of a folder as printed by `du -h`. Raise CleanupException."""
+    """Return a folder's disk usage as `du -h` prints it. Raise CleanupException if the folder does not exist."""
     return human_size(get_disk_usage(d))
 
 
 def rosclean_main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; ``argv`` includes its name. Return its exit status."""
+    """Run the command; ``argv`` includes the command's name. Return its exit status."""
     return main(list(sys.argv if argv is None else argv)[1:])

@@ -1,6 +1,6 @@
 """rosconsole: get and set the levels of a node's loggers, and print the messages that nodes log.
 
-Source: http://wiki.ros.org/rosconsole (the command). The output is that of ROS.
+Source: http://wiki.ros.org/rosconsole (the command). The output is identical to that of ROS.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FAMILY", "main"]
 
-_LEVELS = {name.lower(): level for level, name in LEVEL_NAMES.items()}  # name -> level of rosgraph_msgs/Log
+_LEVELS = {name.lower(): level for level, name in LEVEL_NAMES.items()}  # name -> level in rosgraph_msgs/Log
 
 _COLOURS = {"debug": 92, "info": 97, "warn": 93, "error": 91, "fatal": 95}
 

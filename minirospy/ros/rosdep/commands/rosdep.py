@@ -1,7 +1,7 @@
 """rosdep: list the dependencies of packages that are not available here, and how to install them.
 
-Tutorials use `rosdep install --from-paths src --ignore-src -r -y`. rosdep queries a database on the network and runs the
-system's package manager. This one downloads and installs nothing: minirospy provides the packages of ROS; for any other
+Tutorials use `rosdep install --from-paths src --ignore-src -r -y`. ROS's rosdep queries a database on the network and runs
+the system's package manager. This one downloads and installs nothing: minirospy provides ROS's packages; for any other
 missing dependency it prints the command that installs it.
 Source: http://docs.ros.org/en/independent/api/rosdep/html/commands.html.
 """
@@ -52,7 +52,7 @@ _TOOLS = frozenset(
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status: 1 if a dependency is missing."""
+    """Run the command; return its exit status, 1 if a dependency is missing."""
     return FAMILY.main(argv)
 
 
@@ -100,7 +100,9 @@ def _missing(
 ) -> dict[str, list[str]]:
     """Return the missing keys, each with the packages that depend on it.
 
-    Raise NotFoundError, ManifestError, UsageError.
+    Raise NotFoundError if a package does not exist, ManifestError if its manifest is invalid, UsageError if no package is
+    given
+    or a folder does not exist.
     """
     from minirospy.workspace.build import PROVIDED
     from minirospy.workspace.manifest import Kind, read_manifest
@@ -129,7 +131,7 @@ def _missing(
 
 
 def _module(key: str) -> tuple[str, str] | None:
-    """Return the module and the PyPI name for a rosdep key; None if it is not the key of a Python package."""
+    """Return the module and the PyPI name for a rosdep key, or None if the key is not for a Python package."""
     match = _PYTHON_KEY.match(key)
     if match is None:
         return None
@@ -228,7 +230,7 @@ class _IgnoringParser(Parser):
     """Accepts and ignores any arguments."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Ignore the words; return no arguments."""
+        """Return no arguments, ignoring the words."""
         return {}
 
 

@@ -1,7 +1,7 @@
-"""rosgraph: print which nodes publish to which, and the services; repeated every second until Ctrl-C.
+"""rosgraph: print which nodes publish to which, and the services; repeat every second until Ctrl-C.
 
-Source: http://wiki.ros.org/rosgraph. The output is that of ROS, with sorted names; all data comes from the master, so a
-node that hangs causes no delay.
+Source: http://wiki.ros.org/rosgraph. The output is identical to that of ROS, with sorted names. All data comes from the
+master, so a node that hangs causes no delay.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _PAUSE_SECONDS = 1.0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command."""
+    """Run the command; return an exit status as defined in minirospy.command.command."""
     return COMMAND.main(argv)
 
 
@@ -37,13 +37,13 @@ Usage:
 
 
 class _RosgraphParser(Parser):
-    """Prints ROS's help before its own, and also on a usage error, as ROS does."""
+    """Prints ROS's help before this command's own, and also on a usage error, as ROS does."""
 
     def format_help(self) -> str:
         return _ROS_HELP + super().format_help()
 
     def error(self, message: str, ros: str = "") -> NoReturn:
-        """Print ROS's help to stdout, and raise the CommandLineError for ``message``."""
+        """Print ROS's help to stdout, and raise CommandLineError with ``message``."""
         sys.stdout.write(_ROS_HELP)
         super().error(message, ros)
 

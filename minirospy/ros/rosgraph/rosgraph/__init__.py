@@ -1,4 +1,4 @@
-"""rosgraph: the Master API, names and the environment for Python code."""
+"""rosgraph: the Master API, names and the environment, for Python programs."""
 
 import sys
 from collections.abc import Sequence
@@ -42,5 +42,5 @@ __getattr__ = on_first_use("rosgraph", "roslogging", "xmlrpc")
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:
-    """Return the command line without remappings and private parameters, like `rospy.myargv`."""
+    """Return the command line without remappings and private parameters, as `rospy.myargv` does."""
     return parse_arguments(sys.argv if argv is None else argv).plain

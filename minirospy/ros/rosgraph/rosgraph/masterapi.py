@@ -1,4 +1,4 @@
-"""The Master API for Python code: blocking calls that return lists as in ROS. Source: http://wiki.ros.org/ROS/Master_API."""
+"""The Master API for Python programs: blocking calls that return lists as in ROS. Source: http://wiki.ros.org/ROS/Master_API."""
 
 from __future__ import annotations
 
@@ -33,22 +33,22 @@ class MasterException(Exception):
     """The master is unreachable or returned an error."""
 
 
-ROSMasterException = MasterException  # older name
+ROSMasterException = MasterException  # the older name
 
 
 class MasterFailure(MasterException):
-    """The call failed at the master."""
+    """The call failed on the master."""
 
 
 class MasterError(MasterException):
-    """The call was invalid: an unknown name, a bad argument."""
+    """The call was invalid, because of an unknown name or a bad argument."""
 
 
 Error, Failure = MasterError, MasterFailure
 
 
 class Master:
-    """The master at ``master_uri``, by default that of the environment, called as node ``caller_id``."""
+    """A proxy for the master at ``master_uri`` (default: from the environment); calls are made as node ``caller_id``."""
 
     def __init__(self, caller_id: str, master_uri: str | None = None) -> None:
         uri = master_uri or get_master_uri()
@@ -57,7 +57,7 @@ class Master:
             parse_http_host_and_port(uri)
         except ValueError as error:
             raise ValueError(f"invalid master URI: {uri}") from error
-        # Without a trailing slash, as in ROS's rosgraph.
+        # Remove the trailing slash, as ROS's rosgraph does.
         self.caller_id = make_caller_id(caller_id).rstrip("/")
         self._proxy = MasterProxy(uri, self.caller_id)
         # ROS's Master has no close(): the connections are closed when the object is deleted.
@@ -77,7 +77,7 @@ class Master:
 
     @cached_property
     def handle(self) -> ServerProxy:
-        """The master as Python's `xmlrpc.client.ServerProxy`; its methods return (code, text, value)."""
+        """Return the master as Python's `xmlrpc.client.ServerProxy`, whose methods return (code, text, value)."""
         from xmlrpc.client import ServerProxy
 
         return ServerProxy(self.master_uri)
@@ -107,19 +107,19 @@ class Master:
         return tables
 
     def getPublishedTopics(self, subgraph: str) -> list[list[str]]:
-        """Return [[topic, type]] of the published topics."""
+        """Return [[topic, type]] for the published topics."""
         return [list(pair) for pair in self._call("getPublishedTopics", subgraph)]
 
     def getTopicTypes(self) -> list[list[str]]:
-        """Return [[topic, type]] of all topics known to the master."""
+        """Return [[topic, type]] for all topics known to the master."""
         return [list(pair) for pair in self._call("getTopicTypes")]
 
     def lookupNode(self, node_name: str) -> str:
-        """Return the URI of a node."""
+        """Return a node's URI."""
         return str(self._call("lookupNode", node_name))
 
     def lookupService(self, service: str) -> str:
-        """Return the URI of a service."""
+        """Return a service's URI."""
         return str(self._call("lookupService", service))
 
     def getParam(self, key: str) -> Any:
@@ -147,11 +147,11 @@ class Master:
         return self._list("getParamNames")
 
     def subscribeParam(self, caller_api: str, key: str) -> object:
-        """Subscribe to changes of a parameter; return its value."""
+        """Subscribe to a parameter's changes; return its value."""
         return as_xmlrpc_client(self._call("subscribeParam", caller_api, key))
 
     def unsubscribeParam(self, caller_api: str, key: str) -> int:
-        """Unsubscribe from changes of a parameter."""
+        """Unsubscribe from a parameter's changes."""
         return int(self._call("unsubscribeParam", caller_api, key))
 
     def registerPublisher(self, topic: str, topic_type: str, caller_api: str) -> list[str]:
@@ -180,5 +180,5 @@ class Master:
 
 
 def is_online(master_uri: str | None = None) -> bool:
-    """Return whether a master responds at ``master_uri``, by default that of the environment."""
+    """Return whether a master responds at ``master_uri`` (default: from the environment)."""
     return Master("/rosgraph", master_uri).is_online()

@@ -80,10 +80,10 @@ def is_legal_base_name(name: str | None) -> bool:
 
 
 def resolve_name(name: str, namespace_: str, remappings: Mapping[str, str] | None = None) -> str:
-    """Return the global name of ``name`` in the node ``namespace_``, remapped."""
+    """Return the global name for ``name`` in the node ``namespace_``, after remapping."""
     name = canonicalize_name(name)
     if not is_global(name) and not is_private(name):
-        # This raises ValueError if ``namespace_`` is not a name.
+        # Raise ValueError if ``namespace_`` is not a name.
         namespace(namespace_)
     return _names.resolve(name, namespace_, remappings)
 
@@ -99,7 +99,7 @@ def make_caller_id(name: str) -> str:
 
 
 def script_resolve_name(script_name: str, name: str) -> str:
-    """Return the global name of an argument given to the command ``script_name``."""
+    """Return the global name for an argument given to the command ``script_name``."""
     if not name:
         return get_ros_namespace()
     if is_global(name):

@@ -1,4 +1,4 @@
-"""The addresses of this machine, and connection headers, as in ROS's rosgraph.network.
+"""This machine's addresses, and connection headers, as in ROS's rosgraph.network.
 
 Source: http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/TCPROS.
 """
@@ -42,11 +42,11 @@ __all__ = [
 
 
 class ROSHandshakeException(Exception):
-    """A connection header is incomplete or cannot be parsed."""
+    """The connection header is incomplete or cannot be parsed."""
 
 
 def get_address_override() -> str | None:
-    """Return ROS_HOSTNAME, else ROS_IP, else None. With MINIROSPY_LOCAL=1 return localhost."""
+    """Return ROS_HOSTNAME, or ROS_IP, or None if neither is set. With MINIROSPY_LOCAL=1 return localhost."""
     if is_local(os.environ):
         return "localhost"
     return os.environ.get(ROS_HOSTNAME) or os.environ.get(ROS_IP) or None
@@ -66,7 +66,7 @@ def get_local_address() -> str:
 
 
 def get_local_addresses() -> list[str]:
-    """Return the addresses of this machine, including IPv6 addresses if ROS_IPV6 is on."""
+    """Return this machine's addresses, including IPv6 addresses if ROS_IPV6 is on."""
     import psutil
 
     families = {socket.AF_INET, socket.AF_INET6} if use_ipv6() else {socket.AF_INET}
@@ -98,12 +98,12 @@ def get_bind_address(address: str | None = None) -> str:
 
 
 def create_local_xmlrpc_uri(port: int) -> str:
-    """Return the XML-RPC URI of a server on this machine."""
+    """Return the XML-RPC URI for a server on this machine."""
     return f"http://{Environment.read().uri_host}:{port}/"
 
 
 def parse_http_host_and_port(url: str) -> tuple[str, int]:
-    """Return (host, port) of a URL; the port defaults to 80. Raise ValueError."""
+    """Return a URL's (host, port); the port defaults to 80. Raise ValueError if the URL is invalid."""
     from urllib.parse import urlsplit
 
     if not url:
@@ -115,9 +115,9 @@ def parse_http_host_and_port(url: str) -> tuple[str, int]:
 
 
 def encode_ros_handshake_header(header: Mapping[str, object]) -> bytes:
-    """Return a serialized connection header with its length prefix, fields sorted; names and values are str or bytes.
+    """Return a serialized connection header with its length prefix and sorted fields.
 
-    Raise TypeError.
+    Raise TypeError if a name or value is neither str nor bytes.
     """
     pairs = sorted((_as_bytes(name), _as_bytes(value)) for name, value in header.items())
     fields = [name + b"=" + value for name, value in pairs]
@@ -134,7 +134,10 @@ def _as_bytes(text: object) -> bytes:
 
 
 def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
-    """Return the fields of a connection header with a length prefix. Raise ROSHandshakeException, struct.error."""
+    """Return the fields in a connection header with a length prefix.
+
+    Raise ROSHandshakeException or struct.error if the header cannot be parsed.
+    """
     (size,) = struct.unpack("<I", header_str[:LENGTH_BYTES])
     body = header_str[LENGTH_BYTES : LENGTH_BYTES + size]
     if len(body) < size:
@@ -148,7 +151,7 @@ def decode_ros_handshake_header(header_str: bytes) -> dict[str, str]:
 
 
 def read_ros_handshake_header(sock: socket.socket, b: BytesIO, buff_size: int) -> dict[str, str]:
-    """Read a connection header from a socket; bytes received after it remain in the buffer ``b``.
+    """Read a connection header from a socket; bytes received after the header remain in the buffer ``b``.
 
     Raise ROSHandshakeException if the peer closes the connection before the end of the header.
     """

@@ -1,4 +1,4 @@
-"""rosgraph.roslogging: the names used by logging configuration files and by programs with subclasses."""
+"""rosgraph.roslogging: the names used in logging configuration files, and by programs that subclass its classes."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class LoggingException(Exception):
 
 
 class RospyLogger(logging.Logger):
-    """The logger class of rospy. minirospy does not need it to find a call's line; it exists for programs that patch it."""
+    """rospy's logger class. minirospy finds a call's line without it; the class exists for programs that patch it."""
 
 
 def configure_logging(
     logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
 ) -> str | None:
-    """Log to a file in the log folder; return its path, and set ROS_LOG_FILENAME to it."""
+    """Log to a file in the log folder; set ROS_LOG_FILENAME to the file's path, and return the path."""
     from pathlib import Path
 
     from minirospy.ros.rospkg.rospkg.environment import get_log_dir
@@ -48,7 +48,7 @@ def configure_logging(
     return str(path)
 
 
-# Private names of ROS's module that programs read and change.
+# These are private names in ROS's module that programs read and change.
 _color_reset = "\033[0m"
 _logging_to_rospy_names = {
     "DEBUG": ("DEBUG", "\033[32m"),

@@ -1,6 +1,6 @@
 """rosgraph.xmlrpc: an XML-RPC server in a thread, for programs that implement a node themselves.
 
-minirospy's own nodes do not use it; it is based on Python's xmlrpc.
+It is based on Python's xmlrpc; minirospy's own nodes do not use it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _log = logging.getLogger("xmlrpc")
 
 
 class SilenceableXMLRPCRequestHandler(SimpleXMLRPCRequestHandler):
-    """Handles HTTP/1.1 requests, and logs them only if the server has ``logRequests``."""
+    """Handles HTTP/1.1 requests, and logs them only if the server's ``logRequests`` is set."""
 
     protocol_version = "HTTP/1.1"
     rpc_paths = ()
@@ -53,17 +53,17 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
 
 
 class XmlRpcHandler:
-    """The base class of the methods served by an :class:`XmlRpcNode`; names with a leading underscore are not served."""
+    """The base class for the methods served by an :class:`XmlRpcNode`; names with a leading underscore are not served."""
 
     def _ready(self, uri: str) -> None:
-        """Handle the start of the server at ``uri``; subclasses override it."""
+        """Handle the server's start at ``uri``; subclasses override this method."""
 
     def _shutdown(self, reason: str) -> None:
-        """Handle the shutdown of the server; subclasses override it."""
+        """Handle the server's shutdown; subclasses override this method."""
 
 
 class XmlRpcNode:
-    """Serves the methods of ``rpc_handler`` in a thread after :meth:`start`; ``uri`` is its address.
+    """Serves the methods of ``rpc_handler`` in a thread after :meth:`start`; ``uri`` is the server's address.
 
     If the server's thread fails, ``on_run_error`` is called with the exception.
     """
@@ -93,7 +93,7 @@ class XmlRpcNode:
             self.handler._shutdown(reason)
 
     def start(self) -> None:
-        """Start a thread that serves."""
+        """Start a thread that runs the server."""
         threading.Thread(target=self.run, daemon=True).start()
 
     def set_uri(self, uri: str) -> None:
@@ -101,7 +101,7 @@ class XmlRpcNode:
         self.uri = uri
 
     def run(self) -> None:
-        """Serve in the calling thread until :meth:`shutdown`."""
+        """Run the server in the calling thread until :meth:`shutdown` is called."""
         try:
             self.server = ThreadingXMLRPCServer((get_bind_address(), int(self.port or 0)), log_requests=False)
             self.port = self.server.server_address[1]
@@ -111,7 +111,7 @@ class XmlRpcNode:
             if isinstance(self.handler, XmlRpcHandler):
                 self.handler._ready(str(self.uri))
             self.server.serve_forever(poll_interval=0.1)
-        except Exception as error:  # reported to the node's owner
+        except Exception as error:  # reported through ``on_run_error``
             if self.on_run_error is None:
                 raise
             self.on_run_error(error)

@@ -30,15 +30,15 @@ _M = TypeVar("_M", bound=Message)
 class ClientGoal(Generic[_R, _F]):
     """A goal that was sent; created by :meth:`ActionClient.send`.
 
-    ``async for`` over it yields the feedback until the goal reaches a terminal state. ``await goal`` returns its result; it
-    raises GoalError if the goal was not reached, ROSInterruptException if the client or node was closed before.
-    ``async with goal:`` cancels it if the block is left earlier.
+    ``async for`` over it yields the feedback until the goal reaches a terminal state. ``await goal`` returns the result. It
+    raises GoalError if the goal was not reached, ROSInterruptException if the client or node was closed before that.
+    ``async with goal:`` cancels the goal if the block is left before the goal has ended.
     """
 
     def __init__(self, id: str, cancel: Callable[[ClientGoal[_R, _F]], None]) -> None:
         self.id = id
         self.state = GoalState.PENDING  # the last status published by the server
-        self.text = ""  # the server's text for this status
+        self.text = ""  # the status text from the server
         self._cancel = cancel
         self._feedback: deque[_F] = deque(maxlen=WAITING)
         self._news = asyncio.Event()
@@ -88,12 +88,12 @@ class ClientGoal(Generic[_R, _F]):
         self._news.set()
 
     def _take_status(self, status: GoalStatus | None) -> None:
-        """Process the goal's status in a list from the server; None if the list does not contain the goal."""
+        """Process the goal's status from the server's list, or None if the list does not contain the goal."""
         if status is not None:
             self._is_known = True
             self.state, self.text = GoalState(status.status), status.text
         elif self._is_known and self.state not in TERMINAL:
-            # The server no longer lists the goal: it was restarted.
+            # The server no longer lists the goal, so the server has been restarted.
             self._end(GoalState.LOST, "the server does not know the goal any more", None)
 
     def _end(self, state: GoalState, text: str, result: _R | None) -> None:
@@ -105,13 +105,13 @@ class ClientGoal(Generic[_R, _F]):
     def _interrupt(self) -> None:
         if not self.done:
             self._ended.set_exception(ROSInterruptException("rospy shutdown"))
-            # Mark the exception as retrieved: asyncio would log it if nobody awaits the goal.
+            # Mark the exception as retrieved: otherwise asyncio logs it if nothing awaits the goal.
             self._ended.exception()
             self._news.set()
 
 
 class ActionClient(ActionEnd, Generic[_G, _R, _F]):
-    """A client of the action ``name`` of the class ``action``, such as ``runningLedAction``.
+    """A client for the action ``name``; ``action`` is the action's class, such as ``runningLedAction``.
 
     Use it with ``async with``, or call ``await client.close()`` when done. Raise ActionException if ``action`` is not an
     action class.
@@ -144,7 +144,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
             raise TimeoutError(f"timeout exceeded while waiting for the action server {self.name}") from None
 
     def send(self, goal: _G) -> ClientGoal[_R, _F]:
-        """Send a goal as soon as a server is connected. Raise ROSException if the client is closed."""
+        """Send a goal as soon as a server is connected, and return the goal. Raise ROSException if the client is closed."""
         if self._is_closed or self._node.is_shutdown:
             raise ROSException(f"send() of a closed action client of {self.name}")
         now = self._node.now()
@@ -157,11 +157,11 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         return sent
 
     def cancel_all(self) -> None:
-        """Request the server to cancel all its goals, including those of other clients."""
+        """Request the server to cancel all its goals, including those from other clients."""
         self._start(self._cancel.publish(GoalID()))
 
     async def close(self) -> None:
-        """Unregister from the action's topics. Running goals continue on the server without notifications. Idempotent."""
+        """Unregister from the action's topics. Running goals continue on the server, but report nothing more. Idempotent."""
         self._is_closed = True
         for goal in list(self._goals.values()):
             goal._interrupt()
@@ -193,7 +193,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
             self._start(self._send_cancel(goal))
 
     async def _send_cancel(self, goal: ClientGoal[_R, _F]) -> None:
-        # A connection does not prove that a server exists: `rostopic echo` of the goal topic also connects.
+        # A connection does not prove that a server exists: `rostopic echo` also connects to the goal topic.
         if goal._is_sent and self._goal.num_connections:
             await self._cancel.publish(GoalID(id=goal.id))
         else:
@@ -216,7 +216,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         status = message.status
         goal = self._goals.get(status.goal_id.id)
         if goal is not None:
-            # Feedback has a separate connection: first process the feedback that has arrived by now.
+            # Feedback arrives on a separate connection: process the feedback that has already arrived first.
             end = (goal, GoalState(status.status), status.text, cast("_R", message.result))
             asyncio.get_running_loop().call_soon(self._end_goal, *end)
 

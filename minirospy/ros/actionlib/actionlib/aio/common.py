@@ -1,4 +1,4 @@
-"""The common part of asyncio action clients and servers: the action's class, its topics and tasks."""
+"""Code shared by the asyncio action client and server: the action's class, topics and tasks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _G_co = TypeVar("_G_co", covariant=True)
 _R_co = TypeVar("_R_co", covariant=True)
 _F_co = TypeVar("_F_co", covariant=True)
 
-WAITING = 1000  # queue length in messages, of each topic of an action and of a goal's unread feedback
+WAITING = 1000  # queue length in messages, for each of an action's topics and for a goal's unread feedback
 
 
 class _WithGoal(Protocol[_G_co]):
@@ -38,7 +38,7 @@ class _WithFeedback(Protocol[_F_co]):
 
 
 class ActionClass(Protocol[_G_co, _R_co, _F_co]):
-    """The attributes of an action class such as ``runningLedAction``: the classes of its goal, result and feedback."""
+    """The attributes of an action class such as ``runningLedAction``: its goal, result and feedback classes."""
 
     @property
     def action_goal(self) -> _WithGoal[_G_co]: ...
@@ -53,7 +53,8 @@ class ActionClass(Protocol[_G_co, _R_co, _F_co]):
 class GoalError(MinirospyError):
     """A goal that was not reached: the server's ``text``, its ``result``, if any, and the final ``state``.
 
-    A server's ``execute`` raises it to abort the goal with a text and a result, in any form that it may also return.
+    A server's ``execute`` raises it to abort the goal with a text and a result. The result may have any type that ``execute``
+    may return.
     """
 
     def __init__(self, text: str = "", result: object = None, state: GoalState = GoalState.ABORTED) -> None:
@@ -64,7 +65,7 @@ class GoalError(MinirospyError):
 
 
 class ActionEnd(Handle):
-    """The common base of client and server: their topics, and the tasks that read them."""
+    """The common base of client and server: manages their topics, and the tasks that read the topics."""
 
     def __init__(self, node: Node, name: str, action: object) -> None:
         self.name = node.resolve(name)

@@ -26,7 +26,7 @@ _G = TypeVar("_G")
 _R = TypeVar("_R")
 _F = TypeVar("_F")
 
-# Pause after a list of statuses, per goal in it: publishing them must not use all the server's time.
+# Pause after a list of statuses, per goal in it, so that publishing does not use all the server's time.
 _SECONDS_A_STATUS = 1e-4
 
 _EVENTS = {
@@ -42,7 +42,7 @@ class ServerGoal(Generic[_G, _F]):
     def __init__(self, server: ActionServer[_G, Any, _F], message: ActionGoal) -> None:
         self.request = cast("_G", message.goal)  # the goal message
         self.is_cancel_requested = False  # set if a client has cancelled the goal, or a newer one has arrived
-        self.text = ""  # sent with the goal's final status
+        self.text = ""  # the text sent with the goal's final status
         self._server = server
         self._status = GoalStatus(goal_id=cast("GoalID", message.goal_id))
         self._task: asyncio.Task[None] | None = None
@@ -72,7 +72,7 @@ class ServerGoal(Generic[_G, _F]):
         """Cancel the task that executes the goal. Repeated calls have no effect."""
         if self._task and not self.is_cancel_requested:
             self.is_cancel_requested = True
-            # Cancelling a task before it starts would end it without a result for the client.
+            # A task that is cancelled before it starts would end without sending the client a result.
             if self._has_begun:
                 self._task.cancel()
 
@@ -81,11 +81,11 @@ Execute = Callable[[ServerGoal[_G, _F]], Awaitable[object]]
 
 
 class ActionServer(ActionEnd, Generic[_G, _R, _F]):
-    """The server of the action ``name``: runs ``await execute(goal)`` for each goal.
+    """A server for the action ``name``; it runs ``await execute(goal)`` for each goal.
 
     If ``execute`` returns, the goal has succeeded, and the return value is its result: a result message, a dictionary of
     fields, all values, the value of the only field, or None for an empty result. GoalError aborts the goal, with a text and
-    a result; any other exception also aborts it, and is logged.
+    a result; any other exception also aborts the goal, and is logged.
     If a client cancels the goal, ``execute`` is cancelled: CancelledError is raised at its current ``await``. The goal is
     then preempted, with the result that ``execute`` may still return.
 
@@ -215,13 +215,13 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
                 goal._step(GoalEvent.CANCEL_REQUEST)
                 goal._make_way()
         if cancel.id and cancel.id not in self._goals:
-            # The goal may still arrive.
+            # The goal may still arrive after the cancel request.
             self._canceled_early[cancel.id] = self._node.now().to_nsec()
         self._last_cancel = max(self._last_cancel, stamp)
         self._changed.set()
 
     async def _run(self, goal: ServerGoal[_G, _F], before: list[asyncio.Task[None]]) -> None:
-        """Execute a goal, after the goals that it preempts have finished."""
+        """Execute a goal once the goals that it preempts have finished."""
         event, result, returned = GoalEvent.SUCCEED, None, None
         goal._has_begun = True
 
@@ -246,7 +246,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             if returned is not None:
                 result = to_response(self._types.result, returned)
                 result.serialize(BytesIO())
-        except Exception as error:  # noqa: BLE001 - the edge to user code: any exception
+        except Exception as error:  # noqa: BLE001 - user code may raise any exception
             event, result, goal.text = GoalEvent.ABORT, None, f"the result does not fit: {error}"
             self._node.log.error("the result of your execute callback does not fit: %s", error)
 

@@ -1,1 +1,1 @@
-"""cv_bridge.boost: the functions that ROS implements in C++, here in Python."""
+"""cv_bridge.boost: Python versions of the functions that ROS implements in C++."""

@@ -19,7 +19,7 @@ def CV_MAT_CNWrap(i: int) -> int:
 
 
 def CV_MAT_DEPTHWrap(i: int) -> int:
-    """Return the depth in an OpenCV type number: 0 for 8U, 5 for 32F."""
+    """Return the depth code in an OpenCV type number: 0 for 8U, 5 for 32F."""
     return i % 8
 
 

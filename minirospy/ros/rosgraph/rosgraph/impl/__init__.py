@@ -1,4 +1,4 @@
-"""rosgraph.impl: the graph as it is polled."""
+"""rosgraph.impl: polls the graph."""
 
 from typing import TYPE_CHECKING
 

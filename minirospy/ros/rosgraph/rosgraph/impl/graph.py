@@ -17,12 +17,12 @@ _CALLER_ID = "/rosgraph"
 
 
 def topic_node(topic: str) -> str:
-    """Return the name of a topic's node in the graph: the topic after a space."""
+    """Return the name of a topic's node in the graph: a space followed by the topic."""
     return " " + topic
 
 
 def node_topic(node: str) -> str:
-    """Return the topic of a name returned by :func:`topic_node`."""
+    """Return the topic from a name that :func:`topic_node` returned."""
     return node[1:]
 
 
@@ -96,7 +96,7 @@ class EdgeList:
         return True
 
     def add_edges(self, start: str, dest: str, direction: str, label: str = "") -> bool:
-        """Add the edges for a row of getBusInfo, see :func:`edge_args`; return whether one of them is new."""
+        """Add the edges for a row from getBusInfo, see :func:`edge_args`; return whether one of them is new."""
         added = [self.add(Edge(*each)) for each in edge_args(start, dest, direction, label)]
         return any(added)
 
@@ -110,7 +110,7 @@ class EdgeList:
 
 
 def edge_args(start: str, dest: str, direction: str, label: str) -> list[tuple[str, str, str]]:
-    """Return [(start, end, label)] for a row of getBusInfo: reversed for direction ``i``, both for ``b``, [] if unknown."""
+    """Return [(start, end, label)] for a row from getBusInfo: reversed for direction ``i``, both for ``b``, [] if unknown."""
     there, back = (start, dest, label), (dest, start, label)
     return {"o": [there], "i": [back], "b": [there, back]}.get(direction, [])
 
@@ -137,15 +137,15 @@ class Graph:
         self.last_master_refresh = 0.0
 
     def set_master_stale(self, stale_secs: float) -> None:
-        """Set the minimum number of seconds between queries of the master."""
+        """Set the minimum number of seconds between two queries to the master."""
         self.master_stale = stale_secs
 
     def set_node_stale(self, stale_secs: float) -> None:
-        """Do nothing: accepted for compatibility, because nodes are not queried."""
+        """Do nothing; accepted for compatibility, because nodes are not queried."""
         self.node_stale = stale_secs
 
     def bad_update(self) -> bool:
-        """Return False: there are never nodes in ``bad_nodes`` to query again."""
+        """Return False, because ``bad_nodes`` never contains nodes to query again."""
         return False
 
     def update(self) -> bool:
