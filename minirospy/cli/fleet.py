@@ -208,7 +208,7 @@ def _gateway(
     network = _network(connect, listen, config, scout)
 
     from minirospy.base.name_filter import NameFilter
-    from minirospy.fleet.gateway import Gateway, GatewayOptions
+    from minirospy.fleet.gateway import REGISTRATION_FAULT_LINES, Gateway, GatewayOptions
     from minirospy.fleet.ros1_keys import parse_namespace
     from minirospy.fleet.rules import GatewayRules, parse_priorities, parse_rates
     from minirospy.web.serve import run
@@ -241,8 +241,7 @@ def _gateway(
         (),
         start,
         started,
-        # A thousand robots have thousands of topics: a master that does not register them is one line.
-        registration_fault_lines=1,
+        registration_fault_lines=REGISTRATION_FAULT_LINES,
         connect=Gateway.connect,
     )
 

@@ -29,8 +29,10 @@ from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
 
-__all__ = ["Gateway", "GatewayOptions"]
+__all__ = ["REGISTRATION_FAULT_LINES", "Gateway", "GatewayOptions"]
 
+REGISTRATION_FAULT_LINES = 1
+"""Log lines in ten seconds of a gateway's node: a master that does not register the topics of 1,000 robots is one line."""
 _log = logging.getLogger(__name__)
 
 

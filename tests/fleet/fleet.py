@@ -7,7 +7,8 @@ from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
 from minirospy import Node
-from minirospy.fleet.gateway import Gateway, GatewayOptions
+from minirospy.aio.node import MAX_REGISTRATION_FAULTS
+from minirospy.fleet.gateway import REGISTRATION_FAULT_LINES, Gateway, GatewayOptions
 from minirospy.fleet.network import NetworkOptions
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.transport.loop import LoopThread
@@ -26,9 +27,14 @@ class Place:
         self.uri = f"http://localhost:{master.port}"
         self.nodes: list[Node] = []
 
-    def node(self, name: str) -> Node:
+    def node(self, name: str, *, registration_fault_lines: int = MAX_REGISTRATION_FAULTS) -> Node:
         async def start() -> Node:
-            node = Node(name, rosout=False, master_uri=self.uri)
+            node = Node(
+                name,
+                rosout=False,
+                master_uri=self.uri,
+                registration_fault_lines=registration_fault_lines,
+            )
             await node.start()
             self.nodes.append(node)
             return node
@@ -43,7 +49,8 @@ class Place:
         network = NetworkOptions(listen=(endpoint,)) if listens else NetworkOptions(connect=(endpoint,))
         options.setdefault("imports", not name)
         gateway = Gateway(
-            self.node(f"fleet_{name or 'control'}"), GatewayOptions(name, network=network, **options)
+            self.node(f"fleet_{name or 'control'}", registration_fault_lines=REGISTRATION_FAULT_LINES),
+            GatewayOptions(name, network=network, **options),
         )
         self.fleet.gateways.append(gateway)
         self.fleet.run(gateway.start())
