@@ -379,3 +379,40 @@ def test_rest_can_be_imported_without_a_leaf(copied: Path, leaf: str) -> None:
 def test_every_room_has_its_place() -> None:
     rooms = {path.relative_to(PACKAGE).with_suffix("").parts[0] for path in FILES} - {"__init__"}
     assert rooms == set(DEPTH)
+
+
+GENERATED = {"_buff", "_connection_header", "_full_text", "_has_header", "_md5sum", "_request_class", "_response_class",
+             "_slot_types", "_type"}  # fmt: skip
+"""Private names that genpy gives to messages: programs of ROS use them."""
+OF_PYTHON = {"_actions", "_ArgumentGroup", "_asdict", "_create_unverified_context", "_current_frames", "_exit", "_getframe",
+             "_group_actions", "_make", "_replace"}  # fmt: skip
+"""Private names of the standard library, and those of NamedTuple, which are public."""
+
+
+def test_private_members_stay_in_their_room() -> None:
+    """`ros/` is left out: names such as ``_chain`` are those of the real packages."""
+    named: dict[str, set[str]] = {}
+    used: dict[str, list[tuple[str, str]]] = {}
+    for path in FILES:
+        room = path.relative_to(PACKAGE).parts[0]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = named.setdefault(room, set())
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+                names.add(node.name)
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                names.add(node.id)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                names.add(node.value)  # __slots__
+            elif isinstance(node, ast.Attribute):
+                if isinstance(node.value, ast.Name) and node.value.id in ("self", "cls"):
+                    names.add(node.attr)
+                elif node.attr.startswith("_") and not node.attr.startswith("__"):
+                    used.setdefault(room, []).append((str(path), node.attr))
+
+    foreign = [
+        use
+        for room, uses in used.items()
+        for use in uses
+        if room != "ros" and use[1] not in named[room] | GENERATED | OF_PYTHON
+    ]
+    assert not foreign

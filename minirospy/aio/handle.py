@@ -41,6 +41,10 @@ class Handle:
     ) -> None:
         await self.close()
 
+    async def wait_until_registered(self) -> None:
+        """Wait until the registration has ended, even if it failed or was cancelled: ``await handle`` would raise."""
+        await asyncio.wait([self._registration])
+
     async def close(self) -> None:
         """Close the handle."""
         raise NotImplementedError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import concurrent.futures
 import contextlib
 import logging
 import re
@@ -171,7 +172,7 @@ class Node:
             raise ROSInitException(f"node [{self.name}] cannot listen: {error}") from error
         self._runtime = runtime
         try:
-            self._start_logging()
+            self.start_logging()
             await self._wait_for_master()
             await self._set_private_parameters()
             if self._simulated_time or self._rosout:
@@ -185,6 +186,14 @@ class Node:
         except BaseException:
             await self.close()
             raise
+
+    def start_logging(self) -> None:
+        """Print log lines on the terminal, unless the program has configured logging. :meth:`start` calls this."""
+        if self.log.level == logging.NOTSET:
+            self.log.setLevel(logging.INFO)
+        # A program that has configured logging gets the lines through its own handlers.
+        if not self.log.hasHandlers():
+            self._add_handler(TerminalHandler(self))
 
     async def close(self) -> None:
         """Leave the graph: close topics and services, unregister the node. Idempotent."""
@@ -338,7 +347,7 @@ class Node:
         kept = self._kept.get(resolved)
         if kept is None:
             publisher: Publisher[Message] = self.advertise(resolved, type(message))
-            kept = self._kept[resolved] = (publisher, self._spawn(publisher._wait_for_expected()))
+            kept = self._kept[resolved] = (publisher, self._spawn(publisher.wait_for_expected()))
         publisher, expected = kept
         # Concurrent publishers of the topic wait, too.
         await asyncio.wait([expected])
@@ -436,6 +445,31 @@ class Node:
         """Return the names of all parameters."""
         return list(await self._node.master("getParamNames"))
 
+    # --- the master and the loop
+
+    @property
+    def master_uri(self) -> str:
+        """The URI of the node's master."""
+        return self._environment.master_uri
+
+    async def call_master(self, method: str, *arguments: object) -> Any:
+        """Call a method of the Master API as this node and return the value of the response.
+
+        Raise MasterUnreachableError, RpcRefused with the master's text, or another RpcError.
+        Source: http://wiki.ros.org/ROS/Master_API.
+        """
+        return await self._node.master(method, *arguments)
+
+    def run_threadsafe(self, work: Coroutine[object, object, _T]) -> concurrent.futures.Future[_T]:
+        """Start a coroutine on the node's loop, from any other thread; return its future.
+
+        Raise ROSInitException before the node has been started.
+        """
+        if self._loop is None:
+            work.close()
+            raise ROSInitException(f"node [{self.name}] has not been started: use it inside `async with`")
+        return asyncio.run_coroutine_threadsafe(work, self._loop)
+
     # --- time
 
     def now(self) -> Time:
@@ -523,13 +557,6 @@ class Node:
 
         async for message in self.subscribe("/clock", Clock, queue_size=1):
             simulated.set(message.clock.to_nsec())
-
-    def _start_logging(self) -> None:
-        if self.log.level == logging.NOTSET:
-            self.log.setLevel(logging.INFO)
-        # A program that has configured logging gets the lines through its own handlers.
-        if not self.log.hasHandlers():
-            self._add_handler(TerminalHandler(self))
 
     def _start_rosout(self) -> None:
         from rosgraph_msgs.msg import Log

@@ -210,6 +210,15 @@ class Publisher(Handle, Generic[_M_co]):
             text = f"timeout exceeded while waiting for {count} subscribers of topic {self.topic}"
             raise TimeoutError(text) from None
 
+    async def wait_for_expected(self) -> None:
+        """Wait up to a second until the subscribers that the master knew at the registration are connected."""
+        await self
+        state = self._state
+        if state is None:
+            return  # closed while registering
+        with contextlib.suppress(asyncio.TimeoutError, ROSInterruptException):
+            await asyncio.wait_for(self._wait_for(state.publication.expected), _JOIN_SECONDS)
+
     async def close(self) -> None:
         """Stop publishing; the topic is unregistered with its last publisher in this node. Idempotent."""
         state, self._state = self._state, None
@@ -221,14 +230,6 @@ class Publisher(Handle, Generic[_M_co]):
             if self._node.is_shutdown:
                 raise ROSInterruptException("rospy shutdown")
             await self._state.next_change()
-
-    async def _wait_for_expected(self) -> None:
-        await self
-        state = self._state
-        if state is None:
-            return  # closed while registering
-        with contextlib.suppress(asyncio.TimeoutError, ROSInterruptException):
-            await asyncio.wait_for(self._wait_for(state.publication.expected), _JOIN_SECONDS)
 
 
 class SubscribedTopic:

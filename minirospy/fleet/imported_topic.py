@@ -175,7 +175,7 @@ class ImportedTopic:
             # Limited: the master answers the 8,000 calls for a thousand robots one by one.
             handle = self._publisher or self._subscription
             if handle is not None:
-                await asyncio.wait([handle._registration])
+                await handle.wait_until_registered()
 
     def _advertise(self, interface: InterfaceType) -> None:
         shared, token = self._shared, self.token

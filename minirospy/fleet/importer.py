@@ -454,7 +454,7 @@ class Importer:
     async def _snapshot(self) -> Snapshot | None:
         """Return the local graph if it is needed: if a robot both publishes and subscribes to some topic."""
         if any(topic.needs_snapshot for shown in self.robots.values() for topic in shown.topics.values()):
-            return await fetch(self._node._node.master)
+            return await fetch(self._node.call_master)
         return None
 
     def _look(self, snapshot: Snapshot | None) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import logging
 import time
@@ -44,8 +43,7 @@ async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes
 
 def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
     """Run a coroutine on a node's loop and wait for it: if the loop is slower, messages queue in the receiver."""
-    assert node._loop
-    done = asyncio.run_coroutine_threadsafe(work, node._loop)
+    done = node.run_threadsafe(work)
     with contextlib.suppress(Exception):
         done.result(10.0)
 
@@ -173,7 +171,7 @@ class InboundTopic:
                 self.token.topic, self.token.type, publisher.publish_raw, self._stop_seconds
             )
         self._publisher = publisher
-        await publisher._wait_for_expected()
+        await publisher.wait_for_expected()
         # Publish buffered messages first: until then the receiver's thread passes new ones to `keep`, which runs on
         # this loop.
         for body in self._held:

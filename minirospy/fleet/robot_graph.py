@@ -64,7 +64,7 @@ class RobotGraph:
 
     async def look(self) -> bool:
         """Read the current graph; return whether it has changed. Raise MasterUnreachableError or RpcError."""
-        snapshot = await fetch(self._node._node.master)
+        snapshot = await fetch(self._node.call_master)
         hidden, own = self._hidden(), {self._node.name}
         if self._gateways:
             own.update(self._gateways(snapshot))
@@ -140,7 +140,7 @@ class RobotGraph:
 
     async def _publisher(self, key: tuple[str, str]) -> Header:
         """Query a publisher for its type, and whether it latches."""
-        header = await self._definitions.texts._header_of(*key)
+        header = await self._definitions.texts.header_of(*key)
         self._definitions.learn(
             header.get("type", ""), header.get("md5sum", ""), header.get("message_definition", "")
         )

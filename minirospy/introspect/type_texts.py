@@ -91,15 +91,15 @@ class TypeTexts:
     async def _from_publishers(self, topic: str, publishers: tuple[str, ...]) -> InterfaceType | None:
         for publisher in publishers:
             with contextlib.suppress(MinirospyError, OSError, asyncio.TimeoutError, ValueError):
-                header = await self._header_of(topic, publisher)
+                header = await self.header_of(topic, publisher)
                 text = header.get("message_definition", "")
                 if text or header["md5sum"] == "d41d8cd98f00b204e9800998ecf8427e":  # a message without fields
                     return InterfaceType(header["type"], header["md5sum"], text)
         return None
 
-    async def _header_of(self, topic: str, publisher: str) -> Header:
+    async def header_of(self, topic: str, publisher: str) -> Header:
         """Return a publisher's connection header: connect as a subscriber, then disconnect."""
-        uri = await self._node._node.master("lookupNode", publisher)
+        uri = await self._node.call_master("lookupNode", publisher)
         answer = await self._rpc.call(uri, "requestTopic", self._node.name, topic, [["TCPROS"]])
         match answer:
             case [1, _, ["TCPROS", str(host), int(port), *_]]:

@@ -210,7 +210,7 @@ class Ros2Bridge:
 
     async def _snapshot(self) -> Snapshot:
         """Return the ROS 1 graph, and record its run_id."""
-        snapshot = await fetch(self.node._node.master)
+        snapshot = await fetch(self.node.call_master)
         run_id = await self.node.get_param("/run_id", "")
         self.header = marker(str(run_id))
         return snapshot
@@ -238,7 +238,7 @@ class Ros2Bridge:
         await self._headers.look(present, _QUERY_SECONDS)
 
     async def _header(self, key: tuple[str, str]) -> Header:
-        return await self._texts._header_of(*key)
+        return await self._texts.header_of(*key)
 
     def _is_latched(self, topic: str, node: str) -> bool:
         return self._headers.found.get((topic, node), {}).get("latching") == "1"
@@ -350,7 +350,7 @@ class _ToRos1(_Passing):
         self._subscription: Ros2Handle | None = None
 
     async def open(self) -> None:
-        await self._publisher._wait_for_expected()
+        await self._publisher.wait_for_expected()
         self._subscription = self._bridge.side.subscribe(
             self.link.topic,
             self.link.ros2_type,

@@ -173,7 +173,7 @@ class Bridge:
 
     async def _start_beside(self) -> None:
         """Start rosapi and tf2_web_republisher for clients of rosbridge, unless another node provides them."""
-        graph = await fetch(self.node._node.master)
+        graph = await fetch(self.node.call_master)
         if self.options.rosapi and "/rosapi/topics" not in graph.services:
             from minirospy.web.rosapi.services import Rosapi
 

@@ -269,7 +269,7 @@ class SharedGraph:
         """Refresh the graph, and report changes. Raise MasterUnreachableError or RpcError."""
         # One refresh at a time, so that an earlier one does not replace the snapshot of a later one.
         async with self._looking:
-            found = await fetch(self.node._node.master)
+            found = await fetch(self.node.call_master)
             await self._look_up_services(found)
             after = found.filtered(self.filters.topics, self.filters.services)
             before, self.snapshot = self.snapshot, after
@@ -356,7 +356,7 @@ class SharedGraph:
             if known not in (None, ANY, type_.name):
                 raise BridgeError(f"topic [{topic}] is of type [{known}], not [{type_.name}]")
             publisher = self.node.advertise(topic, raw_class(type_), queue_size=_QUEUE, latch=latch)
-            joining = self.spawn(publisher._wait_for_expected())
+            joining = self.spawn(publisher.wait_for_expected())
             shared = self._publishers[topic] = _SharedPublisher(type_, latch, publisher, joining)
             self.refresh_soon()
         elif shared.type.md5sum != type_.md5sum:

@@ -162,7 +162,7 @@ async def _run(
     bridge: _P | None = None
     try:
         if connect is not None:
-            node._start_logging()
+            node.start_logging()
             bridge = await start(node)
             await connect(bridge)
         async with node:

@@ -77,6 +77,36 @@ def test_importing_rospy_does_not_import_aio() -> None:
 # --- life
 
 
+def test_call_master_calls_any_method_as_the_node(graph: MasterProxy) -> None:
+    async def main() -> None:
+        async with Node("n") as node:
+            await node.advertise("t", String)
+            assert await node.call_master("lookupNode", "/n") == node.uri
+            with pytest.raises(RpcRefused):
+                await node.call_master("lookupNode", "/nobody")
+
+    run(main)
+
+
+def test_run_threadsafe_runs_a_coroutine_on_the_loop(master: str) -> None:
+    threads = []
+
+    async def work() -> int:
+        threads.append(threading.current_thread())
+        return 7
+
+    async def main() -> None:
+        node = Node("n")
+        with pytest.raises(ROSInitException):
+            node.run_threadsafe(work())
+        async with node:
+            assert await asyncio.to_thread(lambda: node.run_threadsafe(work()).result(SECONDS)) == 7
+            assert node.master_uri == master
+        assert threads == [threading.current_thread()]
+
+    run(main)
+
+
 def test_node_is_registered_only_inside_its_block(graph: MasterProxy) -> None:
     async def main() -> None:
         node = Node("n", namespace="robot")

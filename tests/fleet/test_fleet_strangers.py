@@ -253,7 +253,8 @@ def test_topics_are_registered_so_many_at_a_time() -> None:
 
         def advertise(*_: object, **__: object) -> Any:
             registrations.append(loop.create_future())
-            return stub(_registration=registrations[-1], subscribers=())
+            registration = registrations[-1]
+            return stub(wait_until_registered=lambda: asyncio.wait([registration]), subscribers=())
 
         async def interface(*_: object) -> Any:
             return InterfaceType("std_msgs/String", String._md5sum)

@@ -34,9 +34,7 @@ class Graph:
         self.values = {f"/{name}": value for name, value in values.items()}
         self.spawned: list[Coroutine[Any, Any, Any]] = []
         watch = SimpleNamespace(listeners=[], add=self._nothing, remove=self._nothing)
-        self.node = SimpleNamespace(
-            _node=SimpleNamespace(master=self._master), resolve=lambda name: name, parameters=watch
-        )
+        self.node = SimpleNamespace(call_master=self._master, resolve=lambda name: name, parameters=watch)
 
     def spawn(self, work: Coroutine[Any, Any, Any]) -> None:
         self.spawned.append(work)

@@ -40,7 +40,7 @@ class Dashboard:
         ``bags``: the bags that may be opened, by default those in the working folder. ``publishes_joints``: publish joints as
         joint_state_publisher_gui does, even if no page is open.
         """
-        master_uri = node._node.environment.master_uri
+        master_uri = node.master_uri
         self.codes = Codes()
         self._board = BoardEndpoint()
         self.rviz = RvizEndpoint(rviz_file)

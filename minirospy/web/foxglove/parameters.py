@@ -33,7 +33,7 @@ class Parameters:
 
     async def read(self, names: tuple[str, ...]) -> list[Parameter]:
         """Return parameters, or all if ``names`` is empty. Raise MasterUnreachableError or RpcError."""
-        master = self._graph.node._node.master
+        master = self._graph.node.call_master
         allowed = self._graph.filters.parameters
         if not names:
             tree = await master("getParam", _ROOT)
@@ -52,7 +52,7 @@ class Parameters:
 
     async def write(self, parameters: Iterable[Parameter]) -> list[str]:
         """Set or delete parameters; return one line for each failure."""
-        master = self._graph.node._node.master
+        master = self._graph.node.call_master
         failed = []
         for parameter in parameters:
             name = self._graph.node.resolve(parameter.name)

@@ -130,7 +130,7 @@ class Rosapi:
             await service.close()
 
     async def _graph(self) -> Snapshot:
-        found = await fetch(self.node._node.master)
+        found = await fetch(self.node.call_master)
         return found.filtered(self._filters.topics, self._filters.services)
 
     # --- topics
@@ -207,7 +207,7 @@ class Rosapi:
 
     async def _service_host(self, request: ServiceHostRequest) -> object:
         try:
-            uri = await self.node._node.master("lookupService", self.node.resolve(request.service))
+            uri = await self.node.call_master("lookupService", self.node.resolve(request.service))
         except RpcRefused:
             return {"host": ""}
         return {"host": urlsplit(uri).hostname or ""}
@@ -215,7 +215,7 @@ class Rosapi:
     # --- nodes and types
 
     async def _nodes(self, _: object) -> object:
-        graph = await fetch(self.node._node.master)
+        graph = await fetch(self.node.call_master)
         tables = (graph.publishers, graph.subscribers, graph.services)
         return {"nodes": sorted({node for table in tables for nodes in table.values() for node in nodes})}
 

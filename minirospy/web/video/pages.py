@@ -203,7 +203,7 @@ class VideoPages:
     async def _look(self, exchange: Exchange) -> Snapshot | None:
         """Return the graph; if it cannot be read, send an error response and return None."""
         try:
-            found = await fetch(self._graph.node._node.master)
+            found = await fetch(self._graph.node.call_master)
         except (MasterUnreachableError, RpcError) as error:
             _refuse(exchange, 503, f"the graph cannot be read: {error}")
             return None
