@@ -289,7 +289,7 @@ def test_limits_of_time_are_times(path: str, limit: Any) -> None:
 
 
 def test_classes_have_the_names_that_genpy_gives_them(path: str) -> None:
-    """Programs select messages by them, as `type(msg).__name__ == "_sensor_msgs__Image"`."""
+    """Programs select messages by class name, as `type(msg).__name__ == "_sensor_msgs__Image"`."""
     with rosbag.Bag(path) as bag:
         found = {type(each.message).__name__ for each in bag}
     assert found == {"_std_msgs__String", "_std_msgs__Int32"}

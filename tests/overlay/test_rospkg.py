@@ -1,4 +1,4 @@
-"""rospkg: packages and what they need, the environment."""
+"""rospkg: packages and their dependencies, the environment."""
 
 from __future__ import annotations
 
