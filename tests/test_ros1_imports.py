@@ -1,4 +1,4 @@
-"""ros1_imports: rospy and the commands where ROS 2 is sourced, whose packages of the same names come first on PYTHONPATH."""
+"""ros1_imports: rospy and the commands after ROS 2 is sourced, whose packages of the same names come first on PYTHONPATH."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ print(String._md5sum, Log._type, tf2_ros.__name__, PoseStamped().header.seq, gen
 
 @pytest.fixture
 def sourced(tmp_path: Path) -> dict[str, str]:
-    """Return the environment of a terminal where ROS 2 is sourced, with packages as rosidl and ament write them."""
+    """Return a terminal's environment after ROS 2 is sourced, with packages as rosidl and ament generate them."""
     prefix = tmp_path / "opt"
     site = prefix / "lib" / "python3" / "site-packages"
     index = prefix / "share" / "ament_index" / "resource_index" / "packages"
@@ -63,7 +63,7 @@ def test_messages_of_ros2_that_came_first_are_named_in_one_line(sourced: dict[st
 
 
 def test_a_process_without_rospy_imports_what_is_first(sourced: dict[str, str]) -> None:
-    # As the bridge to ROS 2, which runs with its packages.
+    # As in the ROS 2 bridge, which uses ROS 2's packages.
     done = run("import minirospy.aio.node\nfrom std_msgs.msg import Thing\nprint(Thing.kind)", sourced)
     assert done.stdout == "ROS 2\n", done.stderr
 

@@ -1,4 +1,4 @@
-"""The bill of materials of a wheel: what is in it, with licences; a part that is not what it is said to be is refused."""
+"""The bill of materials of a wheel: its contents with licences; a part that differs from its description is refused."""
 
 from __future__ import annotations
 

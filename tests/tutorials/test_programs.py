@@ -1,4 +1,4 @@
-"""Programs of rospy_tutorials and actionlib_tutorials, as pages of the ROS wiki start them."""
+"""Programs of rospy_tutorials and actionlib_tutorials, started as on the pages of the ROS wiki."""
 
 from __future__ import annotations
 
