@@ -126,7 +126,7 @@ def test_addresses_of_gitlab_have_its_paths() -> None:
         "https://[git.example.org/robots/ours",
     ],
 )
-def test_release_refuses_what_is_no_address(address: str) -> None:
+def test_release_refuses_an_invalid_address(address: str) -> None:
     """The error is one line, before anything is built."""
     done = subprocess.run(
         [sys.executable, str(ROOT / "tools" / "release.py")],

@@ -47,7 +47,7 @@ def run(program: str, environ: dict[str, str]) -> subprocess.CompletedProcess[st
     )
 
 
-def test_rospy_and_its_messages_are_imported_beside_ros2(sourced: dict[str, str]) -> None:
+def test_rospy_and_its_messages_can_be_imported_with_ros2_sourced(sourced: dict[str, str]) -> None:
     done = run(PROGRAM, sourced)
     assert done.returncode == 0, done.stderr
     assert done.stdout == "992ce8a1687cec8c8bd883ec73ca41d1 rosgraph_msgs/Log tf2_ros 0 1\n"
@@ -75,12 +75,12 @@ def test_a_process_without_rospy_imports_what_is_first(sourced: dict[str, str]) 
         "import minirospy.ros.tf2_ros.tools.static_publisher as m; print(m.Header._type)",
     ],
 )
-def test_a_program_of_ours_is_imported_beside_ros2(sourced: dict[str, str], program: str) -> None:
+def test_minirospy_program_can_be_imported_with_ros2_sourced(sourced: dict[str, str], program: str) -> None:
     done = run(program, sourced)
     assert done.returncode == 0, done.stderr
 
 
-def test_a_command_has_messages_of_ros1_beside_ros2(sourced: dict[str, str], master: str) -> None:
+def test_command_uses_ros1_messages_with_ros2_sourced(sourced: dict[str, str], master: str) -> None:
     words = (sys.executable, "-m", "minirospy", "topic", "pub", "-1", "/x", "std_msgs/String", "hi")
     environ = {**sourced, "ROS_MASTER_URI": master}
     done = subprocess.run(words, env=environ, capture_output=True, text=True, timeout=100, check=False)

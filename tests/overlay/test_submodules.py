@@ -111,7 +111,7 @@ def test_operating_system_may_be_overridden(monkeypatch: pytest.MonkeyPatch) -> 
     assert OsDetect().detect_os() == ("ubuntu", "", "")
 
 
-def test_operating_system_that_nobody_knows(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unknown_operating_system(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_OS_OVERRIDE", raising=False)
     with pytest.raises(OsNotDetected, match=r"Could not detect OS, tried \[\]"):
         OsDetect([]).detect_os()
