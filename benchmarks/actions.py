@@ -1,7 +1,7 @@
-"""`python benchmarks/actions.py`: goals a second by send_goal_and_wait, server and client as separate processes.
+"""`python benchmarks/actions.py`: goals per second by send_goal_and_wait, with server and client as separate processes.
 
-Each pairing of ours and real actionlib (where /usr/bin/python3 has one) over one master of ours. Latencies in
-microseconds, from send_goal_and_wait's call to its return.
+Measures each pairing of minirospy and real actionlib (if /usr/bin/python3 has one) with one minirospy master. Latencies are in
+microseconds, from the call of send_goal_and_wait to its return.
 """
 
 import json
@@ -44,7 +44,7 @@ rospy.signal_shutdown("")
 
 
 def measure(server: str, client: str, uri: str, seconds: float) -> list[float]:
-    """Goals a second, median and p99 in microseconds, failures."""
+    """Return goals per second, median and p99 in microseconds, and failures."""
     environment = {**os.environ, "ROS_MASTER_URI": uri, "ROS_HOSTNAME": "localhost"}
     serving = subprocess.Popen(
         [server, "-c", SERVER], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

@@ -1,4 +1,4 @@
-"""Attacks on a master, each a function that goes on until its target says that it is over."""
+"""Attacks on a master, each a function that runs until its target's time is over."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def called(method: str, *args: Any) -> bytes:
 
 
 def valued(value: bytes, key: str = "/attack") -> bytes:
-    """Return a setParam of a value that is XML already."""
+    """Return a setParam of a value that is already XML."""
     return post(
         b"<?xml version='1.0'?><methodCall><methodName>setParam</methodName><params><param><value>/bad</value>"
         b"</param><param><value>%s</value></param><param><value>"
@@ -47,12 +47,12 @@ def valued(value: bytes, key: str = "/attack") -> bytes:
 
 
 def array(item: bytes, count: int) -> bytes:
-    """Return an array of the same item."""
+    """Return an array that repeats an item."""
     return b"<array><data>" + item * count + b"</data></array>"
 
 
 def multicall(method: str, params: list[Any], count: int) -> bytes:
-    """Return a multicall of the same call."""
+    """Return a multicall that repeats a call."""
     call = dumps(([{"methodName": method, "params": params}],), "system.multicall").encode()
     start, end = call.index(b"<data>") + 6, call.rindex(b"</data>")
     return post(call[:start] + call[start:end] * count + call[end:])
@@ -62,7 +62,7 @@ def multicall(method: str, params: list[Any], count: int) -> bytes:
 
 
 class Target:
-    """The master that is attacked, and when to stop."""
+    """The attacked master, and the end of the attack."""
 
     def __init__(self, port: int, end: float) -> None:
         self.port = port
@@ -91,13 +91,13 @@ class Target:
             sender.join()
 
     def repeat(self, request: bytes, pause: float = 0.0) -> None:
-        """Exchange the same request again and again."""
+        """Exchange the same request repeatedly."""
         while not self.is_over:
             self.exchange(request)
             time.sleep(pause)
 
     def hold(self, request: bytes, count: int) -> None:
-        """Send it on many connections, and read nothing."""
+        """Send a request on many connections, and do not read."""
         while not self.is_over:
             with contextlib.ExitStack() as stack:
                 for _ in range(count):
@@ -161,7 +161,7 @@ def huge_tag(target: Target) -> None:
 
 
 def huge_comment(target: Target) -> None:
-    """Send an XML comment of 60 MiB, full of what ends a tag."""
+    """Send an XML comment of 60 MiB, full of tag end markers."""
     target.repeat(post(b"<methodCall><!-- " + b"> " * (HUGE // 2)))
 
 
@@ -223,7 +223,7 @@ def deep(target: Target) -> None:
 
 
 def whole_tree(target: Target) -> None:
-    """getParam of / by twenty clients, of a tree of 200,000 parameters, which one goes on changing."""
+    """Send getParam of / from twenty clients, for a tree of 200,000 parameters that one client keeps changing."""
     target.exchange(valued(array(b"<value><int>1</int></value>", 100_000), "/attack/array"))
     many = {f"p{number}": number for number in range(100_000)}
     target.exchange(called("setParam", "/bad", "/attack/tree", many))
@@ -234,25 +234,25 @@ def whole_tree(target: Target) -> None:
 
 
 def names_of_parameters(target: Target) -> None:
-    """getParamNames of 100,000 parameters by ten clients."""
+    """Send getParamNames of 100,000 parameters from ten clients."""
     many = {f"p{number}": number for number in range(100_000)}
     target.exchange(called("setParam", "/bad", "/attack/tree", many))
     _side_by_side([lambda: target.repeat(called("getParamNames", "/bad"))] * 10)
 
 
 def slow_readers(target: Target) -> None:
-    """200 clients that ask for 8 MiB each and read nothing."""
+    """Request 8 MiB each with 200 clients that do not read."""
     target.exchange(valued(b"x" * (8 * MIB), "/attack/large"))
     target.hold(called("getParam", "/bad", "/attack/large"), 200)
 
 
 def pipelines(target: Target) -> None:
-    """300 clients that send a thousand calls each in one go and read nothing."""
+    """Send a thousand calls each in one go with 300 clients that do not read."""
     target.hold(called("getParamNames", "/bad") * 1000, 300)
 
 
 def busy_connections(target: Target) -> None:
-    """1000 clients that request an array of 1,900 numbers again and again, each when it has its answer."""
+    """Request an array of 1,900 numbers repeatedly with 1000 clients, each after its previous response."""
     target.exchange(valued(array(b"<value><int>1</int></value>", 1900), "/attack/middling"))
     request = called("getParam", "/bad", "/attack/middling")
     with contextlib.ExitStack() as stack, selectors.DefaultSelector() as selector:
@@ -272,7 +272,7 @@ def busy_connections(target: Target) -> None:
 
 
 def half_bodies(target: Target) -> None:
-    """1000 clients that send 900 kB of a body of 60 MiB each."""
+    """Send 900 kB of a body of 60 MiB each with 1000 clients."""
     request = b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n" % HUGE + b"x" * 900_000
     while not target.is_over:
         with contextlib.ExitStack() as stack:
@@ -287,7 +287,7 @@ def half_bodies(target: Target) -> None:
 
 
 def endless_head(target: Target) -> None:
-    """1000 clients that send header lines without end."""
+    """Send endless header lines with 1000 clients."""
     target.hold(b"POST / HTTP/1.1\r\n" + b"X-Header: nothing\r\n" * 3000, 1000)
 
 
@@ -298,12 +298,12 @@ def small_chunks(target: Target) -> None:
 
 
 def silent_connections(target: Target) -> None:
-    """5,000 connections that say nothing."""
+    """Open 5,000 connections that send nothing."""
     target.hold(b"", 5000)
 
 
 def system_states(target: Target) -> None:
-    """getSystemState of a graph of 20,000 topics, by ten clients, while another one changes it."""
+    """Send getSystemState of a graph of 20,000 topics from ten clients, while another client changes it."""
     calls = [
         {
             "methodName": "registerPublisher",
@@ -320,7 +320,7 @@ def system_states(target: Target) -> None:
 
 
 def all_topics(target: Target) -> None:
-    """getTopicTypes and getPublishedTopics by ten clients, of as many topics as there may be."""
+    """Send getTopicTypes and getPublishedTopics from ten clients, with the maximum number of topics."""
     for first in range(0, 200_000, 5_000):
         calls = [
             {
@@ -338,7 +338,7 @@ def all_topics(target: Target) -> None:
 
 
 def new_addresses(target: Target) -> None:
-    """Register a node of 20,000 topics again and again from another address."""
+    """Register a node of 20,000 topics repeatedly from new addresses."""
     calls = [
         {"methodName": "registerPublisher", "params": ["/bad", f"/attack/n{n}", "a/B", "http://127.0.0.1:9/"]}
         for n in range(20_000)
@@ -353,7 +353,7 @@ def new_addresses(target: Target) -> None:
 
 
 def topic_subscribers(target: Target) -> None:
-    """Register 20,000 subscribers at a dead address, and a publisher that comes and goes."""
+    """Register 20,000 subscribers at a dead address, and a publisher that registers and unregisters."""
     calls = [
         {
             "methodName": "registerSubscriber",
@@ -369,7 +369,7 @@ def topic_subscribers(target: Target) -> None:
 
 
 def parameter_subscribers(target: Target) -> None:
-    """5,000 subscribers of a parameter that never answer, and large values for them."""
+    """Subscribe 5,000 nodes that never answer to a parameter, and set large values."""
     with socket.create_server(("127.0.0.1", 0), backlog=1) as dead:
         port = dead.getsockname()[1]
         calls = [
@@ -386,7 +386,7 @@ def parameter_subscribers(target: Target) -> None:
 
 
 def long_names(target: Target) -> None:
-    """Registrations with names of 10 MiB."""
+    """Register names of 10 MiB."""
     number = 0
     while not target.is_over:
         number += 1
@@ -397,7 +397,7 @@ def long_names(target: Target) -> None:
 
 
 def many_registrations(target: Target) -> None:
-    """Registrations of ever new nodes and topics, 5,000 in each multicall."""
+    """Register new nodes and topics continuously, 5,000 in each multicall."""
     number = 0
     while not target.is_over:
         calls = []
@@ -409,7 +409,7 @@ def many_registrations(target: Target) -> None:
 
 
 def many_values(target: Target) -> None:
-    """setParam of ever new strings of 8 MiB."""
+    """Set new strings of 8 MiB continuously."""
     number = 0
     while not target.is_over:
         number += 1
@@ -420,7 +420,7 @@ def many_values(target: Target) -> None:
 
 
 class FakePublisher:
-    """A Slave API and a TCPROS server that any number of nodes may be registered at: what connects is passed to ``serve``."""
+    """A Slave API and a TCPROS server for any number of registered nodes: connections are passed to ``serve``."""
 
     def __init__(self, target: Target, type_: InterfaceType, serve: Callable[[socket.socket], None]) -> None:
         self._target = target
@@ -475,27 +475,27 @@ class FakePublisher:
 
 
 def log_lines(target: Target) -> None:
-    """20 publishers of /rosout that send short lines as fast as they are read."""
+    """Publish short lines from 20 publishers of /rosout as fast as they are read."""
     _attack_rosout(target, _log("x" * 20) * 1000, 20)
 
 
 def long_log_lines(target: Target) -> None:
-    """5 publishers of /rosout that send texts of 20 MiB of control characters, and 20 subscribers that read nothing."""
+    """Publish strings of 20 MiB of control characters from 5 publishers of /rosout, with 20 subscribers that do not read."""
     _attack_rosout(target, _log("\x1b" * (20 * MIB)), 5, readers=20)
 
 
 def unread_log_lines(target: Target) -> None:
-    """5 publishers of /rosout that send texts of 200 kB, and 200 subscribers that read nothing."""
+    """Publish strings of 200 kB from 5 publishers of /rosout, with 200 subscribers that do not read."""
     _attack_rosout(target, _log("x" * 200_000), 5, readers=200)
 
 
 def half_log_lines(target: Target) -> None:
-    """300 publishers of /rosout that send the start of a text of 60 MiB and no more."""
+    """Send only the start of a string of 60 MiB from 300 publishers of /rosout."""
     _attack_rosout(target, _log("x" * HUGE)[: 5 * MIB], 300, repeats=False)
 
 
 def rosout_publishers(target: Target) -> None:
-    """9,000 publishers of /rosout at an address where nobody listens, which come and go."""
+    """Register and unregister 9,000 publishers of /rosout at an address without a listener."""
     calls = [
         {
             "methodName": "registerPublisher",
@@ -529,7 +529,7 @@ def _attack_rosout(
 
 
 def _topics_of(target: Target, topic: str) -> tuple[str, int]:
-    """Return where the /rosout node publishes."""
+    """Return the host and port at which the /rosout node publishes."""
     with ServerProxy(f"http://127.0.0.1:{target.port}") as master:
         uri = str(master.lookupNode("/bad", "/rosout")[2])  # type: ignore[index]
     with ServerProxy(uri) as node:

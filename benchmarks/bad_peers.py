@@ -1,10 +1,10 @@
-"""Peers that mean no good, against a node and a master of ours: what they cost, and whether the others notice.
+"""Malicious peers of a minirospy node and master: their cost, and their effect on well-behaved clients.
 
     python benchmarks/bad_peers.py [--peers N] [--json]
 
-Each row: the attack, memory (RSS) of the attacked process before, at its height, and after, in MiB, the lines that it
-logged meanwhile, and the seconds that a good client's call took at worst while the attack lasted. Exit status 1 where a
-good client got no answer.
+Each row: the attack; the memory (RSS) of the attacked process before, at its peak, and after, in MiB; the number of lines that
+it logged meanwhile; and the longest time in seconds of a well-behaved client's call during the attack. The exit status is 1 if
+a well-behaved client got no response.
 """
 
 from __future__ import annotations
@@ -60,13 +60,13 @@ class Row(NamedTuple):
     answered: bool
 
     def shown(self) -> str:
-        """Return the row for people."""
+        """Return the row as a line of text."""
         worst = f"{self.worst * 1000:9.1f} ms" if self.answered else "   NO ANSWER"
         return f"{self.attack:{_WIDTH}}  {self.before:6.1f}  {self.height:6.1f}  {self.after:6.1f}  {self.lines:5}  {worst}"
 
 
 class Victim:
-    """A process that is attacked: its memory, the lines that it logs, and a good client's question to it."""
+    """An attacked process: its memory, the lines that it logs, and a well-behaved client's call."""
 
     def __init__(self, command: list[str], environ: dict[str, str], ready: str) -> None:
         self.process = subprocess.Popen(
@@ -82,11 +82,11 @@ class Victim:
 
     @property
     def mib(self) -> float:
-        """Its resident memory."""
+        """Return its resident memory in MiB."""
         return float(self._memory.memory_info().rss) / MIB
 
     def close(self) -> None:
-        """End it."""
+        """Stop it."""
         self.process.terminate()
         try:
             self.process.wait(5)
@@ -106,16 +106,16 @@ class Victim:
 
 
 Attack = Callable[[int, int], "Iterator[None]"]
-"""(port, number of peers) -> the attack, a generator; the good client makes its calls between its yields."""
+"""(port, number of peers) -> the attack, a generator; the well-behaved client makes its calls between its yields."""
 
 
 def silent(port: int, peers: int) -> Iterator[None]:
-    """Connect, and say nothing."""
+    """Connect, and send nothing."""
     yield from _hold(port, peers, b"")
 
 
 def garbage(port: int, peers: int) -> Iterator[None]:
-    """Connect, and send 128 KiB of anything."""
+    """Connect, and send 128 KiB of arbitrary data."""
     yield from _hold(port, peers, random.Random(1).randbytes(131072))
 
 
@@ -135,20 +135,20 @@ def huge_length(port: int, peers: int) -> Iterator[None]:
 
 
 def huge_request(port: int, peers: int) -> Iterator[None]:
-    """Do a good handshake for a service, then send the length of a request, 1 GiB, and little of it."""
+    """Do a valid handshake for a service, then send a request's length, 1 GiB, and little of its data."""
     header = _header(callerid="/bad", service="/flag", md5sum="*", persistent="1")
     yield from _hold(port, min(peers, 150), header + struct.pack("<I", 2**30 - 1) + bytes(10000))
 
 
 def slow_subscribers(port: int, peers: int) -> Iterator[None]:
-    """Subscribe to a topic of 20 MB a second, and read nothing."""
+    """Subscribe to a topic of 20 MB a second, and do not read."""
     yield from _hold(
         port, min(peers, 100), _header(callerid="/bad", topic="/big", md5sum="*", type="*"), seconds=2.0
     )
 
 
 def slow_readers(port: int, peers: int) -> Iterator[None]:
-    """Ask the same thing 1000 times, and read no answer."""
+    """Send the same request 1000 times, and do not read the responses."""
     body = b"<methodCall><methodName>system.listMethods</methodName></methodCall>"
     request = b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n" % len(body) + body
     yield from _hold(port, min(peers, 150), request * 1000, seconds=1.0)
@@ -159,7 +159,7 @@ XMLRPC = (silent, garbage, half_request, slow_readers)
 
 
 def bad_publisher(master: str, frames: bytes) -> Callable[[int, int], Iterator[None]]:
-    """Return an attack by a publisher of /scan that sends ``frames`` again and again to each subscriber."""
+    """Return an attack by a publisher of /scan that sends ``frames`` repeatedly to each subscriber."""
 
     def bad_frames(_: int, __: int) -> Iterator[None]:
         from xmlrpc.server import SimpleXMLRPCServer
@@ -195,7 +195,7 @@ def _pour(sock: socket.socket, frames: bytes, end: float) -> None:
 
 
 def _hold(port: int, peers: int, data: bytes, seconds: float = 0.5) -> Iterator[None]:
-    """Open connections that send ``data`` and stay."""
+    """Open connections that send ``data`` and stay open."""
     with contextlib.ExitStack() as stack:
         for number in range(peers):
             with contextlib.suppress(OSError):
@@ -221,7 +221,7 @@ def _header(**fields: str) -> bytes:
 
 
 def measure(name: str, victim: Victim, attack: Attack, port: int, peers: int, ask: Callable[[], None]) -> Row:
-    """Attack, with a good client's questions in between."""
+    """Run an attack, with a well-behaved client's calls in between."""
     before = height = victim.mib
     lines = len(victim.lines)
     worst, answered = 0.0, True
@@ -238,7 +238,7 @@ def measure(name: str, victim: Victim, attack: Attack, port: int, peers: int, as
 
 
 def ask_node(api: str, service: str) -> None:
-    """Call the node's Slave API and its service once. Raise OSError without a good answer."""
+    """Call the node's Slave API and its service once. Raise OSError without a correct response."""
     with ServerProxy(api) as proxy:
         proxy.getPid("/good")
     with _connect(port_of(service)) as sock:

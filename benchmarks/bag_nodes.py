@@ -1,10 +1,10 @@
-"""`python benchmarks/bag_nodes.py`: `rosbag record` and `play` beside the C++ ones of Debian's ROS 1, in one run.
+"""`python benchmarks/bag_nodes.py`: `rosbag record` and `play` compared with the C++ ones of Debian's ROS 1, in one run.
 
-record: a publisher that waits for its subscriber sends images of 6 MB, then messages of 1 kB, as fast as it takes them;
-measured are the bytes a second that are in the bag when the recorder has ended, with the messages that are missing in
-it, its CPU time and its peak memory. play: how much later than stored each message arrives, from the earliest one on, at
-plain sockets, which are the same for all players. `--rounds 3` repeats all, in turns, and prints the medians of the rounds;
-`--folder` is where the bags go: the disk that is measured.
+record: a publisher that waits for its subscriber sends images of 6 MB, then messages of 1 kB, as fast as it accepts them.
+Measured are the bytes per second in the finished bag, the messages missing from it, CPU time and peak memory of the recorder.
+play: how much later than stored each message arrives, relative to the earliest one, at plain sockets, which are the same for
+all players. `--rounds 3` repeats all, alternating, and prints the medians of the rounds; `--folder` is the folder of the bags,
+and so the disk that is measured.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ def program(stack: str, verb: str) -> list[str]:
 
 
 def stacks() -> list[str]:
-    """Return the stacks that are here."""
+    """Return the stacks that are installed."""
     return ["C++", "minirospy"] if (CPP / "record").exists() else ["minirospy"]
 
 
 class Measured(NamedTuple):
-    """A case, the stack, and what was measured: names with their units, and values."""
+    """A case, the stack, and the measurements: names with their units, and values."""
 
     case: str
     stack: str
@@ -69,7 +69,7 @@ class Measured(NamedTuple):
 
 
 def record(stack: str, size: int, count: int, folder: Path) -> Measured:
-    """Record ``count`` messages of ``size`` bytes; return what was measured."""
+    """Record ``count`` messages of ``size`` bytes; return the measurements."""
     loop = LoopThread("publisher")
     node = Node(f"/bench_{time.time_ns()}", Environment.read())
     loop.run(node.start())
@@ -89,7 +89,7 @@ def record(stack: str, size: int, count: int, folder: Path) -> Measured:
     start = time.perf_counter()
     for _ in range(count):
         publication.publish(frame)
-    # What is in the sockets; a recorder that has lost messages cannot be waited for by their number.
+    # Wait for messages in the sockets; their number cannot be awaited, since a recorder may have lost some.
     time.sleep(_SETTLE_SECONDS)
     process.send_signal(signal.SIGINT)
     _, status, usage = os.wait4(process.pid, 0)
@@ -115,7 +115,7 @@ def record(stack: str, size: int, count: int, folder: Path) -> Measured:
 
 
 class Stream(NamedTuple):
-    """Messages of a bag on one topic: how many a second, and their size."""
+    """Messages of a bag on one topic: messages per second, and their size."""
 
     hz: float
     size: int
@@ -130,7 +130,7 @@ PLAYED = {
 
 
 def make_bag(path: Path, streams: list[Stream], seconds: float) -> list[int]:
-    """Write a bag of messages at irregular times, numbered through; return those times. Stream N is /bench/N."""
+    """Write a bag of numbered messages at irregular times; return those times. Stream N is /bench/N."""
     chance = random.Random(3)
     due = []
     for topic, stream in enumerate(streams):
@@ -154,7 +154,7 @@ def make_bag(path: Path, streams: list[Stream], seconds: float) -> list[int]:
 
 
 def subscribe(topic: str) -> socket.socket:
-    """Return a connection to the publisher of a topic, which may be about to start."""
+    """Return a connection to the publisher of a topic, which may not have started yet."""
     master: Any = xmlrpc.client.ServerProxy(os.environ["ROS_MASTER_URI"])
     end = time.monotonic() + 30
     while topic not in (published := dict(master.getSystemState("/bench")[2][0])):
@@ -176,7 +176,7 @@ def subscribe(topic: str) -> socket.socket:
 
 
 def receive(socks: list[socket.socket]) -> dict[int, int]:
-    """Return when each message came, by its number, until the publisher has ended."""
+    """Return the arrival time of each message, by its number, until the publisher has exited."""
     arrived: dict[int, int] = {}
     received = [bytearray() for _ in socks]
     space = bytearray(1 << 22)
@@ -199,7 +199,7 @@ def receive(socks: list[socket.socket]) -> dict[int, int]:
                 data += memoryview(space)[:count]
                 while len(data) >= 4 and len(data) >= (end := 4 + int.from_bytes(data[:4], "little")):
                     if not is_header[key.data]:
-                        # Behind the sizes of the message and of its text.
+                        # The number follows the sizes of the message and of its string.
                         arrived[int(data[8:16])] = now
                     is_header[key.data] = False
                     del data[:end]
@@ -207,7 +207,7 @@ def receive(socks: list[socket.socket]) -> dict[int, int]:
 
 
 def play(stack: str, path: Path, times: list[int], what: str) -> Measured:
-    """Play a bag; return how many microseconds later than stored its messages came."""
+    """Play a bag; return how many microseconds later than stored its messages arrived."""
     command = [*program(stack, "play"), str(path), "-d", "1", "-q"]
     with contextlib.ExitStack() as opened:
         process = opened.enter_context(
@@ -248,7 +248,7 @@ def medians(measured: list[Measured]) -> Iterator[Measured]:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> Iterator[Measured]:
-    """Yield what each case gives, round by round."""
+    """Yield the measurements of each case, round by round."""
     for _ in range(arguments.rounds):
         if "record" in arguments.cases:
             for size, count in ((6_000_000, arguments.megabytes // 6), (1000, arguments.megabytes * 250)):
@@ -264,7 +264,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> Iterator[Measured]:
 
 
 def main() -> None:
-    """Run what the command line selects."""
+    """Run the cases that the command line selects."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

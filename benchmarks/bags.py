@@ -1,10 +1,13 @@
-"""`python benchmarks/bags.py`: messages a second and memory of the rosbag API and commands, beside Debian's and rosbags.
+"""`python benchmarks/bags.py`: messages per second and memory of the rosbag API and commands, compared with Debian's and rosbags.
 
-Each case is a process: minirospy's, Debian's rosbag (where /usr/bin/python3 has it) and PyPI's rosbags, on the same bag. Rates
-are of CPU time, so that a busy machine disturbs them less; memory is the peak of the process. All modules are compiled before,
-as they are where packages are installed. `--messages 10000000 --cases open,list,filter` shows the memory of a large bag;
-`--large 5000 --cases info,info_mcap` the time for one of 5 GB and its MCAP twin; `--nodes 3` adds three rounds of bag_nodes.py:
-record and play beside the C++ ones.
+Each case is a process: minirospy's, Debian's rosbag (if /usr/bin/python3 has it) and PyPI's rosbags, on the same bag.
+Rates are
+by CPU time, so that a busy machine affects them less; memory is the peak of the process. All modules are compiled before,
+as in
+installed packages. `--messages 10000000 --cases open,list,filter` shows the memory for a large bag; `--large 5000 --cases
+info,info_mcap` the time for one of 5 GB and its MCAP counterpart; `--nodes 3` adds three rounds of bag_nodes.py: record
+and play
+compared with the C++ ones.
 """
 
 from __future__ import annotations
@@ -114,7 +117,7 @@ CASES = {
     "start": ("ms", ("minirospy", "Debian's rosbag")),
     "filter": ("ms", ("minirospy", "Debian's rosbag")),
 }
-"""What is measured -> its unit, and who takes part."""
+"""Case -> its unit, and the stacks that run it."""
 
 
 def make_bag(path: Path, messages: int, size: int, compression: str) -> None:
@@ -139,7 +142,7 @@ def make_bag(path: Path, messages: int, size: int, compression: str) -> None:
 
 
 def run(case: str, stack: str, path: Path, messages: int) -> list[float] | None:
-    """Return how many were done, CPU seconds, seconds and MB of one process; None if the peer is missing."""
+    """Return the number of messages, CPU seconds, seconds and MB of one process; None if the stack is missing."""
     if case in ("info", "info_mcap", "start", "filter"):
         return command(case, stack, path)
     python, program = {
@@ -161,7 +164,7 @@ def run(case: str, stack: str, path: Path, messages: int) -> list[float] | None:
 
 
 def command(case: str, stack: str, path: Path) -> list[float] | None:
-    """Return the same for a command, its start included."""
+    """Return the same for a command, including its start."""
     program = Path(sys.executable).with_name("rosbag") if stack == "minirospy" else Path("/usr/bin/rosbag")
     if not program.exists():
         return None

@@ -1,9 +1,9 @@
-"""`python benchmarks/bridge.py`: what the bridge costs, beside foxglove-sdk's server where it is installed, in one run.
+"""`python benchmarks/bridge.py`: the cost of the bridge, compared with foxglove-sdk's server if it is installed, in one run.
 
-Image: 640x480 RGB at 30 Hz to five clients. Topics: 1,000 at 1 Hz to one client. Latency: what a client waits longer than a
-ROS subscriber. Stuck: ten clients of the image, of which one reads nothing. Soak: at least as many messages as an hour of images
-has, to five clients that come and go. The peer is a program with the same subscription whose server is that of foxglove-sdk
-(pip install foxglove-sdk), written in Rust. CPU is that of the server's process, in percent of one core.
+Image: 640x480 RGB at 30 Hz to five clients. Topics: 1,000 at 1 Hz to one client. Latency: a client's additional delay compared
+with a ROS subscriber. Stuck: ten clients of the image, one of which does not read. Soak: at least as many messages as an hour
+of images, to five clients that connect and disconnect. The peer is a program with the same subscription and foxglove-sdk's
+server (pip install foxglove-sdk), written in Rust. CPU is that of the server's process, in percent of one core.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def free_port() -> int:
 
 
 class Reader:
-    """One client: subscribes to all topics with a prefix and counts what comes."""
+    """A client that subscribes to all topics with a prefix and counts messages."""
 
     def __init__(self, port: int, prefix: str) -> None:
         self.sock = socket.create_connection(("127.0.0.1", port))
@@ -54,7 +54,7 @@ class Reader:
         assert head.startswith(b"HTTP/1.1 101"), head
 
     def read(self) -> bool:
-        """Take over what has come; return whether the connection is open."""
+        """Read the received data; return whether the connection is open."""
         if self._end == len(self._buffer):
             rest = self._buffer[self._start : self._end]
             if len(rest) > len(self._buffer) // 2:
@@ -93,7 +93,7 @@ class Reader:
 
     def _text(self, fields: dict) -> None:
         if fields["op"] == "status" and "unknown channel" in fields["message"]:
-            # foxglove-sdk may offer a channel before it takes subscriptions of it.
+            # foxglove-sdk may advertise a channel before it accepts subscriptions to it.
             time.sleep(0.05)
             self._send(0x81, self._asked)
         if fields["op"] != "advertise":
@@ -113,7 +113,7 @@ class Reader:
 
 
 def clients(port: int, prefix: str, count: int, seconds: float, topics: int, stuck: int, lives: int) -> None:
-    """Role: read with so many clients for this long; print what came in the second half of the waiting."""
+    """Role: run ``count`` clients for this long; print the messages of the second half."""
     selector = selectors.DefaultSelector()
     readers = []
 
@@ -134,7 +134,7 @@ def clients(port: int, prefix: str, count: int, seconds: float, topics: int, stu
             if not key.data.read():
                 selector.unregister(key.data.sock)
         for reader in [each for each in readers if lives and each.messages >= lives]:
-            # It leaves, and another one comes.
+            # The client disconnects, and another one connects.
             selector.unregister(reader.sock)
             reader.sock.close()
             gone.append(reader.messages)
@@ -171,7 +171,7 @@ def clients(port: int, prefix: str, count: int, seconds: float, topics: int, stu
 
 
 async def publish(kind: str, rate: float, size: int, topics: int) -> None:
-    """Role: publish until standard input ends."""
+    """Role: publish until stdin is closed."""
     from sensor_msgs.msg import Image
     from std_msgs.msg import UInt8MultiArray, UInt64
 
@@ -205,7 +205,7 @@ async def publish(kind: str, rate: float, size: int, topics: int) -> None:
 
 
 async def relay(port: int) -> None:
-    """Role: the peer, foxglove-sdk's server with the same subscriptions."""
+    """Role: run the peer, foxglove-sdk's server with the same subscriptions."""
     import foxglove
 
     from minirospy import Node
@@ -236,7 +236,7 @@ async def relay(port: int) -> None:
 
 
 async def direct(seconds: float) -> None:
-    """Role: a ROS subscriber of the delay's topic; print its median and 99th percentile in milliseconds."""
+    """Role: run a ROS subscriber of the delay's topic; print its median and 99th percentile in milliseconds."""
     from minirospy import Node
 
     delays: list[int] = []
@@ -252,7 +252,7 @@ async def direct(seconds: float) -> None:
 
 
 class Run:
-    """A master and a server, which end with the block."""
+    """A master and a server, which are stopped at the end of the block."""
 
     def __init__(self, server: str) -> None:
         master_port, self.port = free_port(), free_port()
@@ -312,7 +312,7 @@ class Run:
 
 
 def measured(run: Run, seconds: float, **options: object) -> tuple[dict, float, float]:
-    """Return what the clients saw, the server's CPU in percent, and its memory in MB."""
+    """Return the clients' results, the server's CPU in percent, and its memory in MB."""
     child = run.clients(seconds=seconds, **options)
     before, start = run.cpu(), time.monotonic()
     time.sleep(seconds * 0.9)
@@ -356,7 +356,7 @@ def stuck(server: str, seconds: float) -> dict[str, float]:
 
 
 def soak(server: str, seconds: float) -> dict[str, float]:
-    """Messages of 20 kB, as many as go through; an hour of images at 30 Hz has 540,000 for five clients."""
+    """Send messages of 20 kB, as many as possible; an hour of images at 30 Hz has 540,000 for five clients."""
     with Run(server) as run:
         run.start(Run.role("publish", kind="flood", rate=1e6, size=20_000, topics=1))
         child = run.clients(seconds=seconds, count=5, lives=2000)

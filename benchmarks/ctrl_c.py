@@ -1,7 +1,7 @@
 """Ctrl-C at random moments of a publisher, a subscriber, a service, an action server and a launch file.
 
-Usage: python benchmarks/ctrl_c.py [TRIALS]. Prints for each how long the program takes to end, and every trial that shows a
-traceback, another exit status than 0, a program that hangs, or a node that the master still knows. Needs no running master.
+Usage: python benchmarks/ctrl_c.py [TRIALS]. Prints for each how long the program takes to exit, and every trial with a
+traceback, an exit status other than 0, a hanging program, or a node that the master still knows. Needs no running master.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ while not rospy.is_shutdown():
 
 
 def trial(command: list[str], uri: str, folder: str, marks: int) -> tuple[float, str]:
-    """Run a program and send SIGINT at a random moment; return how long it took to end, and what went wrong."""
+    """Run a program and send SIGINT at a random moment; return the time until it exited, and the fault."""
     process = subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
@@ -120,7 +120,7 @@ def trial(command: list[str], uri: str, folder: str, marks: int) -> tuple[float,
         line = process.stdout.readline()
         assert line, process.communicate()
         marks -= line.startswith("ready")
-    # No event serves: the moment is to be a random one.
+    # Sleep, since the moment must be random.
     time.sleep(random.random())
     process.send_signal(signal.SIGINT)
     start = time.monotonic()
@@ -142,7 +142,7 @@ def trial(command: list[str], uri: str, folder: str, marks: int) -> tuple[float,
 
 
 def main() -> int:
-    """Run the trials; the status is 1 where one of them failed."""
+    """Run the trials; return 1 if one of them failed."""
     trials = int(sys.argv[1]) if len(sys.argv) > 1 else 100
     loop = LoopThread("master")
 

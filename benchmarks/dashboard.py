@@ -1,10 +1,11 @@
-"""`PYTHONPATH=. python benchmarks/dashboard.py [page] [clients] [soak]`: what the page draws, and what its server costs.
+"""`PYTHONPATH=. python benchmarks/dashboard.py [page] [clients] [soak]`: the page's frame rate, and the cost of its server.
 
 page: a layout in headless chromium with an image of 640x480 RGB at 30 Hz, ten plots of a scan of 1651 beams at 33 Hz, and the
-topics with the scan open; frames a second by requestAnimationFrame. clients: ten programs that speak what the page speaks, on
-50 topics in fast motion: memory of the server and of a client over the run, and the server's CPU for each MB that it sends.
-soak: ten such clients and two pages in chromium, on 50 topics, a scan, and frames that move, all in fast motion: at 100 Hz, until
-each client has had the messages that an hour has at 10 Hz; memory of the server, the clients and the pages over the run.
+topics with the scan open; frames per second by requestAnimationFrame. clients: ten programs that use the page's protocol, on
+50 topics at a raised rate: memory of the server and of a client over the run, and the server's CPU for each MB that it sends.
+soak: ten such clients and two pages in chromium, on 50 topics, a scan, and moving frames, all at a raised rate of 100 Hz,
+until
+each client has received as many messages as in an hour at 10 Hz; memory of the server, the clients and the pages over the run.
 --pages 10: eight more pages have the 50 topics open.
 CPU is that of a process, in percent of one core.
 """
@@ -154,7 +155,7 @@ def cpu(process: psutil.Process) -> float:
 
 
 def measure_page(seconds: float) -> None:
-    """Print the frames a second of a page with a scan, an image and ten plots."""
+    """Print the frames per second of a page with a scan, an image and ten plots."""
     from tests.interop.browser import Page
 
     plots = ",".join(f"plot?path=%252Fscan%252Franges[{index}:{index + 2}]" for index in range(0, 20, 2))
@@ -185,7 +186,7 @@ def columns(plots: str) -> str:
 
 
 class Client(threading.Thread):
-    """Subscribes to all topics of a name's beginning, as the page does, and counts."""
+    """Subscribes to all topics with a prefix, as the page does, and counts messages."""
 
     def __init__(self, port: int) -> None:
         super().__init__(daemon=True)
@@ -307,7 +308,7 @@ def measure_soak(hours: float, rate: float, count_of_clients: int, count_of_page
 
 
 def memory_of(process: psutil.Process) -> float:
-    """Return what a process has for itself, in MB; 0 if it has ended."""
+    """Return a process's private memory, in MB; 0 if it has exited."""
     with contextlib.suppress(psutil.NoSuchProcess):
         full = process.memory_full_info()
         return float(getattr(full, "uss", full.rss)) / 1e6
@@ -315,7 +316,7 @@ def memory_of(process: psutil.Process) -> float:
 
 
 def main() -> None:
-    """Measure what the words name, by default all."""
+    """Run the measurements that the arguments select, by default all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", nargs="*", default=["page", "clients"], choices=["page", "clients", "soak"])
     parser.add_argument("--seconds", type=float, default=10.0, help="of the measurement")

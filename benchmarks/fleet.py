@@ -1,11 +1,11 @@
 """`python benchmarks/fleet.py`: a simulated fleet of 10 to 1,000 robots, and one real control room.
 
-Robots are sessions of Zenoh that declare what a gateway declares, in a few processes; the control room is a real gateway with
-a real master. As root on Linux with `ip`, robots are in a network namespace of their own, behind a link with delay and loss
-(slow_link.py), and their traffic is what this link counts; elsewhere all is on loopback, and traffic and cuts are left out.
-Printed for each number of robots: seconds until the control room's master has all names, bytes a second of each robot while
-nobody subscribes (both directions, with the headers of TCP, IP and Ethernet), seconds from a cut of the link until all are
-gone, and from its end until all are there again.
+Robots are Zenoh sessions with a gateway's declarations, in a few processes; the control room is a real gateway with a
+real master. As root on Linux with `ip`, robots are in a separate network namespace, behind a link with delay and loss
+(slow_link.py), which counts their traffic; otherwise all is on loopback, and traffic and cuts are left out.
+Printed for each number of robots: seconds until the control room's master has all names; bytes per second of each robot
+without subscribers (both directions, with TCP, IP and Ethernet headers); seconds from a cut of the link until all are
+gone, and from its end until all are back.
 """
 
 import argparse
@@ -26,10 +26,9 @@ PROCESSES = 4
 TOPICS = 7
 SETTLE_SECONDS, QUIET_SECONDS = 8.0, 60.0
 CUT_SECONDS = 15.0
+# Of the link in each direction: milliseconds, milliseconds, percent of the frames.
 DELAY, JITTER, LOSS = 20, 5, 1
-"""Of the link, in each direction: milliseconds, and percent of the frames."""
-MAX_SECONDS = 300
-"""How long a cut is waited for, and the recovery from it."""
+MAX_SECONDS = 300  # limit for detecting a cut, and for the recovery from it
 PORT = 27447
 MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 
@@ -38,8 +37,9 @@ MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 
 
 async def robots(endpoint, first, count):
-    """Be so many robots, until the standard input ends."""
-    # A thread of Zenoh waits 10 s when it closes a dead link. Of a robot that is one: here each has a thread, too.
+    """Simulate ``count`` robots until stdin is closed."""
+    # A Zenoh thread waits 10 s when it closes a dead link. A real robot has one link: here each link has a thread,
+    # too.
     pools = ", ".join(f"{pool}: (worker_threads: {count})" for pool in ("rx", "tx", "net", "acc", "app"))
     os.environ.setdefault("ZENOH_RUNTIME", f"({pools})")
     from minirospy.fleet.keys import ROOT, Claim, ServiceToken, TopicToken, claim_key, service_key, topic_key
@@ -56,7 +56,7 @@ async def robots(endpoint, first, count):
         def ignore(*_):
             pass
 
-        # What is not kept is undeclared.
+        # Keep references: a subscription without one is undeclared.
         kept = [network.subscribe(f"{ROOT}/in/{ends}/**", ignore)]
         answered = ("ping/{0}", "status/{0}", "definition/{0}/*/*", "call/{1}/**", "param/{1}")
         kept += [network.answer(f"{ROOT}/{key.format(gateway, ends)}", pong) for key in answered]
@@ -91,7 +91,7 @@ async def robots(endpoint, first, count):
 
 
 async def control(endpoint, expected):
-    """Show the fleet; print how long it takes, and, at each line of the standard input, how long until all is shown again."""
+    """Show the fleet; print how long it takes, and, for each line on stdin, how long until all is shown again."""
     from minirospy import Node
     from minirospy.base.errors import MasterUnreachableError
     from minirospy.fleet.gateway import Gateway, GatewayOptions
@@ -104,12 +104,12 @@ async def control(endpoint, expected):
     names = expected * (TOPICS + 1)
 
     async def shown(count):
-        """Return when the master has so many names of robots."""
+        """Return when the master has names of ``count`` robots."""
         while True:
             try:
                 state = await node._node.master("getSystemState")
             except MasterUnreachableError:
-                # It shares the cores with a thousand robots that come back.
+                # Poll rarely: this process shares the cores with a thousand robots that reconnect.
                 await asyncio.sleep(1.0)
                 continue
             every = {name for table in state for name, _ in table}
@@ -179,17 +179,17 @@ class Network:
             raise OSError("slow_link.py has not started")
 
     def switch(self, state):
-        """Cut the link ("down"), and mend it ("up")."""
+        """Cut the link ("down"), and restore it ("up")."""
         self._sh(f"ip -n {self.names[1]} link set {DEVICE} {state}")
 
     def count(self):
-        """Return the bytes that have passed the link, both directions."""
+        """Return the bytes that have passed the link, in both directions."""
         text = subprocess.check_output(["ip", "-n", self.names[0], "-s", "-j", "link", "show", DEVICE])
         stats = json.loads(text)[0]["stats64"]
         return stats["rx"]["bytes"] + stats["tx"]["bytes"]
 
     def start(self, is_far, *words, **options):
-        """Start this program in a side of the network."""
+        """Start this program on one side of the network."""
         inside = ["ip", "netns", "exec", self.names[is_far]] if self.is_isolated else []
         environ = {**os.environ, "ROS_HOSTNAME": "localhost"}
         return subprocess.Popen(
@@ -202,7 +202,7 @@ class Network:
 
 
 def request(process, line):
-    """Return the answer of a process to a line: seconds, or that they are too many."""
+    """Return a process's answer to a line: seconds, or that the limit was exceeded."""
     process.stdin.write(f"{line}\n")
     process.stdin.flush()
     limit = threading.Timer(MAX_SECONDS, process.kill)
@@ -215,7 +215,7 @@ def request(process, line):
 
 
 def measure(network, count, *, cuts):
-    """Return the results for so many robots; ``cuts``: also those of a link that is cut."""
+    """Return the results for ``count`` robots; ``cuts``: also those of a link that is cut."""
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     running = []
 
@@ -244,7 +244,7 @@ def measure(network, count, *, cuts):
         results["discovery, s"] = round(json.loads(room.stdout.readline()), 2)
         results["names"] = count * (TOPICS + 1)
         if network.is_isolated:
-            time.sleep(SETTLE_SECONDS)  # clocks are measured once
+            time.sleep(SETTLE_SECONDS)  # clocks are synchronized once
             before, since = network.count(), time.monotonic()
             time.sleep(QUIET_SECONDS)
             passed = (network.count() - before) / (time.monotonic() - since)

@@ -1,7 +1,7 @@
-"""`make guard`: has minirospy become slower? Ends with status 1 where it has.
+"""`make guard`: detect whether minirospy has become slower. The exit status is 1 if it has.
 
-No time of a machine says that, so none is looked at: in one run, CPU seconds of all processes that take part are
-set beside those of plain sockets in plain Python (the yardstick). Each ratio has a limit, about twice what it is.
+Absolute times depend on the machine, so they are not compared: in one run, the CPU seconds of all participating processes are
+divided by those of plain sockets in plain Python (the yardstick). The limit of each ratio is about twice its usual value.
 """
 
 from __future__ import annotations
@@ -21,12 +21,11 @@ import psutil
 
 SECONDS = 0.7
 IMAGE = 921_600
-TRIES = 4
-"""Runs before a ratio over its limit counts: noise of the machine passes, a slowdown stays."""
+TRIES = 4  # runs before a ratio over its limit counts: noise of the machine passes, a slowdown stays
 
 
 class Limit(NamedTuple):
-    """The limit of one ``case``: this many times the cost of one ``yardstick``."""
+    """The limit of one ``case``: a multiple of the cost of one ``yardstick``."""
 
     case: str
     yardstick: str
@@ -44,14 +43,14 @@ LIMITS = [
 
 
 class Meter:
-    """CPU microseconds that a step costs, of this process and of the others that take part."""
+    """Measures CPU microseconds per step, of this process and of the other participating processes."""
 
     def __init__(self) -> None:
         self.others: list[psutil.Process] = []
         self.costs: dict[str, float] = {}
 
     def measure(self, name: str, step: Callable[[], int]) -> None:
-        """Call ``step`` for a while; it returns how often it did what is measured."""
+        """Call ``step`` for a while; it returns how many operations it has done."""
         step()
         start, count, end = self._spent(), 0, time.monotonic() + SECONDS
         while time.monotonic() < end:
@@ -65,7 +64,7 @@ class Meter:
 
 @contextmanager
 def started(*command: str) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a process that ends with the block."""
+    """Run a process that is stopped at the end of the block."""
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     try:
         yield process
@@ -108,7 +107,7 @@ def echo(port: str) -> None:
 
 
 def peer() -> None:
-    """Run the node at the other end."""
+    """Run the node on the other side."""
     import rospy
     from sensor_msgs.msg import Image
     from std_msgs.msg import UInt64
@@ -119,7 +118,7 @@ def peer() -> None:
     rospy.Subscriber("/requests", UInt64, answers.publish, tcp_nodelay=True)
     rospy.Subscriber("/stream", UInt64, lambda message: answers.publish(message) if message.data else None)
     rospy.Subscriber("/images", Image, lambda message: answers.publish(len(message.data)))
-    # The other end waits for the service: by then it receives what is published here.
+    # The peer waits for the service: by then it receives the messages published here.
     answers.wait_for_subscribers(1, 10)
     rospy.Service("/service", SetBool, lambda request: (request.data, ""))
     rospy.spin()
@@ -193,7 +192,7 @@ def measure_ours(meter: Meter, others: list[psutil.Process]) -> None:
 
 
 def wait_for_port(port: int) -> None:
-    """Return when somebody listens there."""
+    """Return when a server listens on the port."""
     end = time.monotonic() + 20
     while time.monotonic() < end:
         try:
@@ -205,7 +204,7 @@ def wait_for_port(port: int) -> None:
 
 
 def measure_all() -> dict[str, float]:
-    """Return the CPU microseconds of each case and yardstick, with a master and a peer of this run."""
+    """Return the CPU microseconds of each case and yardstick, with a new master and peer."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = str(probe.getsockname()[1])
@@ -238,7 +237,7 @@ def report(costs: dict[str, float]) -> list[str]:
 
 
 def main() -> int:
-    """Measure, again where a ratio is over its limit, and return the exit status."""
+    """Measure, again if a ratio is over its limit, and return the exit status."""
     for _ in range(TRIES):
         # A new process each time: a node cannot be started twice in one.
         result = subprocess.run([sys.executable, __file__, "once"], check=False)

@@ -1,12 +1,14 @@
-"""Clients of the dashboard and of rosbridge that mean no good, beside a page that drives a robot.
+"""Malicious clients of the dashboard and of rosbridge, while a page drives a robot.
 
     python benchmarks/hostile_clients.py [--clients 8 64 250] [--seconds N] [--writers] [ATTACK ...]
 
-Each row is a new server that so many clients attack, which have the read-only token (``--writers``: none, which on loopback is
-the right to write). Beside them a reader, and a writer that has the read-write token, send a request every 50 ms and wait for its
-answer. A page drives a robot at 20 Hz, which is a subscriber of plain sockets, and at the end falls silent. Columns: the longest
-wait of the reader and of the writer, the longest gap between two velocities at the robot, the time from the last command to the
-zero velocity (0.5 s are intended), in milliseconds, and the server's memory (RSS) at its height in MiB. Each attack ends by
+Each row is a new server under attack by this number of clients, which have the read-only token (``--writers``: none, which on
+loopback gives the right to write). Meanwhile a reader, and a writer with the read-write token, send a request every 50 ms and
+wait for its response. A page drives a robot, a subscriber with plain sockets, at 20 Hz, and at the end falls silent.
+Columns: the
+longest wait of the reader and of the writer, the longest gap between two velocities at the robot, the time from the last
+command
+to the zero velocity (0.5 s are intended), all in milliseconds, and the server's peak memory (RSS) in MiB. Each attack stops by
 itself; everything is on loopback.
 """
 
@@ -35,8 +37,8 @@ BIN = Path(sys.executable).parent
 READ_TOKEN, WRITE_TOKEN = "read-token-0", "write-token-0"
 TOPIC = "/cmd_vel"
 REQUEST = b'{"op":"subscribe","subscriptions":[{"id":1,"channelId":999999}]}'
-PERIOD = 0.05  # seconds between two requests of a good client, and two commands of the page
-PATIENCE = 30.0  # seconds that a good client waits for an answer
+PERIOD = 0.05  # seconds between two requests of a well-behaved client, and two commands of the page
+PATIENCE = 30.0  # seconds that a well-behaved client waits for a response
 CHUNK = 256 * 1024
 MASK = bytes(4)
 
@@ -53,7 +55,7 @@ def frame(opcode: int, data: bytes, *, is_final: bool = True) -> bytes:
 
 
 class Attack(NamedTuple):
-    """``endpoint``: the port; ``first`` is sent once, then ``again`` until the end; ``reads``: whether answers are read."""
+    """``endpoint``: the port; ``first`` is sent once, then ``again`` until the end; ``reads``: whether responses are read."""
 
     endpoint: str
     first: bytes
@@ -135,9 +137,9 @@ def connect(port: int, token: str, protocol: str) -> socket.socket:
 
 
 def attack_for(name: str, ports: dict[str, int], count: int, seconds: float, token: str) -> None:
-    """Role: attack with so many clients; print a line once they are connected."""
+    """Role: attack with ``count`` clients; print a line once they are connected."""
     if hasattr(os, "SCHED_OTHER"):
-        # `chrt -r 20 python benchmarks/...` is for those that are measured.
+        # Only the measured processes should have the priority of `chrt -r 20 python benchmarks/...`.
         with contextlib.suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     attack = attacks()[name]
@@ -201,7 +203,7 @@ def _flood(port: int, request: bytes, count: int, end: float) -> None:
 
 
 async def serve() -> None:
-    """Role: the dashboard with rosbridge; print its ports and the URI of its node, and run until standard input ends."""
+    """Role: run the dashboard with rosbridge; print its ports and its node's URI, and run until stdin is closed."""
     from minirospy.runtime.master.heap import return_large_blocks
 
     from minirospy import Node
@@ -229,7 +231,7 @@ async def serve() -> None:
 
 
 async def _publish_big(node: Any) -> None:
-    """Publish texts of 100 kB at 10 Hz, which clients may subscribe to."""
+    """Publish strings of 100 kB at 10 Hz, to which clients may subscribe."""
     from std_msgs.msg import String
 
     publisher = await node.advertise("/big", String, queue_size=10)
@@ -242,7 +244,7 @@ async def _publish_big(node: Any) -> None:
 
 
 class Asker(threading.Thread):
-    """A good client: the longest wait for an answer. ``lost``: why it has none any more."""
+    """A well-behaved client: the longest wait for a response. ``lost``: why it gets no more responses."""
 
     def __init__(self, port: int, token: str) -> None:
         super().__init__(daemon=True)
@@ -254,7 +256,7 @@ class Asker(threading.Thread):
         self._sock = connect(port, token, "foxglove.sdk.v1")
 
     def run(self) -> None:
-        """Ask and wait for the answer, until the end."""
+        """Send requests and wait for the responses, until the end."""
         try:
             while not self._ended.wait(PERIOD):
                 self.since = start = time.monotonic()
@@ -267,7 +269,7 @@ class Asker(threading.Thread):
             self.lost = str(error) or type(error).__name__
 
     def end(self) -> None:
-        """End it, after the answer that it waits for."""
+        """Stop it, after the pending response."""
         self._ended.set()
         self.join(PATIENCE)
         self._sock.close()
@@ -292,7 +294,7 @@ class Asker(threading.Thread):
 
 
 class Robot(threading.Thread):
-    """A subscriber of the velocities: the longest gap between two while it is driven, and when a zero came."""
+    """A subscriber of the velocities: the longest gap between two while it is driven, and the time of a zero velocity."""
 
     def __init__(self, uri: str) -> None:
         super().__init__(daemon=True)
@@ -312,14 +314,14 @@ class Robot(threading.Thread):
         self.has_stopped = threading.Event()
 
     def run(self) -> None:
-        """Read until the connection ends."""
+        """Read until the connection is closed."""
         last = 0.0
         with contextlib.suppress(OSError):
             while True:
                 moves = any(self._exactly(struct.unpack("<I", self._exactly(4))[0]))
                 now = time.monotonic()
                 if moves:
-                    # A gap begins and ends with a velocity: a zero of the guard between them is part of it.
+                    # A gap starts and ends with a velocity: a zero of the guard in between is part of it.
                     if last:
                         self.longest = max(self.longest, now - last)
                     last = now
@@ -330,7 +332,7 @@ class Robot(threading.Thread):
                     self.has_stopped.set()
 
     def close(self) -> None:
-        """End it."""
+        """Close the connection."""
         with contextlib.suppress(OSError):
             self._sock.shutdown(socket.SHUT_RDWR)
         if self.ident:
@@ -348,7 +350,7 @@ class Robot(threading.Thread):
 
 
 class Row(NamedTuple):
-    """What an attack cost; times in milliseconds."""
+    """The cost of an attack; times in milliseconds."""
 
     attack: str
     clients: int
@@ -360,7 +362,7 @@ class Row(NamedTuple):
     lost: str
 
     def shown(self) -> str:
-        """Return the row for people."""
+        """Return the row as a line of text."""
         return (
             f"{self.attack:22} {self.clients:7} {self.reader:7.0f} {self.writer:7.0f} {self.gap:7.0f} "
             f"{self.stop:7.0f} {self.memory:7.0f}  {self.lost}"
@@ -369,7 +371,7 @@ class Row(NamedTuple):
 
 @contextlib.contextmanager
 def started(words: list[str], environ: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
-    """Run a process that ends with the block."""
+    """Run a process that is stopped at the end of the block."""
     process = subprocess.Popen(
         words,
         env=environ,
@@ -391,7 +393,7 @@ def role(kind: str, **options: object) -> list[str]:
 
 
 def measure(name: str, clients: int, seconds: float, environ: dict[str, str], token: str) -> Row:
-    """Attack a new server; return what it cost."""
+    """Attack a new server; return the cost."""
     with contextlib.ExitStack() as stack:
         server = stack.enter_context(started(role("serve"), environ))
         assert server.stdout
@@ -420,13 +422,13 @@ def measure(name: str, clients: int, seconds: float, environ: dict[str, str], to
         assert attackers.stdout
         for thread in (reader, writer, robot):
             thread.start()
-        # The attackers connect, then send; what is measured starts before.
+        # The attackers connect, then send; the measurement starts before.
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             last = time.monotonic()
             driver.sendall(forward)
             time.sleep(PERIOD)
-        # It holds its velocity and says nothing more, as a page that hangs.
+        # The page holds its velocity and sends nothing more, as if it hung.
         stopped = robot.is_moving.wait(PATIENCE) and robot.has_stopped.wait(PATIENCE)
         stop = time.monotonic() - last if stopped else PATIENCE
         for asker in (reader, writer):
@@ -444,7 +446,7 @@ def measure(name: str, clients: int, seconds: float, environ: dict[str, str], to
 
 
 class Height(threading.Thread):
-    """The memory of a process at its height, looked at a hundred times a second."""
+    """The peak memory of a process, sampled a hundred times a second."""
 
     def __init__(self, pid: int) -> None:
         super().__init__(daemon=True)
@@ -454,19 +456,19 @@ class Height(threading.Thread):
         self.start()
 
     def run(self) -> None:
-        """Look until the end."""
+        """Sample until the end."""
         with contextlib.suppress(psutil.Error):
             while not self._ended.wait(0.01):
                 self.height = max(self.height, self._process.memory_info().rss)
 
     def end(self) -> None:
-        """End it."""
+        """Stop sampling."""
         self._ended.set()
         self.join(5)
 
 
 def _until(make: Callable[[], Robot]) -> Robot:
-    """Return what is made as soon as the topic is there."""
+    """Return the robot as soon as the topic exists."""
     end = time.monotonic() + PATIENCE
     while True:
         try:
@@ -479,7 +481,7 @@ def _until(make: Callable[[], Robot]) -> Robot:
 
 @contextlib.contextmanager
 def master() -> Iterator[dict[str, str]]:
-    """Run a master; give the environment of its nodes."""
+    """Run a master; yield the environment of its nodes."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     environ = {
@@ -521,7 +523,7 @@ def main() -> int:
     unknown = set(options.names) - set(attacks())
     if unknown:
         parser.error(f"there is no attack {', '.join(sorted(unknown))}")
-    clients = [min(max(1, each), 250) for each in options.clients]  # a listener keeps 256 connections
+    clients = [min(max(1, each), 250) for each in options.clients]  # a listener accepts 256 connections
     seconds = min(options.seconds, 60.0)
     token = "" if options.writers else READ_TOKEN
     if not options.json:

@@ -1,12 +1,12 @@
-"""The master under load, ours beside real rosmaster: CPU of a registration, memory of a node, look-ups.
+"""The master under load, minirospy's compared with real rosmaster: CPU of a registration, memory of a node, look-ups.
 
-    python benchmarks/master.py                           # ours, and rosmaster where it is installed
+    python benchmarks/master.py                           # minirospy's, and rosmaster if it is installed
     python benchmarks/master.py --sizes 100,1000,10000 --stacks "ours,ours without rosout"
 
-Ours runs under the interpreter that runs this file: rosmaster's (/usr/bin/python3) makes a fair comparison.
+minirospy's runs under the interpreter that runs this file: use rosmaster's (/usr/bin/python3) for a fair comparison.
 
 Fake nodes of three publications and three subscriptions register by raw XML-RPC from one client, as in the case
-`master` of the workshop's benchmark; a dummy answers for all of them. CPU and memory are the master's alone.
+`master` of the workshop's benchmark; a dummy answers for all of them. CPU and memory are the master's only.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ REPLY = b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\nContent-Length: %d\r\n\r\
 
 
 class Dummy:
-    """A Slave API that says yes to everything, and counts."""
+    """A Slave API that answers every call with success, and counts the calls."""
 
     def __init__(self) -> None:
         self.calls = 0
@@ -71,7 +71,7 @@ class Dummy:
 
 
 class Client:
-    """One connection, as little work as can be."""
+    """A client with one connection and minimal overhead."""
 
     def __init__(self, port: int) -> None:
         self._sock = socket.create_connection(("127.0.0.1", port))
@@ -144,7 +144,7 @@ def _measured(program: psutil.Process, port: int, sizes: list[int], dummy: Dummy
         figures[f"registrations_per_s_{size}"] = count / seconds
         figures[f"kB_per_node_{size}"] = (program.memory_info().rss - first_rss) / size / 1024
         client, used = Client(port), cpu()
-        # Many calls: the system counts CPU time in ticks of 10 ms.
+        # Many calls, because the system counts CPU time in ticks of 10 ms.
         times = [_timed(client.call, "getSystemState", "/bench") for _ in range(200)]
         figures[f"getSystemState_ms_{size}"] = statistics.median(times) * 1e3
         figures[f"getSystemState_cpu_ms_{size}"] = (cpu() - used) / len(times) * 1e3
@@ -169,7 +169,7 @@ def _measured(program: psutil.Process, port: int, sizes: list[int], dummy: Dummy
 
 
 def _dead_subscribers(port: int) -> dict[str, float]:
-    """Return the delay until a live subscriber is notified, with fifty more that never answer."""
+    """Return the delay until a live subscriber is notified, among fifty that never answer."""
     with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
         dead = f"http://127.0.0.1:{silent.getsockname()[1]}/"
         notified, live = threading.Event(), Dummy()

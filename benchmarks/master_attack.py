@@ -1,15 +1,15 @@
-"""The master under attack: how long a well-behaved client waits, and how much memory the master takes.
+"""The master under attack: the delays of a well-behaved client, and the master's memory.
 
     python benchmarks/master_attack.py                    # each attack alone, for some seconds
     python benchmarks/master_attack.py --mixed 600        # all of them together while nodes register
     python benchmarks/master_attack.py --only "huge tag"
 
-A client in a separate process calls getPid fifty times a second, each time by a new connection. Its waits hold what
-the machine itself adds, so the same calls go to a server that nobody attacks (column "control"); the time that the
-master or the client waited for a processor meanwhile is taken off the wait in column "own" (on Linux); and the longest
-turn of the master's loop, in CPU time, is a column too, as is its longest iteration, which is all that was due at a
-time (``benchmarks/master_turns.py``). Memory is the resident memory of the master. Exit status 1 where a call of the
-good client failed or a registration was refused.
+A client in a separate process calls getPid fifty times a second, each time by a new connection. Its delays include
+those of the machine itself, so the same calls go to a server that is not attacked (column "control"). Column "own" is the
+delay without the time that the master or the client waited for a processor meanwhile (on Linux). Two more columns are the
+CPU time of the longest callback and of the longest iteration of the master's loop, which runs everything that is due
+(``benchmarks/master_turns.py``). Memory is the master's resident memory. The exit status is 1 if a call of the
+well-behaved client failed or a registration was refused.
 """
 
 from __future__ import annotations
@@ -35,8 +35,7 @@ import psutil
 from attacks import ATTACKS, MIB, Target, called, silent_connections
 
 PERIOD = 0.02
-LONG = 0.5
-"""Seconds of a call whose cause is printed."""
+LONG = 0.5  # seconds; the cause of a longer call is printed
 
 
 def waited(thread: str) -> tuple[float, float]:
@@ -51,7 +50,7 @@ def waited(thread: str) -> tuple[float, float]:
 
 
 def retransmissions(sock: socket.socket) -> int:
-    """Return how many segments the kernel has sent again on a connection: tcpi_total_retrans of Linux; else 0."""
+    """Return the number of segments that the kernel retransmitted on a connection: tcpi_total_retrans of Linux; else 0."""
     if sys.platform != "linux":
         return 0
     return int.from_bytes(sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 104)[100:104], sys.byteorder)
@@ -61,10 +60,10 @@ def retransmissions(sock: socket.socket) -> int:
 
 
 def run_client(port: int, server: str) -> None:
-    """Call getPid all the time; a line for each call: the start, the wait, whether it was answered, the machine's part.
+    """Call getPid continuously; print for each call its start, its delay, whether it was answered, and the machine's part.
 
-    That is the longer of the times that the thread ``server`` and this one waited for a processor meanwhile, on Linux.
-    Why a call was not answered goes to standard error.
+    That part is the longer of the times that the thread ``server`` and this one waited for a processor meanwhile, on Linux.
+    The reason of a failed call is printed to stderr.
     """
     request, threads = called("getPid", "/good"), (server, str(os.getpid()))
     while True:
@@ -97,7 +96,7 @@ def run_client(port: int, server: str) -> None:
 
 
 def run_control() -> None:
-    """Answer as a master does, at a port that is printed."""
+    """Answer as a master does, on a port that is printed."""
     answer = b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n"
     with socket.create_server(("127.0.0.1", 0)) as server:
         print(server.getsockname()[1], flush=True)
@@ -108,7 +107,7 @@ def run_control() -> None:
 
 
 def run_nodes(port: int, count: int) -> None:
-    """Register nodes of three publications and three subscriptions, and unregister them; a line for each round."""
+    """Register nodes of three publications and three subscriptions, and unregister them; print a line for each round."""
     with contextlib.ExitStack() as stack:
         uris = []
         for _ in range(count):
@@ -186,9 +185,9 @@ def run_attack(name: str, port: int, seconds: float) -> None:
 
 
 def lower_priority() -> None:
-    """Run attackers at the ordinary priority, whatever the benchmark was started with.
+    """Run attackers at the ordinary priority, even if the benchmark was started with a higher one.
 
-    Attackers of a network have their own processors; these would take those of the master and the good client.
+    Attackers on a network have their own processors; these would take those of the master and the well-behaved client.
     """
     if sys.platform != "win32":
         with contextlib.suppress(OSError):
@@ -202,7 +201,7 @@ def lower_priority() -> None:
 
 
 class Watch:
-    """A program that prints a line for each call: the worst of them."""
+    """A program that prints a line for each call, and the statistics of the calls."""
 
     def __init__(self, *args: str, program: str = __file__, environ: Mapping[str, str] | None = None) -> None:
         self.calls: list[tuple[float, float, bool, float]] = []
@@ -217,7 +216,7 @@ class Watch:
         self._reader.start()
 
     def close(self) -> None:
-        """End the program."""
+        """Stop the program."""
         self.process.kill()
         self.process.wait()
         self._reader.join(5)
@@ -236,7 +235,7 @@ class Watch:
         return waits[len(waits) // 2], waits[len(waits) * 99 // 100], waits[-1], len(calls), failed
 
     def own(self, begin: float) -> float:
-        """Return the worst wait since ``begin`` without the machine's part: what the server itself took."""
+        """Return the longest delay since ``begin`` without the machine's part: the server's own delay."""
         return max((wait - machine for start, wait, _, machine in self.calls if start >= begin), default=0.0)
 
 
@@ -258,14 +257,14 @@ class Row(NamedTuple):
 
 
 def longest(turns: Path, what: str, begin: float, end: float) -> float:
-    """Return the CPU seconds of the longest "turn" or "loop" of the master's between two moments."""
+    """Return the CPU seconds of the master's longest "turn" or "loop" between two moments."""
     lines = [line.split() for line in turns.read_text(encoding="ascii").splitlines()]
     taken = (float(taken) for moment, kind, taken in lines if kind == what and begin <= float(moment) <= end)
     return max(taken, default=0.0)
 
 
 def environ_of(folder: str, port: int) -> dict[str, str]:
-    """Return the environment of a master at ``port`` and its nodes, whose files are in ``folder``."""
+    """Return the environment of a master at ``port`` and its nodes, with their files in ``folder``."""
     environ = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "MINIROSPY_"))}
     environ |= {"ROS_HOME": folder, "ROS_LOG_DIR": str(Path(folder) / "log"), "ROS_HOSTNAME": "localhost"}
     return environ | {"ROS_MASTER_URI": f"http://localhost:{port}"}
@@ -299,7 +298,7 @@ def started_master(folder: str, python: list[str]) -> Iterator[tuple[subprocess.
 
 
 def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[Row, str]:
-    """Attack a new master, and watch the good client; and how the nodes fared."""
+    """Attack a new master, and watch the well-behaved client; return the row, and the nodes' results."""
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
         turns = Path(folder) / "turns"
@@ -325,7 +324,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
         median, p99, worst, calls, failed = good.since(begin)
         last, wait, _, _ = good.calls[-1]
         if last < end:
-            # The present call has no answer yet.
+            # The current call has no response yet.
             worst, failed = max(worst, time.monotonic() - last - wait), failed + 1
 
         said = ""
@@ -347,7 +346,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
 
 
 def watch_clients(stack: contextlib.ExitStack, port: int, thread: str) -> tuple[Watch, Watch]:
-    """Return the good client of the server at ``port``, whose loop runs in ``thread``, and that of the control."""
+    """Return the well-behaved client of the server at ``port``, whose loop runs in ``thread``, and that of the control."""
     control = subprocess.Popen([sys.executable, __file__, "control"], stdout=subprocess.PIPE, text=True)
     stack.callback(control.wait)
     stack.callback(control.kill)
@@ -362,7 +361,7 @@ def watch_clients(stack: contextlib.ExitStack, port: int, thread: str) -> tuple[
 def watch_memory(
     pid: int, parts: Sequence[subprocess.Popen[bytes]], good: Watch, latest: float
 ) -> tuple[float, float, float]:
-    """Wait for the end of the attacks, then for the good client's call; return the peak of the memory, the last, the end."""
+    """Wait for the end of the attacks, then for the client's call; return the peak memory, the last, the end."""
     memory, peak = psutil.Process(pid), 0.0
     while any(part.poll() is None for part in parts) and time.monotonic() < latest:
         peak = max(peak, memory.memory_info().rss / MIB)
@@ -371,7 +370,7 @@ def watch_memory(
         part.kill()
         part.wait()
 
-    # The call that waits is answered, or not.
+    # Wait for the pending call.
     end = time.monotonic()
     while good.calls[-1][0] < end and time.monotonic() < end + 60:
         peak = max(peak, memory.memory_info().rss / MIB)
@@ -380,7 +379,7 @@ def watch_memory(
 
 
 def _describe_nodes(fleet: Watch, nodes: int) -> tuple[str, int]:
-    """Return what the nodes found, and how many rounds of registrations failed."""
+    """Return the nodes' results, and the number of failed rounds of registrations."""
     _, _, wait, rounds, refused = fleet.since(0.0)
     failed = refused + (fleet.process.poll() is not None)
     end = "A REGISTRATION FAILED" if failed else "every call answered"
@@ -389,7 +388,7 @@ def _describe_nodes(fleet: Watch, nodes: int) -> tuple[str, int]:
 
 @contextlib.contextmanager
 def _mix(names: list[str], port: int, seconds: float, number: int) -> Iterator[subprocess.Popen[bytes]]:
-    """Attacks one after the other in random order, of which several such programs run side by side."""
+    """Run attacks one after the other in random order; several such programs run in parallel."""
     process = subprocess.Popen(
         [sys.executable, __file__, "mix", str(port), str(seconds), str(number), json.dumps(names)]
     )
@@ -401,7 +400,7 @@ def _mix(names: list[str], port: int, seconds: float, number: int) -> Iterator[s
 
 
 def run_mix(port: int, seconds: float, seed: int, names: list[str]) -> None:
-    """Attack in random order, ten seconds each; the first of these programs holds 5,000 connections all the time."""
+    """Attack in random order, ten seconds each; the first of these programs keeps 5,000 connections open all the time."""
     lower_priority()
     generator, end = random.Random(seed), time.monotonic() + seconds
     if seed == 0:
@@ -486,7 +485,7 @@ def main() -> int:
 
 
 def raise_file_limit() -> None:
-    """Allow as many connections as the system does."""
+    """Raise the limit of open files as far as the system allows."""
     if sys.platform != "win32":
         import resource
 

@@ -1,9 +1,9 @@
-"""A master that writes each long turn of its event loop to a file: the moment of its end, "turn", its CPU seconds.
+"""A master that writes each long turn of its event loop to a file: the time of its end, "turn", its CPU seconds.
 
     python benchmarks/master_turns.py FILE [options of minirospy master]
 
-For ``benchmarks/master_attack.py``: what a turn takes is what a client waits for the master itself, whatever else the
-machine does. A turn is one callback of the loop. Lines of "loop" are iterations of it, with all callbacks that were due.
+For ``benchmarks/master_attack.py``: a turn's duration is a client's delay by the master itself, independent of the
+machine's load. A turn is one callback of the loop. Lines of "loop" are iterations, with all callbacks that were due.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ from typing import Any
 
 from minirospy.ros.rosmaster.commands.master import main
 
-LONG = 0.002
-"""Seconds; shorter turns are not written."""
+LONG = 0.002  # seconds; shorter turns are not written
 
 
 def record_turns(path: str) -> None:

@@ -1,6 +1,6 @@
-"""`python benchmarks/messages.py`: messages to bytes and back, beside real genpy where /usr/bin/python3 has one.
+"""`python benchmarks/messages.py`: serialization of messages, compared with real genpy if /usr/bin/python3 has it.
 
-And the compiler: definitions to Python modules, and the time to import them.
+Also the compiler: definitions to Python modules, and the time to import them.
 """
 
 import io
@@ -13,7 +13,7 @@ REAL = "/usr/bin/python3"
 
 
 def samples():
-    """Messages as robots send them: name -> message."""
+    """Return name -> message, as robots send them."""
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
     from geometry_msgs.msg import Pose, PoseArray, TransformStamped
     from sensor_msgs.msg import Image, JointState, LaserScan
@@ -82,7 +82,7 @@ def worker():
 
 
 def compiler():
-    """Milliseconds to compile all of msgs/ in memory, and to import a package of messages in a fresh process."""
+    """Return milliseconds to compile all of msgs/ in memory, and to import a package of messages in a fresh process."""
     from pathlib import Path
 
     from minirospy.core.idl.load import Catalogue, compile_package

@@ -1,12 +1,12 @@
-"""A node under attack: how long a well-behaved client waits for its Slave API, its program for `publish`, and memory.
+"""A node under attack: the delays of a client of its Slave API and of its own `publish` calls, and its memory.
 
     python benchmarks/node_attack.py                      # each attack alone, for some seconds
     python benchmarks/node_attack.py --only "pipelines"
 
-The node is a program of rospy that publishes one topic a hundred times a second and subscribes to another one. The waits
-are measured as in ``benchmarks/master_attack.py``; column "own" is without the time in which the thread of the node's event
-loop, or the client, waited for a processor, and so is "publish". The threads of a node share the GIL: what its loop waits
-for that is part of "own". Exit status 1 where a call of the good client failed.
+The node is a rospy program that publishes one topic a hundred times a second and subscribes to another one. Delays
+are measured as in ``benchmarks/master_attack.py``; the columns "own" and "publish" exclude the time in which the thread of
+the node's event loop, or the client, waited for a processor. The threads of a node share the GIL: the time for which its
+loop waits for it is part of "own". The exit status is 1 if a call of the well-behaved client failed.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ PUBLISH_PERIOD = 0.01
 
 
 def run_node(turns: str, thread: str) -> None:
-    """Publish all the time, a line for each call; write the system's number of the event loop's thread to a file."""
+    """Publish continuously, print a line for each call; write the event loop thread's system id to a file."""
     import rospy
     from master_turns import record_turns
     from std_msgs.msg import String
@@ -76,7 +76,7 @@ def publisher_update(target: Target) -> None:
 
 
 def publisher_updates(target: Target) -> None:
-    """Send a publisherUpdate of 20,000 publishers, as many as it may have, and 20,000 updates in a multicall."""
+    """Send a publisherUpdate of 20,000 publishers, the maximum, and 20,000 updates in a multicall."""
     uris = [f"http://127.0.0.1:9/{number}" for number in range(20_000)]
     update = called("publisherUpdate", "/bad", "/in", uris)
     updates = multicall("publisherUpdate", ["/bad", "/in", ["http://127.0.0.1:9/"]], 20_000)
@@ -91,7 +91,7 @@ def param_update(target: Target) -> None:
 
 
 def half_headers(target: Target) -> None:
-    """400 peers that send most of a connection header of 4 MiB to the port of the node's topics."""
+    """Send most of a connection header of 4 MiB from 400 peers to the port of the node's topics."""
     with ServerProxy(f"http://127.0.0.1:{target.port}") as node:
         _, _, (_, _, port) = node.requestTopic("/bad", "/out", [["TCPROS"]])  # type: ignore[misc]
     length = 4 * MIB
@@ -135,7 +135,7 @@ class Row(NamedTuple):
 
 
 def measure(name: str, seconds: float) -> Row:
-    """Attack a new node, and watch the good client and the node."""
+    """Attack a new node, and watch the well-behaved client and the node."""
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
         _, master = stack.enter_context(

@@ -1,7 +1,7 @@
-"""`python benchmarks/packages.py [NAME ...]`: packages that programs import, ours next to Debian's, in one run.
+"""`python benchmarks/packages.py [NAME ...]`: packages that programs import, minirospy's compared with Debian's, in one run.
 
-Each measurement is a program that prints one number, run in turns under both interpreters; of three runs the best one
-counts. Real ROS is what /usr/bin/python3 imports.
+Each measurement is a program that prints one number, run alternately under both interpreters; the best of three runs
+counts. Real ROS is the one that /usr/bin/python3 imports.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ RUNS = 3
 
 
 class Measurement(NamedTuple):
-    """A program that prints one number, and what the number is."""
+    """A program that prints one number, and the number's meaning."""
 
     unit: str
     code: str
     ours: str = ""
-    """The program with ours, where that offers a better way."""
+    """The program for minirospy, if that offers a better way."""
     needs_master: bool = False
     peer: str = ""
-    """The interpreter that runs both programs, where only what they start is ours or real; else each runs its own."""
+    """The interpreter for both programs, if only the programs that they start differ; otherwise each stack uses its own."""
 
 
 SYNCHRONIZER = """
@@ -67,7 +67,7 @@ print((time.perf_counter() - start) / len(arrivals) * 1e6)
 
 
 def synchronizer(queue: int, slop: float, delay: int) -> Measurement:
-    """Return the cost of a message: ``slop`` in seconds, ``delay`` of each topic after the one before it in nanoseconds."""
+    """Return the cost of a message: ``slop`` in seconds, ``delay`` of each topic after the previous one in nanoseconds."""
     code = SYNCHRONIZER
     for name, value in (("queue", queue), ("slop", slop), ("delay", delay)):
         code = code.replace("{" + name + "}", str(value))
@@ -98,7 +98,7 @@ print(min(times) * 1e3)
 
 
 def cloud(body: str, instead: str = "") -> Measurement:
-    """Return the time that a line of a program takes; ``instead`` is what ours can use where real ROS has only the line."""
+    """Return the time of a line of code; ``instead``: minirospy's alternative for which real ROS has only the line."""
     return Measurement(
         "ms a 640x480 cloud", CLOUD.replace("BODY", body), CLOUD.replace("BODY", instead or body)
     )
@@ -193,7 +193,7 @@ print(cpu * 1e3 if WHAT == "cpu" else times[len(times) // 2] * 1e3)
 
 
 def pass_on(what: str, peer: str, *words: str) -> Measurement:
-    """Return the cost of an image through a program of topic_tools, ours or Debian's, between the same two ends."""
+    """Return the cost of an image through a program of topic_tools, minirospy's or Debian's, between the same endpoints."""
     scripts = Path(__file__).resolve().parents[1] / "msgs" / "topic_tools" / "scripts"
     code = PASS_ON.replace("WHAT", repr(what))
     real = code.replace("COMMAND", repr([f"/usr/lib/topic_tools/{words[0]}", *words[1:]]))
@@ -232,7 +232,7 @@ MEASUREMENTS = {
 
 @functools.cache
 def our_master() -> int:
-    """Start a master of ours for this run; return its port."""
+    """Start a minirospy master for this run; return its port."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
@@ -265,7 +265,7 @@ def measure(python: str, measurement: Measurement) -> float:
 
 
 def main() -> None:
-    """Print a table of what was asked for."""
+    """Print a table of the selected measurements."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("name", nargs="*", choices=[*MEASUREMENTS, []])
     names = parser.parse_args().name or list(MEASUREMENTS)

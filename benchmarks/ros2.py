@@ -1,7 +1,8 @@
-"""What the bridge to ROS 2 adds: small messages and images from a publisher on one side to a subscriber on the other.
+"""The overhead of the ROS 2 bridge: small messages and images from a publisher on one side to a subscriber on the other.
 
-Run by minirospy's Python after `make ros2`, which installs ROS 2: python benchmarks/ros2.py [SECONDS]. Printed: messages sent and
-lost, median and 99th percentile of the time on the way. For each kind there is a route within ROS 1 and one within ROS 2.
+Run by minirospy's Python after `make ros2`, which installs ROS 2: python benchmarks/ros2.py [SECONDS]. Prints messages
+sent and
+lost, median and 99th percentile of the latency. For each kind there is a route within ROS 1 and one within ROS 2.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ def bridge(parts: contextlib.ExitStack) -> None:
 
 
 def measure(route: str, topic: str, type_: str, rate: float, seconds: str) -> str:
-    """Return the line of a route: the receiver says when it is connected, then the sender starts in earnest."""
+    """Return the line of a route: the receiver prints when it is connected, then the sender starts at full rate."""
     sender, receiver = route.split()
     words = [topic, type_, str(rate), seconds]
 
@@ -116,7 +117,7 @@ def sent_at(side: int, type_: str, data: bytes | memoryview) -> int:
 
 
 class Clock:
-    """When to send: 20 times a second until the line `go` comes, then at the rate."""
+    """The send times: 20 times a second until the line `go` arrives, then at the rate."""
 
     def __init__(self, rate: float, seconds: float) -> None:
         self._rate = rate
@@ -141,7 +142,7 @@ class Clock:
 
 
 class Log:
-    """What was received: when it was sent, and how long it took."""
+    """The received messages: the send time and the latency of each."""
 
     def __init__(self, side: int, type_: str) -> None:
         self._side, self._type = side, type_

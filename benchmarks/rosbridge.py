@@ -1,6 +1,6 @@
-"""`python benchmarks/rosbridge.py`: what rosbridge costs: 640x480 RGB at 30 Hz to five clients, CPU in percent of one core.
+"""`python benchmarks/rosbridge.py`: cost of rosbridge: 640x480 RGB at 30 Hz to five clients, CPU in percent of one core.
 
-JSON (base64), and cbor, which roslib.js uses for images. With ``--peer 'COMMAND {port}'`` the same with the real
+Measures JSON (base64), and cbor, which roslib.js uses for images. With ``--peer 'COMMAND {port}'``, also the real
 rosbridge_websocket, in the same run: COMMAND starts it with the environment's master.
 """
 
@@ -22,7 +22,7 @@ from bridge import BIN, Run, free_port
 
 
 class Client(threading.Thread):
-    """A client of the image, which counts what comes and parses nothing."""
+    """A client of the image, which counts messages and does not parse them."""
 
     def __init__(self, port: int, compression: str) -> None:
         super().__init__(daemon=True)
@@ -42,7 +42,7 @@ class Client(threading.Thread):
 
 
 def clients(port: int, compression: str, seconds: float) -> None:
-    """Role: five clients; print the slowest one's rate, and what came to all in MB/s."""
+    """Role: run five clients; print the slowest one's rate, and the total received data in MB/s."""
     readers = [Client(port, compression) for _ in range(5)]
     for reader in readers:
         reader.start()
@@ -60,7 +60,7 @@ def clients(port: int, compression: str, seconds: float) -> None:
 
 
 def measure(command: list[str], port: int, environ: dict[str, str], compression: str, seconds: float) -> str:
-    """Return what a server costs."""
+    """Return the cost of a server."""
     server = subprocess.Popen(command, env=environ, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         while True:

@@ -1,7 +1,7 @@
-"""`make bench`: minirospy, beside a real rospy where /usr/bin/python3 has one, in one run, in turns.
+"""`make bench`: minirospy, compared with a real rospy if /usr/bin/python3 has one, in one run, alternating.
 
-Figures are medians of the rounds; ``ratio`` says how many times better than rospy. All traffic is on loopback.
-``--json`` keeps the figures of every round, ``--plot`` draws the ratios.
+The results are medians of the rounds; ``ratio`` is how many times better than rospy. All traffic is on loopback.
+``--json`` keeps the results of every round, ``--plot`` draws the ratios.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Figures = dict[str, float]
 
 
 class Peers:
-    """A master and the workers of one measurement; all end with the block."""
+    """A master and the workers of one measurement, which are stopped at the end of the block."""
 
     def __init__(self, stack: str) -> None:
         self._python, master = STACKS[stack]
@@ -85,7 +85,7 @@ class Peers:
 
 
 class Worker(NamedTuple):
-    """A process that prints lines of JSON and reads words."""
+    """A process that prints lines of JSON and reads commands."""
 
     process: subprocess.Popen[str]
 
@@ -98,14 +98,14 @@ class Worker(NamedTuple):
         raise SystemExit(f"a worker ended early: {self.process.args!r}")
 
     def tell(self, word: str) -> None:
-        """Let it go on."""
+        """Send a command."""
         assert self.process.stdin
         self.process.stdin.write(word + "\n")
         self.process.stdin.flush()
 
 
 def cost(workers: list[Worker]) -> float:
-    """CPU seconds of workers, which end."""
+    """Return the CPU seconds of workers, and stop them."""
     for worker in workers:
         worker.tell("stop")
     return float(sum(worker.said()["cpu"] for worker in workers))
@@ -131,7 +131,7 @@ def measure_round_trip(stack: str) -> Figures:
 
 
 def stream(kind: str, *, hz: float = 0.0, listeners: int = 1) -> Callable[[str], Figures]:
-    """Measure one kind of message, to this many listeners."""
+    """Return a measurement of one kind of message, with this number of listeners."""
     name = f"{kind} to {listeners}" if listeners > 1 else kind
 
     def measure(stack: str) -> Figures:
@@ -204,18 +204,18 @@ CASES: dict[str, Callable[[str], Figures]] = {
 
 
 def is_rate(name: str) -> bool:
-    """Return whether more is better."""
+    """Return whether a higher value is better."""
     return name.endswith("per second")
 
 
 def ratio(name: str, ours: float, theirs: float) -> float:
-    """Return how many times better ours is."""
+    """Return how many times better minirospy is."""
     better, worse = (ours, theirs) if is_rate(name) else (theirs, ours)
     return better / worse if worse else float("nan")
 
 
 def table(medians: dict[str, dict[str, float]]) -> str:
-    """One line a figure."""
+    """Return the results, one line for each."""
     stacks = list(medians)
     lines = [f"{'':38}" + "".join(f"{stack:>18}" for stack in stacks) + f"{'ratio':>8}" * ("rospy" in stacks)]
     for name in medians[stacks[-1]]:

@@ -3,9 +3,10 @@
     python benchmarks/shutdown.py --nodes 200 --rounds 20
     python benchmarks/shutdown.py --launch --nodes 100 --rounds 10
 
-Each node publishes, subscribes and offers a service. All get Ctrl-C in the same moment, as processes of one terminal do;
-with ``--launch`` a roslaunch does, and with ``--kill`` the nodes get SIGKILL while their roslaunch goes on. Each round
-prints a line; the exit status is 1 where a node, a topic or a service was left. Not for Windows.
+Each node publishes, subscribes and offers a service. All get Ctrl-C at the same moment, as processes of one terminal do;
+with ``--launch`` a roslaunch gets it, and with ``--kill`` the nodes get SIGKILL while their roslaunch keeps running. Each
+round
+prints a line; the exit status is 1 if a node, a topic or a service was left. Not for Windows.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def left(master: MasterProxy) -> set[str]:
 
 
 def wait_until(condition: Callable[[], bool], seconds: float, what: str) -> None:
-    """Wait for a condition. Raise SystemExit with ``what`` where it does not come true."""
+    """Wait for a condition. Raise SystemExit with ``what`` if it does not become true."""
     end = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > end:
@@ -69,7 +70,7 @@ def wait_until(condition: Callable[[], bool], seconds: float, what: str) -> None
 
 
 def fork_nodes(master: MasterProxy, count: int, pids: list[int]) -> None:
-    """Fork nodes, which saves each of them the imports, some at a time; puts their process ids into ``pids``."""
+    """Fork nodes some at a time, which saves each of them the imports; append their process ids to ``pids``."""
     import rospy
     import std_srvs.srv  # noqa: F401
 
@@ -85,7 +86,7 @@ def fork_nodes(master: MasterProxy, count: int, pids: list[int]) -> None:
             continue
         status = 1
         try:
-            # One process group: the terminal's Ctrl-C.
+            # One process group, as for the terminal's Ctrl-C.
             os.setpgid(0, pids[0] if pids else 0)
             sys.argv = ["node", f"__name:={TESTED[1:]}{number}"]
             signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -102,7 +103,7 @@ def fork_nodes(master: MasterProxy, count: int, pids: list[int]) -> None:
 
 
 def round_of_forks(master: MasterProxy, nodes: int) -> tuple[float, int]:
-    """Start nodes, interrupt all; seconds until the last process has exited, and how many exited with an error."""
+    """Start nodes, interrupt all; return the seconds until the last process has exited, and the number that failed."""
     pids: list[int] = []
     try:
         fork_nodes(master, nodes, pids)
@@ -124,7 +125,7 @@ def ready(master: MasterProxy) -> int:
 
 
 def write_package(folder: Path, nodes: int) -> Path:
-    """Write a package with the node, and a launch file; its path."""
+    """Write a package with the node, and a launch file; return the file's path."""
     package = folder / "src" / "shutdown_nodes"
     (package / "scripts").mkdir(parents=True)
     (package / "package.xml").write_text(
@@ -145,7 +146,7 @@ def write_package(folder: Path, nodes: int) -> Path:
 def round_of_launch(
     master: MasterProxy, nodes: int, file: Path, environ: dict[str, str], *, kill: bool
 ) -> tuple[float, int]:
-    """Launch the nodes and end them; seconds that it took, and the exit status of roslaunch."""
+    """Launch the nodes and stop them; return the seconds that it took, and the exit status of roslaunch."""
     command = [sys.executable, "-m", "minirospy.ros.roslaunch.commands.roslaunch", "--wait", str(file)]
     launch = subprocess.Popen(command, env=environ, stdout=subprocess.DEVNULL)
     try:
@@ -165,7 +166,7 @@ def round_of_launch(
 
 @contextmanager
 def running_master(environ: dict[str, str], *, is_real: bool) -> Iterator[MasterProxy]:
-    """Run a master, ours or rosmaster."""
+    """Run a master, minirospy's or rosmaster."""
     from minirospy.base.environment import split_uri
 
     port = str(split_uri(environ["ROS_MASTER_URI"], "http")[1])
@@ -174,7 +175,7 @@ def running_master(environ: dict[str, str], *, is_real: bool) -> Iterator[Master
         environ = {name: value for name, value in environ.items() if name != "PYTHONPATH"}
         command = [shutil.which("rosmaster", path="/usr/bin") or "rosmaster", "--core", "-p", port]
     process = subprocess.Popen(command, env=environ, stdout=subprocess.DEVNULL)
-    # A real rosmaster may be busy for long.
+    # A real rosmaster may be busy for a long time.
     master = MasterProxy(environ["ROS_MASTER_URI"], "/benchmark", timeout=60.0)
     try:
         wait_until(master.is_online, 20.0, "the master has not started")
@@ -185,7 +186,7 @@ def running_master(environ: dict[str, str], *, is_real: bool) -> Iterator[Master
         try:
             process.wait(20)
         except subprocess.TimeoutExpired:
-            # A real rosmaster whose nodes have just exited.
+            # A real rosmaster may hang after its nodes have exited.
             process.kill()
             process.wait()
 

@@ -1,7 +1,7 @@
 """`python benchmarks/slow_link.py NAMESPACE NAMESPACE`: a link with delay and loss between two network namespaces of Linux.
 
-For kernels without netem: each namespace gets a TAP device, and this program passes the frames from one to the other,
-later, or not at all. It prints "ready", and ends with its standard input. Needs root, `ip` and /dev/net/tun.
+For kernels without netem: each namespace gets a TAP device, and this program forwards the frames from one to the other,
+delayed, or drops them. It prints "ready", and exits when stdin is closed. Needs root, `ip` and /dev/net/tun.
 """
 
 import argparse
@@ -15,11 +15,10 @@ import subprocess
 import sys
 import time
 
-DEVICE = "veth0"
-"""The device's name in each namespace."""
+DEVICE = "veth0"  # name of the TAP device in each namespace
 LONGEST_FRAME = 65_536
 
-# linux/if_tun.h
+# From linux/if_tun.h.
 TUNSETIFF = 0x400454CA
 IFF_TAP, IFF_NO_PI = 0x0002, 0x1000
 
@@ -36,7 +35,7 @@ def open_tap(namespace, number):
 
 
 def pass_frames(taps, delay, jitter, loss):
-    """Pass frames until the standard input ends. ``delay``, ``jitter``: seconds, one way; ``loss``: a share, one way."""
+    """Forward frames until stdin is closed. ``delay``, ``jitter``: seconds, one way; ``loss``: a fraction, one way."""
     there = {taps[0]: taps[1], taps[1]: taps[0]}
     waiting = []
     order = itertools.count()

@@ -2,9 +2,9 @@
 
     python benchmarks/soak.py --minutes 60
 
-Nodes come and go (with and without a good-bye, and twice under one name), topics, services and parameters change,
-tools look, clients hang up in the middle of a request. Each ten seconds a line prints the master's memory, files,
-threads and journal; the exit status is 1 where memory or files grew between the middle and the end.
+Nodes start and stop (with and without unregistering, and twice under one name), topics, services and parameters change,
+tools query the master, clients disconnect in the middle of a request. Every ten seconds a line prints the master's memory,
+files, threads and journal; the exit status is 1 if memory or files grew between the middle and the end.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Churn:
         self.calls = 0
 
     def step(self) -> None:
-        """Something happens."""
+        """Make a random change or query."""
         happens = self._random.choices(
             (self.join, self.leave, self.vanish, self.parameters, self.look, self.hang_up),
             (10, 8, 1, 20, 2, 1),
@@ -74,9 +74,9 @@ class Churn:
         happens()
 
     def join(self) -> None:
-        """Start a node; there may be one of its name already."""
+        """Start a node; a node of its name may already exist."""
         name = f"/robot{self._random.randrange(NAMES)}"
-        # Never where it was before: a new process has a new port, here a new path.
+        # Always a new address: a new process has a new port, here a new path.
         uri = f"http://127.0.0.1:{self._random.choice(self._slaves).port}/{self._random.randrange(10**9)}/"
         self._live[name] = uri
         for topic in ("/rosout", f"{name}/out"):
@@ -89,7 +89,7 @@ class Churn:
             self.leave()
 
     def leave(self) -> None:
-        """Shut a node down as it should be."""
+        """Shut a node down properly."""
         if not self._live:
             return
         name = self._random.choice(list(self._live))
@@ -107,12 +107,12 @@ class Churn:
         self.calls += 24
 
     def vanish(self) -> None:
-        """Kill a node: its registrations stay."""
+        """Kill a node: its registrations remain."""
         if self._live:
             self._live.popitem()
 
     def parameters(self) -> None:
-        """Parameters are set, read and deleted."""
+        """Set, read and delete parameters."""
         key = f"/p{self._random.randrange(20)}/q{self._random.randrange(20)}"
         self.call(
             "setParam", "/tool", key, self._random.choice([1, 2.5, "x" * 200, [1, "a"], {"k": {"l": True}}])
@@ -122,7 +122,7 @@ class Churn:
             self.call("deleteParam", "/tool", key)
 
     def look(self) -> None:
-        """Somebody runs `rosnode list` and `rosparam list`."""
+        """Query as `rosnode list` and `rosparam list` do."""
         self.call("getSystemState", "/tool")
         self.call("getParamNames", "/tool")
 
@@ -132,7 +132,7 @@ class Churn:
             sock.sendall(b"POST / HTTP/1.1\r\nContent-Length: 100\r\n\r\n<methodCall>")
 
     def call(self, method: str, *args: object) -> None:
-        """One call, whatever it answers."""
+        """Make a call and ignore its answer."""
         self._master.call(method, *args)
         self.calls += 1
 
@@ -140,7 +140,7 @@ class Churn:
 def samples(
     program: psutil.Process, home: Path, churn: Churn, seconds: float, pause: float
 ) -> Iterator[Sample]:
-    """Churn for the given time, with samples."""
+    """Churn for the given time; yield samples."""
     start = time.monotonic()
     following = start
 
@@ -166,7 +166,7 @@ def samples(
 
 
 def main() -> int:
-    """Churn and tell."""
+    """Churn and print the result."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

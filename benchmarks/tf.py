@@ -1,7 +1,7 @@
-"""`python benchmarks/tf.py`: transforms, beside Debian's tf2 where /usr/bin/python3 has it, in one run.
+"""`python benchmarks/tf.py`: transforms, compared with Debian's tf2 if /usr/bin/python3 has it, in one run.
 
-Lookups over a chain of five, insertion of 1,000 frames, a listener's processor time for a TFMessage of 20 transforms, and ten
-listeners at 1 kHz. Each listener looks one transform up ten times a second. All traffic is on loopback.
+Lookups over a chain of five, insertion of 1,000 frames, a listener's CPU time for a TFMessage of 20 transforms, and ten
+listeners at 1 kHz. Each listener looks up one transform ten times a second. All traffic is on loopback.
 """
 
 import argparse
@@ -22,7 +22,7 @@ FRAMES = 20
 
 
 def stamped(parent, child, seconds, x=0.0):
-    """Return a transform that also turns."""
+    """Return a transform that includes a rotation."""
     import rospy
     from geometry_msgs.msg import TransformStamped
 
@@ -46,7 +46,7 @@ def best_of_five(step, count):
 
 
 def measure_buffer():
-    """Return what lookups and insertions take, without a node."""
+    """Return the times of lookups and insertions, without a node."""
     import rospy
     import tf2_ros
 
@@ -77,7 +77,7 @@ def measure_buffer():
 
 
 def listen(seconds):
-    """Listen for some seconds; print the processor time each message took, and the share of a core."""
+    """Listen for some seconds; print the CPU time per message, and the share of a core."""
     import rospy
     import tf2_ros
 
@@ -105,7 +105,7 @@ def listen(seconds):
 
 
 def send(rate, transforms):
-    """Publish messages of so many transforms at a rate, until the input ends: from bytes, so that the sender keeps up."""
+    """Publish messages of ``transforms`` transforms until stdin is closed: from bytes, so that the sender keeps up."""
     import io
     import select
     import struct
@@ -144,7 +144,7 @@ def send(rate, transforms):
 
 
 def measure_listeners(stack, listeners, rate, transforms, seconds):
-    """Return, of some listeners together: microseconds a message, share of a core, messages a second of each."""
+    """Return the results of all listeners: microseconds per message, share of a core, messages per second of each."""
     python, master = STACKS[stack]
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -174,7 +174,7 @@ def measure_listeners(stack, listeners, rate, transforms, seconds):
                 break
             except OSError:
                 time.sleep(0.05)
-        # The same sender for both: real rospy's reaches a fourth of this rate.
+        # The same sender for both: real rospy's reaches a quarter of this rate.
         start(sys.executable, "--send", rate, transforms)
         programs = [start(python, "--listen", seconds) for _ in range(listeners)]
         for program in programs:
@@ -196,7 +196,7 @@ def measure_listeners(stack, listeners, rate, transforms, seconds):
 
 
 def main():
-    """Print each figure of both, and the ratio."""
+    """Print each result of both, and the ratio."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--buffer", action="store_true", help="only what needs no node, of this interpreter, as JSON"

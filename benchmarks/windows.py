@@ -1,7 +1,7 @@
-"""Windows' CPython under Wine next to Linux, in turns in one run, both over TCP: `python benchmarks/windows.py`.
+"""Windows' CPython under Wine compared with Linux, alternating in one run, both over TCP: `python benchmarks/windows.py`.
 
-`make windows` sets Wine up before. What Wine itself costs is in the figures: they show how much of a robot's work is left
-there, not how fast Windows is. Each process of a system talks to a master of that system.
+First run `make windows`, which sets up Wine. The results include Wine's own cost: they show how much of a robot's work is
+possible there, not how fast Windows is. Each process of a system uses a master of that system.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def main() -> int:
 
 
 def measure(system: str) -> dict[str, float]:
-    """Measure one system once: the names of what was measured, with their units, and the values."""
+    """Measure one system once; return name with unit -> value."""
     environ = {
         "ROS_MASTER_URI": f"http://localhost:{(port := free_port())}",
         "MINIROSPY_LOCAL": "1",
@@ -173,7 +173,7 @@ def _commands(system: str, folder: Path, environ: dict[str, str]) -> tuple[Start
 
 
 def _seconds(python: Starter, *words: str) -> float:
-    """Return how long a process takes; the first of two is for the system's caches."""
+    """Return how long a process takes; the first of two runs fills the system's caches."""
     for _ in range(2):
         start = time.perf_counter()
         run = python(*words)

@@ -1,7 +1,7 @@
 """One process of a benchmark: `worker.py ROLE name=value ...`. Only the rospy API, so it runs on any rospy.
 
 A worker prints a line of JSON when it is ready, one when it has measured, and one with its cost at the
-end; the lines "go" and "stop" come to it on its standard input.
+end; it reads the lines "go" and "stop" from stdin.
 """
 
 import json
@@ -18,7 +18,7 @@ def say(**result):
 
 
 def heard(word):
-    """Wait for a line; a driver that has gone ends the worker."""
+    """Wait for a line; exit if the driver has exited."""
     for line in sys.stdin:
         if line.strip() == word:
             return
@@ -64,7 +64,7 @@ def message_of(kind):
 
 
 def reader_of(kind):
-    """Do what a callback does with a message."""
+    """Return a function that reads a message as a typical callback does."""
     if kind == "small":
         return lambda message: message.data
     if kind == "scan":
@@ -100,7 +100,7 @@ def talk(options):
 
 
 def listen(options):
-    """Count what arrives, and how late."""
+    """Count the messages that arrive, and their delay."""
     import rospy
 
     rospy.init_node("bench_listener_" + options["id"])
@@ -146,7 +146,7 @@ def echo(_options):
 
 
 def ping(options):
-    """Round trips of a small message: each pong's callback sends the next ping."""
+    """Measure round trips of a small message: each pong's callback sends the next ping."""
     import rospy
     from std_msgs.msg import UInt64
 
@@ -180,7 +180,7 @@ def ping(options):
 
 
 def serve(_options):
-    """Offers a service, and keeps a latched message."""
+    """Offer a service, and publish a latched message."""
     import rospy
     from std_msgs.msg import UInt64
     from std_srvs.srv import SetBool, SetBoolResponse
@@ -195,7 +195,7 @@ def serve(_options):
 
 
 def call(options):
-    """Service calls, parameters, and how long a new Subscriber waits for a latched message."""
+    """Measure service calls, parameters, and how long a new Subscriber waits for a latched message."""
     import rospy
     from std_msgs.msg import UInt64
     from std_srvs.srv import SetBool
@@ -231,7 +231,7 @@ def call(options):
 
 
 def rate(step, seconds):
-    """Return how often ``step`` can be done in a second."""
+    """Return how often ``step`` runs in a second."""
     for _ in range(20):
         step()
     count, start = 0, time.perf_counter()

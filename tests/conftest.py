@@ -1,4 +1,4 @@
-"""The environment of every test, which keeps it apart from other tests and from the user's ROS."""
+"""The environment of every test, which isolates it from other tests and from the user's ROS."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-# A busy machine makes examples slow, and nothing wrong.
+# On a busy machine examples are slow without being wrong.
 settings.register_profile("minirospy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("minirospy")
 
 
 def pytest_configure() -> None:
-    """Undo that a shell has background jobs ignore SIGINT, and `nohup` SIGHUP: the tests' processes must not."""
+    """Reset ignored signals: a shell makes background jobs ignore SIGINT, and `nohup` SIGHUP; the tests' processes must not."""
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
-        # Nothing happens here; a new process starts with the system's default.
+        # The signal has no effect here; a new process starts with the system's default.
         signal.signal(signal.SIGHUP, lambda *_: None)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Write surrogates of what a test has printed or logged as escapes: pytest-xdist cannot send them."""
+    """Escape surrogates in a test's output and log: pytest-xdist cannot send them."""
     report = yield
     report.sections = [(name, escaped_surrogates(text)) for name, text in report.sections]
     return report
@@ -54,7 +54,7 @@ def write_files(folder: Path, texts: Mapping[str, str], executable: Collection[s
 
 
 def free_port() -> int:
-    """Return a port without a listener, for a server that another process starts, or that comes back.
+    """Return a port without a listener, for a server that another process starts, or that is restarted.
 
     It is outside of the ephemeral range (from 32768 or 49152 on): such a port may be assigned to any
     connection of another test before it is used.
@@ -71,7 +71,7 @@ def free_port() -> int:
 
 @pytest.fixture(scope="session")
 def _board_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Return where the virtual boards of all tests live; in the end none is left running."""
+    """Yield the folder of the virtual boards of all tests; stop all boards at the end."""
     folder = tmp_path_factory.mktemp("boards")
     yield folder
     if any(folder.iterdir()):
@@ -86,7 +86,7 @@ def _board_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def _own_environment(
     tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, _board_folder: Path
 ) -> None:
-    """No ROS variable of the outside gets in; files go to a temporary folder, sockets to loopback."""
+    """Remove the user's ROS variables; put files into a temporary folder, and sockets on loopback."""
     home: Path = tmp_path_factory.mktemp("ros")
     for name in list(os.environ):
         if name.startswith(("ROS_", "MINIROSPY_")):
@@ -94,7 +94,7 @@ def _own_environment(
     monkeypatch.setenv("ROS_HOME", str(home))
     monkeypatch.setenv("ROS_LOG_DIR", str(home / "log"))
     monkeypatch.setenv("ROS_HOSTNAME", "localhost")
-    # A port on which nothing listens: a test that forgets its own master fails immediately.
+    # A port on which nothing listens: a test without its own master fails immediately.
     monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
     monkeypatch.setenv("MINIROSPY_BOARD", f"test-{uuid.uuid4().hex[:12]}")
     monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(_board_folder))
@@ -103,7 +103,7 @@ def _own_environment(
 
 @pytest.fixture
 def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """Run a master; return its URI, which ROS_MASTER_URI has while the test runs."""
+    """Run a master; yield its URI, to which ROS_MASTER_URI is set during the test."""
     from minirospy.runtime.master.master import Master
     from minirospy.runtime.transport.loop import LoopThread
 
@@ -126,7 +126,7 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 
 @pytest.fixture
 def interrupted_processes(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
-    """Return the processes that are started from now on; as each starts, this one gets a Ctrl-C."""
+    """Return the processes that are started from now on; this process gets a Ctrl-C whenever one starts."""
     children: list[subprocess.Popen[bytes]] = []
 
     class Interrupted(subprocess.Popen):  # type: ignore[type-arg]

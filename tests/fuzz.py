@@ -1,10 +1,10 @@
-"""Anything at all, sent to a master: it answers or refuses, and keeps what it holds.
+"""Fuzz a master with arbitrary input: it answers or refuses, and keeps its registrations.
 
     make fuzz                                     # ten minutes
     python tests/fuzz.py --minutes 1
 
-With atheris (coverage-guided; ``pip install atheris``) where it is installed, else with random mutations of good
-and bad requests. A finding is written to ``fuzz-finding.bin``; ``python tests/fuzz.py FILE`` runs it again.
+Uses atheris (coverage-guided; ``pip install atheris``) if it is installed, else random mutations of valid
+and invalid requests. A finding is written to ``fuzz-finding.bin``; ``python tests/fuzz.py FILE`` runs it again.
 """
 
 from __future__ import annotations
@@ -25,19 +25,18 @@ from typing import Any
 INPUTS_PER_MASTER = 2000
 FINDING = Path("fuzz-finding.bin")
 HEAD = b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n"
-CUT = b"\xff\xfe"
-"""Where an input is cut into what comes with one receive."""
+CUT = b"\xff\xfe"  # separates the parts of an input that arrive with one receive each
 
 
 class Faults(logging.Handler):
-    """Whatever a server logs as a fault of its own."""
+    """Collects internal errors that a server logs."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
         self.found: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep it."""
+        """Record it."""
         self.found.append(logging.Formatter().format(record))
 
 
@@ -53,11 +52,11 @@ class Target:
         self._master: Any = None
 
     def __call__(self, data: bytes) -> None:
-        """One input. Raise on a finding."""
+        """Send one input. Raise on a finding."""
         self._loop.run_until_complete(self._take(data))
 
     def close(self) -> None:
-        """End the master."""
+        """Stop the master."""
         if self._master:
             self._loop.run_until_complete(self._master.close())
         self._loop.close()
@@ -105,7 +104,7 @@ class Target:
 
 
 def seeds() -> list[bytes]:
-    """Good and bad requests to start with."""
+    """Return valid and invalid requests to start with."""
     from minirospy.core.wire.xmlrpc import serialize_call
 
     uri = "http://127.0.0.1:1/"
@@ -149,7 +148,7 @@ def seeds() -> list[bytes]:
 
 
 def with_atheris(minutes: float) -> int:
-    """Coverage-guided; does not return on a finding."""
+    """Fuzz with coverage guidance; do not return on a finding."""
     import atheris  # type: ignore[import-not-found, import-untyped, unused-ignore]
 
     with atheris.instrument_imports(include=["minirospy"]):
@@ -165,7 +164,7 @@ def with_atheris(minutes: float) -> int:
 
 
 def with_mutations(minutes: float) -> int:
-    """Without coverage: pieces of requests put together, cut and repeated."""
+    """Fuzz without coverage: combine, cut and repeat pieces of requests."""
     target, sources = Target(), seeds()
     rng = random.Random(time.time_ns())
     end, count = time.monotonic() + 60 * minutes, 0
@@ -214,7 +213,7 @@ def mutated(rng: random.Random, sources: list[bytes]) -> bytes:
 
 
 def main() -> int:
-    """Fuzz, or run one input again."""
+    """Fuzz, or run one input again; return the exit status."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -1,11 +1,13 @@
-"""Anything at all, sent to the bridge by a client: it answers or refuses, and the next client finds it as before.
+"""Fuzz the bridge with arbitrary client input: it answers or refuses, and the next client is served as before.
 
     make fuzz                                            # ten minutes of this, too
     python tests/fuzz_bridge.py --minutes 1 --only rosbridge
 
-Handshakes and frames with mutations of the Foxglove protocol and of rosbridge, requests for images. A finding is written to
-``fuzz-bridge-finding.bin``, the kind of its input in the first line; ``python tests/fuzz_bridge.py FILE`` runs it again. At
-the end the memory of the process at each quarter is printed.
+Inputs are mutated handshakes and frames of the Foxglove protocol and of rosbridge, and requests for images. A finding is
+written
+to ``fuzz-bridge-finding.bin``, with the kind of its input in the first line; ``python tests/fuzz_bridge.py FILE`` runs it
+again.
+At the end the memory of the process at each quarter is printed.
 """
 
 from __future__ import annotations
@@ -120,7 +122,7 @@ PAGES = [
 
 
 def tcp_pair() -> tuple[socket.socket, socket.socket]:
-    """Return two ends of a TCP connection: Unix sockets have no ports, which a request names."""
+    """Return both sockets of a TCP connection: Unix sockets have no ports, which a request contains."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         theirs = socket.create_connection(server.getsockname())
         ours, _ = server.accept()
@@ -136,7 +138,7 @@ class Kind(NamedTuple):
 
 
 def kinds() -> Mapping[str, Kind]:
-    """Return the inputs by the name of the listener that gets them."""
+    """Return the name of each listener -> its inputs."""
     from minirospy.web.rosbridge.cbor import encode_cbor, typed_array
     from minirospy.web.rosbridge.protocol import encode
 
@@ -172,11 +174,11 @@ class Target:
         self._parts: tuple[Any, Any, Any] | None = None
 
     def __call__(self, kind: str, data: bytes) -> None:
-        """Give one input to a listener. Raise on a finding."""
+        """Send one input to a listener. Raise on a finding."""
         self._loop.run_until_complete(self._take(kind, data))
 
     def close(self) -> None:
-        """End the bridge."""
+        """Stop the bridge."""
         self._loop.run_until_complete(self._end())
         self._loop.close()
 
@@ -217,7 +219,7 @@ class Target:
         await self._settle(bridge)
 
     async def _settle(self, bridge: Any) -> None:
-        """Wait until nothing of the client is left."""
+        """Wait until no state of the client is left."""
 
         def left() -> list[object]:
             connections = [each for listener in bridge.listeners.values() for each in listener.connections]
@@ -246,7 +248,7 @@ class Target:
         await master.start()
         node = Node("bridge", master_uri=f"http://localhost:{master.port}", host="localhost", rosout=False)
         await node.start()
-        # What a client did wrong is not a finding, and would be printed for each input.
+        # A client's errors are not findings, and would be logged for each input.
         logging.getLogger(node.log.name).disabled = True
         options = BridgeOptions(
             foxglove_port=0,
@@ -261,7 +263,7 @@ class Target:
         images = await node.advertise("/image", Image, latch=True)
         await images.publish(Image(height=2, width=2, encoding="mono8", step=2, data=b"abcd"))
         await node.serve("/set", SetBool, lambda request: (request.data, "set"))
-        # A steady client, so that the next one is offered channels immediately.
+        # A client that stays connected, so that the next one is offered channels immediately.
         bridge.foxglove.open(Steady())  # type: ignore[arg-type]
         while not bridge.foxglove.channels.by_id:
             await asyncio.sleep(0.01)
@@ -279,7 +281,7 @@ class Target:
 
 
 class Steady:
-    """A client that takes everything."""
+    """A client that accepts all messages."""
 
     may_write = True
 
@@ -289,13 +291,13 @@ class Steady:
         self.queue = SendQueue()
 
     def send_text(self, _: str) -> None:
-        """Take it."""
+        """Discard it."""
 
     def send_binary(self, *_: bytes) -> None:
-        """Take it."""
+        """Discard it."""
 
     def send_message(self, *_: object, **__: object) -> None:
-        """Take it."""
+        """Discard it."""
 
 
 def an_input(rng: random.Random, kind: Kind) -> bytes:
@@ -308,15 +310,15 @@ def an_input(rng: random.Random, kind: Kind) -> bytes:
         sources = list(kind.texts if is_text else kind.binaries)
         payload = rng.choice(sources)
         if rng.random() < 0.6:
-            # The accidents are those of requests, of which a payload is the body.
+            # The mutations are those of requests, whose body is the payload.
             requests = [b"\r\n\r\n" + each for each in sources]
             payload = mutated(rng, requests).replace(CUT, b"").partition(b"\r\n\r\n")[2]
         if rng.random() < 0.1:
-            # Continuations, pings, pongs, closes, and opcodes and bits that have no meaning.
+            # Continuations, pings, pongs, closes, and opcodes and bits without a meaning.
             parts.append(frame(payload[: rng.choice((0, 2, 100, 200))], rng.choice(OPCODES)))
         opcode = 1 if is_text else 2
         if rng.random() < 0.1:
-            # In two fragments.
+            # Split it into two fragments.
             cut = rng.randrange(len(payload) + 1)
             parts.append(frame(payload[:cut], opcode))
             payload, opcode = payload[cut:], 0
@@ -327,7 +329,7 @@ def an_input(rng: random.Random, kind: Kind) -> bytes:
 
 
 def main() -> int:
-    """Fuzz, or run one input again."""
+    """Fuzz, or run one input again; return the exit status."""
     inputs = kinds()
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -370,7 +372,7 @@ def main() -> int:
 
 
 def resident_megabytes() -> float:
-    """Return the memory of this process."""
+    """Return the memory of this process in MB."""
     import psutil
 
     return float(psutil.Process().memory_info().rss) / 1e6

@@ -1,12 +1,13 @@
-"""Any bytes, given to the readers of files: they are read, or refused with an error of ours, in little time and memory.
+"""Fuzz the file readers with arbitrary bytes: they read or refuse with minirospy's errors, within limits of time and memory.
 
     make fuzz                                                    # ten minutes of this, too
     python tests/fuzz_readers.py --minutes 60 --only mcap --seed 7
 
-Bags of both versions, MCAP files, XML (launch files, robot descriptions, manifests, test results), YAML (every loader of
-ours), with mutations that know what a length and a bracket are. Each kind of finding is written to
-``fuzz-reader-finding-N.bin`` once, the name of its reader in the first line; ``python tests/fuzz_readers.py FILE`` runs it
-again. At the end the inputs, the errors by their type, the slowest input and the peak of memory are printed.
+Bags of both versions, MCAP files, XML (launch files, robot descriptions, manifests, test results), YAML (all of minirospy's
+loaders), with mutations of lengths and brackets, among others. Each kind of finding is written to
+``fuzz-reader-finding-N.bin`` once, with the name of its reader in the first line; ``python tests/fuzz_readers.py FILE``
+runs it
+again. At the end the inputs, the errors by type, the slowest input and the peak memory are printed.
 """
 
 from __future__ import annotations
@@ -30,14 +31,14 @@ from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+# Address space of the process: a reader that claims more gets a MemoryError, a finding.
 MEMORY_BYTES = 3 << 30
-"""Address space of the process: a reader that claims more gets a MemoryError, which is a finding."""
 MAX_SECONDS = 20.0  # CPU time of an input of some kilobytes; more is a finding
 MAX_INPUT = 50_000  # bytes
 
 
 class Reader(NamedTuple):
-    """Texts or files to start with, what reads them, and the errors that it documents."""
+    """Seed texts or files, the function that reads them, and its documented errors."""
 
     seeds: Sequence[bytes]
     read: Callable[[bytes], object]
@@ -48,7 +49,7 @@ class Reader(NamedTuple):
 
 
 def bag_readers() -> dict[str, Reader]:
-    """Return the readers of files of messages."""
+    """Return the readers of bags."""
     from minirospy.base.errors import BagError
     from minirospy.core.bag.mcap_writer import McapWriter
     from tests.core.bag.bags import Given, make_bag
@@ -202,7 +203,7 @@ def xml_readers() -> dict[str, Reader]:
 
     def launch(data: bytes) -> None:
         text = data.decode("utf-8", "replace")
-        # Expressions of a launch file are evaluated: those of a mutation had better not be.
+        # Expressions of a launch file are evaluated: those of a mutation must not be.
         if "eval" not in text:
             load_text(text, {}, packages, {"HOME": "/h"})
 
@@ -224,7 +225,8 @@ def xml_readers() -> dict[str, Reader]:
         try:
             URDF.from_xml_string(data)
         except Exception as error:
-            # As the real one's: of a number that is none, an unknown shape, and two shapes in one <geometry>.
+            # Same as the real one's errors: for an invalid number, an unknown shape, and two shapes in one
+            # <geometry>.
             if type(error) not in (Exception, AssertionError, ValueError):
                 raise
 
@@ -349,7 +351,7 @@ TOKENS = [
 
 
 def mutated(source: random.Random, seeds: Sequence[bytes]) -> bytes:
-    """Return one of ``seeds`` after some accidents."""
+    """Return one of ``seeds`` after some mutations."""
     data = bytearray(source.choice(seeds))
 
     def flip(at: int) -> None:
@@ -396,14 +398,14 @@ def mutated(source: random.Random, seeds: Sequence[bytes]) -> bytes:
 
 
 class NoProgram:
-    """In place of subprocess.Popen: a launch file runs programs, and those of a mutation had better not run."""
+    """Replaces subprocess.Popen: a launch file runs programs, and those of a mutation must not run."""
 
     def __init__(self, *_: object, **__: object) -> None:
         raise FileNotFoundError
 
 
 class Run:
-    """What was tried, and what was found."""
+    """The inputs that were tried, and the findings."""
 
     def __init__(self) -> None:
         self.inputs: Counter[str] = Counter()
@@ -412,7 +414,7 @@ class Run:
         self.slowest = (0.0, "")
 
     def take(self, name: str, reader: Reader, data: bytes) -> None:
-        """Give one input to a reader, and keep what is a finding."""
+        """Give one input to a reader, and record a finding."""
         self.inputs[name] += 1
         start = time.process_time()
         try:
@@ -422,7 +424,7 @@ class Run:
             if "\n" in str(error).rstrip("\n") and name not in ("yaml", "urdf_parser_py"):
                 self._found(name, data, f"{type(error).__name__} of several lines", f"{error}\n")
         except Exception as error:  # noqa: BLE001 - that is what is looked for
-            # The same place and error is one finding.
+            # An error at the same location is the same finding.
             frames = traceback.extract_tb(error.__traceback__)
             place = next(
                 (
@@ -455,7 +457,7 @@ def all_readers() -> dict[str, dict[str, Reader]]:
 
 
 def main() -> int:
-    """Fuzz, or run one input again."""
+    """Fuzz, or run one input again; return the exit status."""
     groups = all_readers()
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -495,7 +497,7 @@ def main() -> int:
 
 
 def limit_memory() -> None:
-    """Have what claims more than MEMORY_BYTES fail, if the system can."""
+    """Limit the address space to MEMORY_BYTES, if the system can."""
     with contextlib.suppress(ImportError):
         import resource
 
@@ -503,7 +505,7 @@ def limit_memory() -> None:
 
 
 def peak_megabytes() -> str:
-    """Return the peak of this process's memory."""
+    """Return this process's peak memory in MB."""
     try:
         import resource
     except ImportError:

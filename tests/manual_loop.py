@@ -1,4 +1,4 @@
-"""An event loop whose clock the test holds: a time limit passes when the test says so, on any machine."""
+"""An event loop whose clock the test controls: timeouts expire when the test decides, on any machine."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import Any
 
 __all__ = ["ManualLoop", "run_manually", "until"]
 
-_PATIENCE = 60.0
-"""Seconds of the wall clock: a condition that does not hold by then never will."""
+_PATIENCE = 60.0  # seconds of the wall clock after which a condition is considered to never become true
 
 
 class ManualLoop(asyncio.SelectorEventLoop):
@@ -25,15 +24,16 @@ class ManualLoop(asyncio.SelectorEventLoop):
         return self._now
 
     async def advance(self, seconds: float) -> None:
-        """Move the clock in one leap, as a stall of the machine does, and run what is due then."""
-        # What has been started sets its own timers by the clock as it is now.
+        """Advance the clock in one step, as after a stall of the machine, and run what is due then."""
+        # New tasks set their timers by the current clock.
         await self._settle()
         self._now += seconds
         await self._settle()
 
     @staticmethod
     async def _settle() -> None:
-        # The first turn collects the timers that are due, the next ones run what their callbacks start.
+        # The first iteration collects the timers that are due, the next ones run the tasks that their callbacks
+        # start.
         for _ in range(20):
             await asyncio.sleep(0)
 
@@ -49,7 +49,7 @@ def run_manually(scene: Callable[[ManualLoop], Coroutine[Any, Any, None]]) -> No
 
 
 async def until(condition: Callable[[], object]) -> None:
-    """Let sockets and threads do their part until the condition holds; the loop's clock does not advance meanwhile."""
+    """Let sockets and threads run until the condition is true; the loop's clock does not advance meanwhile."""
     end = time.monotonic() + _PATIENCE
     while not condition():
         if time.monotonic() > end:

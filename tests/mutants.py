@@ -1,4 +1,4 @@
-"""Mutation testing: small faults put into pure rooms, the journal and access, and whether a test notices each one.
+"""Mutation testing: insert small faults into pure rooms, the journal and access, and check that a test detects each one.
 
     make mutants                                  # all rooms
     python tests/mutants.py journal --show        # one, with the source of every survivor
@@ -6,7 +6,7 @@
 
 One pytest session collects the tests and runs them once, recording which lines each test executes. Then every mutant gets
 a fork of that session: the code of the mutated function is replaced in place, and the tests that execute the mutated line
-run, the quickest first, until one fails. So a mutant costs milliseconds and the working tree is never touched. Texts
+run, the quickest first, until one fails. So a mutant costs milliseconds and the working tree is never touched. Messages
 of exceptions and of log lines are not mutated, nor are annotations and docstrings.
 
 Needs os.fork: Linux and macOS.
@@ -41,12 +41,12 @@ PACKAGE = ROOT / "minirospy"
 
 @dataclass(frozen=True)
 class Room:
-    """Modules that are mutated, and the tests that are to notice it."""
+    """Mutated modules, and the tests that should detect the mutants."""
 
     modules: Sequence[str]
     tests: Sequence[str]
     deselected: Sequence[str] = ()
-    """Parts of names of tests: those of other processes, which would run the code as it is."""
+    """Parts of names of excluded tests: they start other processes, which would run the original code."""
 
 
 ROOMS = {
@@ -125,11 +125,10 @@ _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.BitAnd: ast.BitOr,
 }
 
-_IMPOSSIBLE = 42
-"""The exit status of a fork that could not install its mutant."""
+_IMPOSSIBLE = 42  # exit status of a fork that could not install its mutant
 
 Mutate = Callable[[ast.AST], ast.AST | None]
-"""Return what replaces a node; None if the node itself was changed."""
+"""Return a node's replacement; None if the node itself was changed."""
 
 
 # --- finding mutants
@@ -137,7 +136,7 @@ Mutate = Callable[[ast.AST], ast.AST | None]
 
 @dataclass(frozen=True)
 class Mutant:
-    """One fault: ``number`` is that of the mutated node in a walk of the module."""
+    """One fault: ``number`` is the position of the mutated node in a walk of the module."""
 
     module: str
     number: int
@@ -171,19 +170,19 @@ def _untested(node: ast.AST) -> Iterator[ast.AST]:
         case ast.Call(func=ast.Attribute(value=ast.Name(id="_log"))):
             yield node
         case ast.Call(func=ast.Name(id="getattr"), args=[ast.Name(id="os"), *_]):
-            # What only some systems have.
+            # Code for some systems only.
             yield node
         case ast.Expr(value=ast.Constant()) | ast.ImportFrom() | ast.Import():
             yield node
         case ast.If(test=ast.Name(id="TYPE_CHECKING")):
             yield node
         case ast.If(test=ast.Compare(left=ast.Attribute(value=ast.Name(id="sys"), attr="platform"))):
-            # What another system runs.
+            # Code for another system.
             yield from (node.test, *(node.body if sys.platform != "win32" else node.orelse))
         case ast.Assign(targets=[ast.Name(id="__all__")]):
             yield node
         case ast.ClassDef():
-            # What a class body holds is evaluated once, before there is a mutant.
+            # A class body's statements run once, before there is a mutant.
             yield from (each for each in node.body if not isinstance(each, ast.FunctionDef))
             yield from (*node.bases, *node.decorator_list, *(each.value for each in node.keywords))
 
@@ -261,7 +260,7 @@ def install(
 ) -> bool:
     """Change the code of the running module; return whether that was possible. ``functions``: by line and name.
 
-    It is not where the fault takes away a function's only use of an outer variable, such as super().
+    It is not possible if the fault removes a function's only use of an outer variable, such as super().
     """
     mutated = copy.deepcopy(tree)
     node = next(each for number, each in enumerate(ast.walk(mutated)) if number == mutant.number)
@@ -312,7 +311,7 @@ def _holds(statement: ast.stmt, line: int) -> bool:
 
 
 def _assign(module: ModuleType, statement: ast.stmt, path: str) -> None:
-    """Run a mutated assignment of a module, and hand its value to the modules that import the name."""
+    """Run a mutated assignment of a module, and set its value in the modules that import the name."""
     before = dict(vars(module))
     exec(compile(ast.Module([statement], []), path, "exec"), vars(module))
     for name, old in before.items():
@@ -347,18 +346,21 @@ class Mutants:
         self.results: Counter[str] = Counter()
 
     def pytest_sessionstart(self) -> None:
-        """Have fewer examples made up, and the same ones for each mutant. The tests' own profile is loaded by now."""
+        """Reduce the number of generated examples, and use the same ones for each mutant.
+
+        The tests' own profile is loaded by now.
+        """
         settings.register_profile(
             "mutants", settings(), max_examples=30, derandomize=True, database=None, deadline=None
         )
         settings.load_profile("mutants")
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Leave out the tests of other processes."""
+        """Exclude the tests of other processes."""
         items[:] = [item for item in items if not any(part in item.name for part in self._room.deselected)]
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Run the tests once, then those that matter for each mutant."""
+        """Run the tests once, then the relevant ones for each mutant."""
         for index, item in enumerate(session.items):
             self._record(session, index, item)
         session._setupstate.teardown_exact(None)
@@ -387,7 +389,7 @@ class Mutants:
 
             return on_line
 
-        # What is made once is executed by the first test alone.
+        # Cached results are computed only in the first test.
         for name in self._trees:
             importlib.import_module(f"minirospy.{name}")
             _clear_caches(name)
@@ -484,7 +486,7 @@ class Mutants:
                 if name == mutant.module
                 for index in indexes
             }
-            # A test that a limit is as documented executes no line.
+            # A test of a documented limit executes no line.
             test_file = "test_" + mutant.module.rpartition(".")[2]
             found |= {index for index, item in enumerate(session.items) if item.path.stem == test_file}
         else:
@@ -506,7 +508,7 @@ class Mutants:
         tests: Sequence[int],
         functions: dict[str, dict[tuple[int, str], list[FunctionType]]],
     ) -> None:
-        """Run the tests with the fault in place; exit with 1 as soon as one fails."""
+        """Run the tests with the mutant installed; exit with 1 as soon as one fails."""
         status = 1
 
         try:
@@ -514,7 +516,7 @@ class Mutants:
             for stream in (0, 1, 2):
                 os.dup2(nowhere, stream)
             path, tree = self._trees[mutant.module]
-            # Its stream is a copy of standard output.
+            # Its stream is a copy of stdout.
             session.config.pluginmanager.unregister(name="terminalreporter")
             if not install(mutant, tree, path, functions[mutant.module]):
                 status = _IMPOSSIBLE
@@ -542,7 +544,7 @@ def run_room(name: str, options: argparse.Namespace) -> float:
     """Try the mutants of a room; return the percentage that was killed."""
     room, start_time = ROOMS[name], time.monotonic()
     plugin = Mutants(room, options)
-    # importlib's rewriting of asserts is for people.
+    # importlib mode; rewriting asserts is only useful for people.
     arguments = [
         "-q",
         "-p",
@@ -585,7 +587,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.chdir(ROOT)
     shares = []
     for name in options.rooms or ROOMS:
-        # Each room gets a process: pytest runs once in each.
+        # Each room gets a process, because pytest runs once per process.
         pid = os.fork()
         if not pid:
             share = run_room(name, options)

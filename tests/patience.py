@@ -1,4 +1,4 @@
-"""Limits of the product that a test waits out: longer than a machine that runs tests may stand still."""
+"""Raise the product's time limits in a test: above any stall of a machine that runs tests."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import pytest
 
 __all__ = ["PATIENCE", "patient_limits"]
 
-PATIENCE = 60.0
-"""Seconds: a machine that runs tests may stand still for some."""
+PATIENCE = 60.0  # seconds; a machine that runs tests may stall for some
 LIMITS = (
     "aio.topics._JOIN_SECONDS",
     "fleet.definitions._SECONDS",
@@ -20,11 +19,11 @@ LIMITS = (
     "ros2.services._QUERY_SECONDS",
     "cli.bridge_status._SECONDS",
 )
-"""What gives up, or goes on without an answer, after some seconds."""
+"""Limits after which the product gives up, or continues without an answer, in seconds."""
 
 
 @pytest.fixture(autouse=True)
 def patient_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait longer than a machine may stand still for. A test of a limit sets it after this."""
+    """Raise the limits above a machine's stalls. A test of a limit sets it after this."""
     for name in LIMITS:
         monkeypatch.setattr(f"minirospy.{name}", PATIENCE)

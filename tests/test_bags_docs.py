@@ -1,4 +1,4 @@
-"""docs/bags.md is true: each recipe, typed, prints what the page shows."""
+"""docs/bags.md is correct: each recipe prints the output on the page."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def make_bag(path: Path) -> None:
 
 
 def matches(shown: list[str], printed: list[str]) -> bool:
-    """Return whether lines are those that are shown, where ``...`` is any text, and alone any lines."""
+    """Return whether printed lines match the shown ones; ``...`` is any text, on a separate line any lines."""
     if not shown:
         return not printed
     first, *rest = shown

@@ -1,4 +1,4 @@
-"""The pages of the course are true: each command, typed into real terminals, prints what the page shows."""
+"""The pages of the course are correct: each command, typed into real terminals, prints the output on the page."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PAGES: tuple[str, ...] = record.PAGES if record else ()
 
 
 class Course:
-    """One student for all tests: a page builds on what the pages before it have left in the home folder."""
+    """One student for all tests: a page continues with the files that the earlier pages left in the home folder."""
 
     def __init__(self, home: Path, boards: Path) -> None:
         assert record is not None
@@ -51,7 +51,7 @@ def course(tmp_path_factory: pytest.TempPathFactory, _board_folder: Path) -> Cou
     return Course(tmp_path_factory.mktemp("student"), _board_folder)
 
 
-# The pages before it may have to be played first, on a machine that has other things to do.
+# The earlier pages may have to be played first, on a busy machine.
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("page", PAGES)
 def test_page_shows_the_output_of_its_commands(course: Course, page: str) -> None:

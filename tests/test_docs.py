@@ -1,4 +1,4 @@
-"""The programs of the docs run, and print what the pages say."""
+"""The programs in the docs run, and print the output on the pages."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_program(code: str, printed: str, master: str) -> None:
     assert done.returncode == 0, done.stderr
     expected = re.escape(printed).replace(r"\.\.\.", ".*")
     assert re.fullmatch(expected, done.stdout), done.stdout
-    # What handlers raise is logged; nothing else is.
+    # Exceptions of handlers are logged, and nothing else.
     assert "Warning" not in done.stderr
 
 

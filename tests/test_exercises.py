@@ -1,4 +1,4 @@
-"""The workshop's exercises, solved in rpi_feros: their package tests, as a student runs them, and their launch files."""
+"""The workshop's exercises, solved in rpi_feros: their package tests as students run them, and their launch files."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_each_exercise_has_its_test() -> None:
 
 @pytest.mark.parametrize("exercise", EXERCISES)
 def test_one_launch_file_starts_all_robots(exercise: str) -> None:
-    """workshop.launch runs what the exercise's own file runs, and every node in it has a program."""
+    """workshop.launch runs the nodes of the exercise's own file, and every node in it has a program."""
     packages = Packages()
 
     def nodes(name: str, **args: str) -> list[tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""Imports go only downwards through the rooms, and the pure rooms stay pure. By reading, not by importing."""
+"""Imports go only downwards through the rooms, and the pure rooms stay pure. Checked by parsing, not by importing."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ LAYERS = [
     {"core", "board"},
     {"base"},
 ]
+# Exceptions: `rosbag play --bridge` shows the bag in a browser.
 UPWARDS = {("ros/rosbag/commands/rosbag_play.py", "web")}
-"""Imports that go upwards all the same: `rosbag play --bridge` shows the bag in a browser."""
 OPTIONAL_PACKAGES = [
     "ament_index_python", "angles", "camera_info_manager_py", "diagnostic_aggregator",
     "diagnostic_updater", "dynamic_reconfigure", "foxglove_bridge", "image_geometry", "image_transport",
@@ -41,7 +41,7 @@ OPTIONAL_PACKAGES = [
     "topic_tools", "turtle_tf", "turtle_tf2", "turtlesim", "two_link_arm", "urdf", "urdf_parser_plugin",
     "urdfdom_py", "web_video_server", "xacro",
 ]  # fmt: skip
-"""The ROS packages that no other package needs."""
+"""The ROS packages on which no other package depends."""
 LEAVES = {
     **{room: [room] for room in ("web", "fleet", "ros2")},
     "ROS packages": [f"ros/{package}" for package in OPTIONAL_PACKAGES],
@@ -51,7 +51,7 @@ LEAVES = {
 """Parts that can be deleted: nothing outside imports one, except for functions of `cli/`, which run it. Name -> its paths."""
 LEAF_PATHS = sorted(path for paths in LEAVES.values() for path in paths)
 SYSTEM_PACKAGES = {"catkin", "python_orocos_kdl", "rospkg"}
-"""Real ROS has these from the system or for each package: a package.xml names them as rosdep does, or not at all."""
+"""Real ROS has these from the system or for each package: a package.xml uses rosdep's name, or none."""
 UNNAMED = {
     ("camera_info_manager_py", "camera_calibration_parsers"): "both read the files of cameras' calibrations",
     ("catkin", "rosunit"): "run_tests runs the tests of all kinds",
@@ -74,7 +74,7 @@ UNNAMED = {
     ("tf2_py", "tf2_ros"): "the buffer is in tf2_ros",
     ("tf2_sensor_msgs", "tf2_geometry_msgs"): "both transform with PyKDL",
 }
-"""(package, imported package) that the package.xml of the real package does not name -> the reason for the import."""
+"""(package, imported package) missing from the real package's package.xml -> the reason for the import."""
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 BYTES_ONLY = [PACKAGE / "runtime", PACKAGE / "core" / "wire"]
 PURE = {"core"}
@@ -150,7 +150,7 @@ FILES = sorted(
 
 @functools.cache
 def imports(path: Path, *, for_types: bool = True) -> frozenset[str]:
-    """Return every module that a file imports, wherever in the file; without ``for_types`` only what runs."""
+    """Return every module that a file imports, anywhere in the file; without ``for_types`` only run-time imports."""
     found: set[str] = set()
     blocks: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
     while blocks:
@@ -163,13 +163,13 @@ def imports(path: Path, *, for_types: bool = True) -> frozenset[str]:
         elif isinstance(node, ast.If) and not for_types and ast.unparse(node.test) == "TYPE_CHECKING":
             blocks += node.orelse
         elif not isinstance(node, ast.expr):
-            # Imports are statements, and no expression has one.
+            # Imports are statements, which expressions cannot contain.
             blocks += ast.iter_child_nodes(node)
     return frozenset(found)
 
 
 def graph_of_imports(room: str) -> dict[str, set[str]]:
-    """Return the modules of a room that each of its modules imports, functions included, types alone excluded."""
+    """Return module -> the modules of the same room that it imports, including in functions, excluding imports for types."""
     files = [path for path in FILES if path.relative_to(PACKAGE).with_suffix("").parts[0] == room]
     modules = {module_name(path): path for path in files}
     found = {module: imports(path, for_types=False) for module, path in modules.items()}
@@ -230,7 +230,7 @@ def test_no_room_has_an_import_cycle(room: str) -> None:
 
 
 def ros_package_of(path: Path) -> str:
-    """Return the ROS package that a file belongs to, empty for a file of another room."""
+    """Return a file's ROS package; an empty string for a file of another room."""
     parts = path.relative_to(PACKAGE).parts
     return parts[1] if parts[0] == "ros" and len(parts) > 2 else ""
 
@@ -249,7 +249,7 @@ def package_imports() -> dict[tuple[str, str], set[str]]:
 
 
 def named_dependencies(package: str) -> set[str]:
-    """Return what the package.xml names; nothing for a package that real ROS has from the system."""
+    """Return the dependencies in package.xml; nothing for a package that real ROS has from the system."""
     folders = (PACKAGE / "ros" / package, PACKAGE.parent / "msgs" / package)
     manifests = [folder / "package.xml" for folder in folders if (folder / "package.xml").exists()]
     return {
@@ -267,7 +267,7 @@ def test_ros_package_imports_what_its_manifest_names() -> None:
         if package and other not in SYSTEM_PACKAGES and other not in named_dependencies(package)
     }
     assert {pair: files for pair, files in unnamed.items() if pair not in UNNAMED} == {}
-    # An exception that is needed no longer goes.
+    # Remove exceptions that are no longer needed.
     assert set(UNNAMED) - unnamed.keys() == set()
 
 
@@ -292,7 +292,7 @@ def leaf_of_module(module: str) -> str:
 
 @functools.cache
 def imported_on_import(path: Path) -> frozenset[str]:
-    """Return what a file imports when it is imported: not in functions, not for types alone."""
+    """Return a file's imports at import time: not those in functions or for types only."""
     found: set[str] = set()
     blocks: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
     while blocks:
@@ -349,7 +349,7 @@ import_all(minirospy)
 
 @pytest.fixture(scope="module")
 def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a copy of the modules of the package, with the definitions of messages next to it."""
+    """Return a copy of the package's modules, with the message definitions next to it."""
     target = tmp_path_factory.mktemp("copy") / "minirospy"
     for path in FILES:
         copy = target / path.relative_to(PACKAGE)

@@ -1,6 +1,6 @@
 """Cells of a notebook: the kernel's event loop runs in the main thread, and an interrupt ends a cell, not the kernel.
 
-A kernel of IPython's own is not needed for that: what it does to signals and to the loop is done here.
+The tests need no IPython kernel: they imitate its handling of signals and of the loop.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def test_interrupts_end_cells_and_not_the_kernel(master: str) -> None:
         *["interrupted"] * 4,
         "(False, None)",
         "from a cell",
-        # Real rospy's spin takes the interrupt too, and shuts down.
+        # Real rospy's spin also handles the interrupt, and shuts down.
         "None",
         "(True, ['still here'])",
         "the kernel goes on",

@@ -1,4 +1,4 @@
-"""packaging/: what the recipes say is what pyproject.toml says."""
+"""packaging/: the recipes agree with pyproject.toml."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from minirospy.cli.registry import console_scripts
 ROOT = Path(__file__).parents[1]
 PROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
 
-CONDA_NAMES = {"msgpack": "msgpack-python"}
-"""Where conda-forge has another name than PyPI."""
+CONDA_NAMES = {"msgpack": "msgpack-python"}  # PyPI name -> conda-forge name, if they differ
 
 
 def _section(title: str) -> str:
@@ -81,6 +80,6 @@ def test_lists_of_commands_are_those_of_the_registry() -> None:
 def test_dockerfile_installs_the_wheel_of_a_release() -> None:
     text = (ROOT / "packaging" / "Dockerfile").read_text(encoding="utf-8")
     assert "COPY dist/minirospy-*-py3-none-any.whl" in text
-    # A program in a container gets its signals itself: the command is no shell's line.
+    # A program in a container must receive signals itself: the command is not run by a shell.
     assert re.search(r'^CMD \["roscore"\]$', text, flags=re.MULTILINE)
     assert text.index("USER ros") < text.index("CMD ")

@@ -30,7 +30,7 @@ SOURCES = [
 
 @pytest.fixture
 def contents() -> dict[str, int]:
-    """Return the files of a wheel that has all that it needs, with their sizes."""
+    """Return the files of a complete wheel, with their sizes."""
     names = [
         "minirospy_overlay.pth",
         "minirospy/__init__.py",
@@ -126,8 +126,8 @@ def test_addresses_of_gitlab_have_its_paths() -> None:
         "https://[git.example.org/robots/ours",
     ],
 )
-def test_release_refuses_what_is_no_address(address: str) -> None:
-    """In one line, before anything is built."""
+def test_release_refuses_an_invalid_address(address: str) -> None:
+    """The error is one line, before anything is built."""
     done = subprocess.run(
         [sys.executable, str(ROOT / "tools" / "release.py")],
         env={**os.environ, ADDRESS_VARIABLE: address},
@@ -152,7 +152,7 @@ def test_metadata_without_the_addresses_is_named() -> None:
 
 
 def test_every_link_of_the_readme_leads_to_a_file() -> None:
-    """Below the address, as the published description has them."""
+    """The links are below the address, as in the published description."""
     files = f"{ADDRESS}/blob/HEAD/"
     text = readme_of_wheel((ROOT / "README.md").read_text(encoding="utf-8"), files)
     named = [link.partition(")")[0] for link in text.split(f"]({files}")[1:]]
@@ -161,7 +161,7 @@ def test_every_link_of_the_readme_leads_to_a_file() -> None:
 
 
 def test_both_builds_are_of_one_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where somebody commits between them."""
+    """Also if a commit is made between them."""
     repository = tmp_path / "repository"
     repository.mkdir()
     environ = {**os.environ, "GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1"}
@@ -181,7 +181,7 @@ def test_both_builds_are_of_one_commit(tmp_path: Path, monkeypatch: pytest.Monke
         git("add", "text")
         git("commit", "--quiet", "--message", text)
     monkeypatch.setattr(release, "ROOT", repository)
-    # What is built is not looked at here, but what is built from.
+    # This test checks only the commit that is built.
     monkeypatch.setattr(release, "_run", lambda *_, **__: "")
 
     (tmp_path / "build" / "dist").mkdir(parents=True)

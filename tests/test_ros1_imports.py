@@ -1,4 +1,4 @@
-"""ros1_imports: rospy and the commands where ROS 2 is sourced, whose packages of the same names come first on PYTHONPATH."""
+"""ros1_imports: rospy and the commands after ROS 2 is sourced, whose packages of the same names come first on PYTHONPATH."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ print(String._md5sum, Log._type, tf2_ros.__name__, PoseStamped().header.seq, gen
 
 @pytest.fixture
 def sourced(tmp_path: Path) -> dict[str, str]:
-    """Return the environment of a terminal where ROS 2 is sourced, with packages as rosidl and ament write them."""
+    """Return a terminal's environment after ROS 2 is sourced, with packages as rosidl and ament generate them."""
     prefix = tmp_path / "opt"
     site = prefix / "lib" / "python3" / "site-packages"
     index = prefix / "share" / "ament_index" / "resource_index" / "packages"
@@ -47,7 +47,7 @@ def run(program: str, environ: dict[str, str]) -> subprocess.CompletedProcess[st
     )
 
 
-def test_rospy_and_its_messages_are_imported_beside_ros2(sourced: dict[str, str]) -> None:
+def test_rospy_and_its_messages_can_be_imported_with_ros2_sourced(sourced: dict[str, str]) -> None:
     done = run(PROGRAM, sourced)
     assert done.returncode == 0, done.stderr
     assert done.stdout == "992ce8a1687cec8c8bd883ec73ca41d1 rosgraph_msgs/Log tf2_ros 0 1\n"
@@ -63,7 +63,7 @@ def test_messages_of_ros2_that_came_first_are_named_in_one_line(sourced: dict[st
 
 
 def test_a_process_without_rospy_imports_what_is_first(sourced: dict[str, str]) -> None:
-    # As the bridge to ROS 2, which runs with its packages.
+    # As in the ROS 2 bridge, which uses ROS 2's packages.
     done = run("import minirospy.aio.node\nfrom std_msgs.msg import Thing\nprint(Thing.kind)", sourced)
     assert done.stdout == "ROS 2\n", done.stderr
 
@@ -75,12 +75,12 @@ def test_a_process_without_rospy_imports_what_is_first(sourced: dict[str, str]) 
         "import minirospy.ros.tf2_ros.tools.static_publisher as m; print(m.Header._type)",
     ],
 )
-def test_a_program_of_ours_is_imported_beside_ros2(sourced: dict[str, str], program: str) -> None:
+def test_minirospy_program_can_be_imported_with_ros2_sourced(sourced: dict[str, str], program: str) -> None:
     done = run(program, sourced)
     assert done.returncode == 0, done.stderr
 
 
-def test_a_command_has_messages_of_ros1_beside_ros2(sourced: dict[str, str], master: str) -> None:
+def test_command_uses_ros1_messages_with_ros2_sourced(sourced: dict[str, str], master: str) -> None:
     words = (sys.executable, "-m", "minirospy", "topic", "pub", "-1", "/x", "std_msgs/String", "hi")
     environ = {**sourced, "ROS_MASTER_URI": master}
     done = subprocess.run(words, env=environ, capture_output=True, text=True, timeout=100, check=False)

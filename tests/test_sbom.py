@@ -1,4 +1,4 @@
-"""The bill of materials of a wheel: what is in it, with licences; a part that is not what it is said to be is refused."""
+"""The bill of materials of a wheel: its contents with licences; a part that differs from its description is refused."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_sbom_has_dependencies_without_those_of_extras(bom: dict[str, Any]) -> N
     assert bom["dependencies"][0]["dependsOn"] == ["pkg:pypi/pyyaml", "pkg:pypi/rich"]
 
 
-def test_sbom_has_what_is_inside_with_licences(bom: dict[str, Any]) -> None:
+def test_sbom_lists_contents_with_licences(bom: dict[str, Any]) -> None:
     dagre, messages = bom["metadata"]["component"]["components"]
     assert (dagre["purl"], dagre["licenses"]) == (
         "pkg:npm/%40dagrejs/dagre@3.1.3",

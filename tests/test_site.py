@@ -1,4 +1,4 @@
-"""The pages as a site: mkdocs.yml names each of them, and no link of theirs is broken, there or in the sources."""
+"""The pages as a site: mkdocs.yml lists each of them, and no link is broken, on the site or in the sources."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _nav(entries: object) -> Iterator[str]:
 
 
 def _prose(page: Path) -> str:
-    """Return a page's text without what is code."""
+    """Return a page's text without code."""
     text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
     return re.sub(r"^(?:    |\t)(?![-*\d]).*$", "", text, flags=re.MULTILINE)
 

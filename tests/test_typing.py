@@ -1,4 +1,4 @@
-"""What mypy and an editor know of a student's file: the types of rospy and of messages."""
+"""The types of rospy and of messages that mypy and editors see in a student's file."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_constructors_of_messages_are_typed(tmp_path: Path) -> None:
         check=False,
     )
     lines = [line for line in done.stdout.splitlines() if "defined in" not in line]
-    # Each version of mypy writes the type of a function in its own way.
+    # mypy's versions format a function's type differently.
     (scan,) = (line for line in lines if "LaserScan" in line)
     assert "angle_min: float =, angle_max: float =" in scan
     assert [line for line in lines if line != scan] == [
@@ -96,7 +96,7 @@ def test_constructors_of_messages_are_typed(tmp_path: Path) -> None:
 
 
 def test_any_stays_rare() -> None:
-    """`Any` switches the checker off: a value that is passed on is an `object`, a message has a protocol."""
+    """`Any` disables the checker: a value that is only passed on is an `object`, and a message has a protocol."""
     package = Path(__file__).parents[1] / "minirospy"
     texts = {
         path.relative_to(package): path.read_text(encoding="utf-8")

@@ -1,6 +1,6 @@
-"""Waiting for a condition that no event reports: the one place where tests poll, and the one limit.
+"""Wait for a condition that no event reports: the only place in the tests that polls, with one limit.
 
-A test whose loop's clock stands still has ``until`` of :mod:`tests.manual_loop`.
+A test that uses a loop with a stopped clock needs ``until`` of :mod:`tests.manual_loop`.
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ from collections.abc import Callable
 
 __all__ = ["until", "wait_until"]
 
-_PATIENCE = 100.0
-"""Seconds: a machine that runs tests may stand still for some."""
+_PATIENCE = 100.0  # seconds; a machine that runs tests may stall
 _PAUSE = 0.005
 
 
 def wait_until(condition: Callable[[], object]) -> None:
-    """Return once a condition holds. Raise TimeoutError if it never does."""
+    """Return once a condition is true. Raise TimeoutError if it never is."""
     end = time.monotonic() + _PATIENCE
     while not condition():
         if time.monotonic() > end:
@@ -26,7 +25,7 @@ def wait_until(condition: Callable[[], object]) -> None:
 
 
 async def until(condition: Callable[[], object]) -> None:
-    """Let the loop run until a condition holds. Raise TimeoutError if it never does."""
+    """Let the loop run until a condition is true. Raise TimeoutError if it never is."""
     end = time.monotonic() + _PATIENCE
     while not condition():
         if time.monotonic() > end:

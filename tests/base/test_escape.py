@@ -67,7 +67,7 @@ def test_own_text_of_a_command_moves_the_cursor() -> None:
         "\033]2;a title\007",
     ],
 )
-def test_terminal_gets_what_commands_send(text: str) -> None:
+def test_terminal_receives_output_of_commands(text: str) -> None:
     assert written(lambda terminal: terminal.write(text)) == text
 
 

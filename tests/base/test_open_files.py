@@ -70,7 +70,7 @@ def test_replace_file_gives_up_after_a_while(
     assert old.read_text() == "old"
 
 
-def test_replace_file_does_not_wait_where_permission_is_missing(
+def test_replace_file_does_not_retry_without_permission(
     paths: tuple[Path, Path], refused: Callable[[int], threading.Event], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     refused(1)

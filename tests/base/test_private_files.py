@@ -88,7 +88,7 @@ def test_open_text_empties_or_appends(tmp_path: Path) -> None:
     assert path.read_text() == ""
 
 
-def test_read_file_reads_what_has_another_name_too(tmp_path: Path, mine: Path) -> None:
+def test_read_file_reads_hard_links(tmp_path: Path, mine: Path) -> None:
     """Backups use hard links; reading one is harmless."""
     os.link(mine, tmp_path / "name")
     assert private_files.read_file(tmp_path / "name") == (b"precious", mine.stat().st_mtime)

@@ -50,7 +50,7 @@ READERS: dict[str, tuple[str, Callable[[str], object], type[Exception]]] = {
     ],
     ids=["laughs", "parameter entity", "external entity", "default of an attribute", "deep"],
 )
-def test_what_unfolds_is_refused_with_its_reason(reader: str, text: str, why: str) -> None:
+def test_expanding_entities_are_refused_with_the_reason(reader: str, text: str, why: str) -> None:
     root, parse, error = READERS[reader]
     with pytest.raises(error, match=why):
         parse(text.format(root))
@@ -84,7 +84,7 @@ def test_too_many_tags_are_refused() -> None:
         check_xml("<a>" + "<b/>" * 1_000_000 + "</a>")
 
 
-def test_what_is_no_xml_is_a_syntax_error_with_its_line() -> None:
+def test_invalid_xml_is_a_syntax_error_with_its_line() -> None:
     with pytest.raises(XmlSyntaxError, match=r"line 2: mismatched tag"):
         parse_xml("<a>\n</b>")
 
@@ -99,7 +99,7 @@ def test_test_results_that_unfold_are_a_warning(tmp_path: Path, capsys: pytest.C
 
 
 @pytest.mark.parametrize("included", [False, True])
-def test_xacro_refuses_what_unfolds(tmp_path: Path, included: bool) -> None:
+def test_xacro_refuses_expanding_entities(tmp_path: Path, included: bool) -> None:
     pytest.importorskip("xacro")
     bad, main = tmp_path / "bad.xacro", tmp_path / "main.xacro"
     bad.write_text(LAUGHS.format("robot") + "<robot>&a8;</robot>")

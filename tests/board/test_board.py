@@ -184,7 +184,7 @@ def test_spoilt_pins_are_a_fresh_board() -> None:
         assert set(board.levels().values()) == {0}
 
 
-def test_by_tcp_where_the_path_is_too_long_for_a_socket(
+def test_tcp_is_used_if_the_path_is_too_long_for_a_socket(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(tmp_path / ("d" * 120)))

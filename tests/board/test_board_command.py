@@ -98,7 +98,7 @@ def test_reset(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == f"{new}away\n"
 
 
-def test_press_warns_where_no_button_is_wired(capsys: pytest.CaptureFixture[str]) -> None:
+def test_press_warns_if_no_button_is_wired(capsys: pytest.CaptureFixture[str]) -> None:
     program = Gpio()
     program.setmode(BCM)
     program.setup(20, IN, pull_up_down=PUD_UP)

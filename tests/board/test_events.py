@@ -23,7 +23,7 @@ def test_debounce_reports_the_first_edge_then_is_deaf() -> None:
     assert [time for time in times if detector.see(1, time)] == [10.0, 10.51, 11.2]
 
 
-def test_edges_of_the_other_slope_do_not_make_it_deaf() -> None:
+def test_edges_of_the_other_slope_do_not_block_detection() -> None:
     detector = Detector(11, Slope.RISING, 0.5)
     assert not detector.see(0, 1.0)
     assert detector.see(1, 1.1)

@@ -262,7 +262,7 @@ def test_cleanup(bcm: Gpio, board: Board) -> None:
         bcm.cleanup()
 
 
-def test_cleanup_forgets_the_numbering_also_where_no_channel_is_left(bcm: Gpio) -> None:
+def test_cleanup_resets_numbering_without_channels(bcm: Gpio) -> None:
     bcm.setwarnings(False)
     bcm.cleanup()
     assert bcm.getmode() == GPIO.BCM  # no pin is set up yet

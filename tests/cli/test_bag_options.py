@@ -77,7 +77,9 @@ def test_show_prints_the_definition_in_the_bag(command: Command, bag: str) -> No
 
 
 @pytest.mark.parametrize("words", [("rostopic", "list"), ("rostopic", "echo"), ("rosmsg", "show")])
-def test_what_is_not_a_bag_is_one_line(command: Command, bag: str, words: tuple[str, str]) -> None:
+def test_file_that_is_not_a_bag_gives_a_one_line_error(
+    command: Command, bag: str, words: tuple[str, str]
+) -> None:
     Path("no.bag").write_bytes(b"hello")
     name, verb = words
     argument = [] if verb == "list" else ["std_msgs/String"]

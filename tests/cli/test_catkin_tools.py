@@ -49,7 +49,7 @@ def test_find(workspace: Path, capsys: Capture) -> None:
     assert find(capsys, workspace, "std_msgs", "msg/Bool.msg")[0].endswith("std_msgs/msg/Bool.msg")
 
 
-def test_find_where_there_can_be_nothing(workspace: Path, capsys: Capture) -> None:
+def test_find_in_folders_without_packages(workspace: Path, capsys: Capture) -> None:
     assert catkin_find(["--lib", "a"]) == 2
     assert capsys.readouterr().err == "catkin_find: ERROR: no search for a package in lib\n"
     assert catkin_find(["--libexec"]) == 2

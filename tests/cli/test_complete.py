@@ -155,7 +155,7 @@ def test_every_command_is_completed(entry: Entry) -> None:
 
 
 @pytest.mark.parametrize(("typed", "leaf"), LEAVES, ids=[typed for typed, _ in LEAVES])
-def test_function_takes_what_its_parser_parses(typed: str, leaf: Command | Verb) -> None:
+def test_function_accepts_its_parsers_arguments(typed: str, leaf: Command | Verb) -> None:
     parser = leaf.parser()
     names = {
         action.dest

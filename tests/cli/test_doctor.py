@@ -86,7 +86,7 @@ def test_a_graph_that_is_well(robot: Any, command: Any) -> None:
     assert command("rosnode", "list").out == "/robot\n"
 
 
-def test_nodes_that_are_dead_nowhere_or_others(
+def test_dead_unresolvable_and_third_party_nodes(
     robot: Any, master: str, closed_port: int, command: Any
 ) -> None:
     proxy = MasterProxy(master, "/")

@@ -97,7 +97,7 @@ def test_a_local_roscore_listens_on_loopback_alone(how: str, elsewhere: Mapping[
         assert names.stdout == "/rosout\n"
 
 
-def test_roscore_names_the_word_where_everybody_may_connect(elsewhere: Mapping[str, str]) -> None:
+def test_roscore_suggests_local_if_everyone_may_connect(elsewhere: Mapping[str, str]) -> None:
     with started("roscore", "-p", str(free_port()), until="Ctrl-C", ROS_HOSTNAME=socket.gethostname()) as (
         _,
         printed,

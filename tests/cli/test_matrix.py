@@ -359,7 +359,7 @@ ROS_OUTPUT = {
 
 
 @pytest.mark.parametrize("line", [name for name, row in ROWS.items() if row.unknown and not row.waits])
-def test_a_name_that_nobody_has(line: str, graph: Robot) -> None:
+def test_unknown_name(line: str, graph: Robot) -> None:
     row = ROWS[line]
     result = run(f"{line} {row.unknown}")
     if row.quiet:
@@ -563,7 +563,7 @@ def test_the_nearest_of_a_topic_that_is_waited_for(line: str, graph: Robot) -> N
 
 
 @posix
-def test_the_nearest_of_what_else_is_waited_for(graph: Robot) -> None:
+def test_suggestions_for_other_waits(graph: Robot) -> None:
     assert _until_ctrl_c("rosservice call --wait /set_led_stat", "did you mean").err == (
         "WARNING: service [/set_led_stat] is not there yet\ndid you mean /set_led_state?\n"
     )

@@ -171,7 +171,7 @@ def test_a_file_that_cannot_be_read_does_not_stop_the_others(command: Command, b
     assert compressions(bag) == {"bz2"}
 
 
-def test_a_disk_that_is_full_leaves_the_bag_where_it_was(
+def test_full_disk_leaves_the_bag_unchanged(
     command: Command, bag: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(self: BagWriter, connection: int, time: int, body: bytes) -> None:
@@ -198,7 +198,7 @@ def test_reindex_makes_the_index_again(command: Command, bag: Path) -> None:
     assert bag.read_bytes() == data
 
 
-def test_reindex_says_what_is_lost(command: Command, bag: Path) -> None:
+def test_reindex_reports_lost_messages(command: Command, bag: Path) -> None:
     expected = messages(bag)
     bag.write_bytes(bag.read_bytes()[:6000])
 
@@ -219,9 +219,7 @@ def test_reindex_says_what_is_lost(command: Command, bag: Path) -> None:
         ("False", 0),
     ],
 )
-def test_filter_keeps_what_the_expression_selects(
-    command: Command, bag: Path, expression: str, kept: int
-) -> None:
+def test_filter_keeps_selected_messages(command: Command, bag: Path, expression: str, kept: int) -> None:
     status, _, err = command("rosbag", "filter", "a.bag", "b.bag", expression)
     assert (status, err) == (0, "")
     assert len(messages(Path("b.bag"))) == kept

@@ -76,7 +76,7 @@ def test_fix_writes_the_new_type(command: Command, bag: Path) -> None:
     assert command("rosbag", "check", "b.bag").out == "Bag file does not need any migrations.\n"
 
 
-def test_fix_by_force_copies_what_has_no_rule(command: Command, bag: Path) -> None:
+def test_forced_fix_copies_messages_without_a_rule(command: Command, bag: Path) -> None:
     assert command("rosbag", "fix", "--force", "a.bag", "b.bag") == (
         0,
         "Bag migrated successfully.\n",
@@ -85,7 +85,7 @@ def test_fix_by_force_copies_what_has_no_rule(command: Command, bag: Path) -> No
     assert len(list(open_bag(io.BytesIO(Path("b.bag").read_bytes())).messages())) == 2
 
 
-def test_type_that_has_moved_is_asked_for(
+def test_moved_type_prompts_for_its_new_name(
     command: Command, bag: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     gone = connection(0, "/a", type="gone_msgs/Text", md5sum="x")

@@ -46,7 +46,7 @@ def test_without_logs_nothing_is_printed(command: Command, tmp_path: Path) -> No
     assert command("rosclean", "purge") == (0, "", "")
 
 
-def test_purge_asks(command: Command, logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_purge_requests_confirmation(command: Command, logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     question = f"PLEASE BE CAREFUL TO VERIFY THE COMMAND BELOW!\nOkay to perform:\n\nrm -rf {logs}\n(y/n)?\n"
     for said in ("n\n", ""):
         answer(monkeypatch, said)

@@ -80,7 +80,7 @@ def test_without_a_master(command: Command) -> None:
         assert "no ROS master answers" in err
 
 
-def test_echo_that_waits_in_vain_says_so(
+def test_echo_reports_that_it_receives_nothing(
     master: str, program: Callable[[Sequence[str]], subprocess.Popen[str]]
 ) -> None:
     echo = program(["rosconsole", "echo", "--topic", "!!", "nobody"])

@@ -238,7 +238,7 @@ for omit, message.level, message.msg in (
 """
 
 
-def test_rosout_log_contains_what_nodes_log(start: Start) -> None:
+def test_rosout_log_contains_messages_of_nodes(start: Start) -> None:
     """The lines have the format of real rosout."""
     core = start()
     subprocess.run([sys.executable, "-c", LOGS], check=True, timeout=60)

@@ -146,7 +146,7 @@ def test_an_option_that_is_nearly_one(capsys: pytest.CaptureFixture[str]) -> Non
         )
 
 
-def test_without_words_it_tells_where_help_is(command: Any) -> None:
+def test_command_without_arguments_points_to_its_help(command: Any) -> None:
     assert command("rospack") == (0, "", "[rospack] Error: no command given.  Try 'rospack help'\n")
     for words in (["-h"], ["help"], ["--help"]):
         result = command("rospack", *words)

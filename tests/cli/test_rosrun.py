@@ -70,14 +70,14 @@ def test_of_several_of_one_name_one_is_chosen(package: Path) -> None:
 
 
 @posix
-def test_where_nobody_can_choose_it_ends(package: Path) -> None:
+def test_ambiguous_name_without_a_choice_is_an_error(package: Path) -> None:
     status, _, err = rosrun_("my", "twin")
     assert status == 2
     assert err.splitlines()[-1] == "#? rosrun: ERROR: nobody chose: name the path, as `rosrun my nodes/twin`"
 
 
 @posix
-def test_what_a_build_has_put_in_devel_is_no_second_program(package: Path, tmp_path: Path) -> None:
+def test_copy_in_devel_is_not_a_second_program(package: Path, tmp_path: Path) -> None:
     built = tmp_path / "devel" / "lib" / "my"
     built.mkdir(parents=True)
     for name in ("down", "compiled"):

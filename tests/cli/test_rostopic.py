@@ -247,7 +247,7 @@ def test_pub_of_another_type_is_warned_of(robot: Any, command: Any, monkeypatch:
     )
 
 
-def test_pub_to_nobody_names_a_similar_topic_with_subscribers(
+def test_pub_without_subscribers_suggests_a_similar_topic(
     robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.1)

@@ -33,7 +33,7 @@ def test_of_all(command: Command) -> None:
     assert names == sorted(names)
 
 
-def test_of_what_minirospy_brings_along(command: Command) -> None:
+def test_version_of_included_packages(command: Command) -> None:
     """The version is that of the ROS release from which the definitions are, not minirospy's."""
     for package, version in (
         ("std_msgs", "0.5.13"),

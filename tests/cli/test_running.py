@@ -102,7 +102,7 @@ def read_until(process: subprocess.Popen[str], word: str) -> str:
 
 @posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_roscore_says_where_it_is_and_ends(
+def test_roscore_prints_its_address_and_exits(
     port: int, started: list[subprocess.Popen[str]], number: int
 ) -> None:
     core = start(started, "roscore", "-p", str(port))
@@ -136,7 +136,7 @@ def test_a_second_roscore_says_that_one_is_running(master: str) -> None:
     assert done.stderr.count("\n") == 1
 
 
-def test_roscore_on_a_port_of_somebody_else() -> None:
+def test_roscore_on_an_occupied_port() -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
@@ -271,7 +271,7 @@ def test_nodes_run_without_log_files(
     assert "[s-1] process has finished cleanly\nlog file: none\n" in done.stdout
 
 
-def test_a_node_starts_where_its_folder_cannot_be_made(
+def test_node_starts_if_its_folder_cannot_be_created(
     master: str, package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
@@ -365,7 +365,7 @@ def test_undeclared_launch_argument_is_a_warning(package: Path, capsys: pytest.C
     assert captured.err.startswith("WARNING: arg [sped] not found; did you mean speed?")
 
 
-def test_the_line_of_a_node_where_no_master_is_named(
+def test_args_line_without_ros_master_uri(
     package: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The line matches real ROS's, so that it works in every terminal."""
@@ -396,7 +396,7 @@ def test_roslaunch_does_not_start_a_master_elsewhere(package: Path, monkeypatch:
 # --- the family and the demo
 
 
-def test_the_family_tells_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
+def test_family_lists_its_commands(capsys: pytest.CaptureFixture[str]) -> None:
     assert umbrella.main([]) == 2
     assert "minirospy demo " in capsys.readouterr().out
     assert umbrella.main(["--version"]) == 0

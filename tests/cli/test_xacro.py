@@ -88,7 +88,7 @@ def test_python_programs_find_packages(macros: Path) -> None:
         (None, "error: No such file or directory"),
     ],
 )
-def test_what_cannot_be_processed_is_said_without_a_traceback(
+def test_unprocessable_files_are_reported_without_a_traceback(
     text: str | None, words: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "a.xacro"

@@ -75,7 +75,7 @@ def eventually(name, value):
 """
 
 
-def test_a_cached_namespace_follows_what_is_below_and_above_it(serving: Master) -> None:
+def test_cached_namespace_follows_changes_below_and_above_it(serving: Master) -> None:
     program = """
 rospy.set_param("/g", {"a": 1, "n": {"x": 1}})
 print(rospy.get_param_cached("/g"), rospy.get_param_cached("/g/n"), rospy.get_param_cached("/g/n/x"))
@@ -97,7 +97,7 @@ print(rospy.get_param_cached("/g", None), rospy.get_param_cached("/g/n/x", None)
     ]
 
 
-def test_a_cached_value_asks_nobody_and_is_the_callers_own(serving: Master) -> None:
+def test_cached_value_needs_no_call_and_is_a_copy(serving: Master) -> None:
     program = """
 rospy.set_param("/list", [1])
 rospy.get_param_cached("/list").append(2)

@@ -202,7 +202,7 @@ def test_a_request_that_does_not_fit_is_answered(started: list[Program], master:
         assert answer.read(length).startswith(b"error processing request: ")
 
 
-def test_a_call_of_what_is_not_there_fails_with_one_error(started: list[Program]) -> None:
+def test_call_of_missing_service_raises_one_error(started: list[Program]) -> None:
     """rospy also prints its own internals."""
     client = start(
         started,

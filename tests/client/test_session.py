@@ -71,7 +71,7 @@ def test_a_fork_keeps_the_state_and_not_the_hooks(session: Session, *, was_down:
     assert ran == []
 
 
-def test_what_waits_for_a_node_runs_once_it_is_ready(session: Session) -> None:
+def test_waiting_calls_run_once_the_node_is_ready(session: Session) -> None:
     ran: list[int] = []
     session.when_ready(lambda: ran.append(1))
     assert ran == []

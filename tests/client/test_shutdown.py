@@ -48,7 +48,7 @@ def test_a_main_thread_that_goes_on_is_interrupted_once_and_reported(machine: Sh
     assert timeline(machine, 10.3, 100.0) == [(10.8, Action.INTERRUPT), (12.0, Action.REPORT)]
 
 
-def test_hooks_run_elsewhere_where_the_main_thread_is_in_c_code(machine: ShutdownMachine) -> None:
+def test_hooks_run_in_another_thread_during_c_code(machine: ShutdownMachine) -> None:
     machine.signal(0.0)
     assert timeline(machine, 0.0, 0.9) == [(0.5, Action.RUN_HOOKS)]
     machine.phase = Phase.HOOKS

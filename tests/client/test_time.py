@@ -23,7 +23,7 @@ def run(program: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-def test_a_timer_that_is_shut_down_ends_at_once() -> None:
+def test_timer_stops_immediately_at_shutdown() -> None:
     program = """
 rospy.init_node("case")
 timer = rospy.Timer(rospy.Duration(1000), print)
@@ -80,7 +80,7 @@ print(thread.is_alive(), rospy.get_time() > 1e9)
     assert run(program) == ["False True"]
 
 
-def test_an_error_in_simulated_time_is_logged_where_a_timer_ends() -> None:
+def test_error_in_simulated_time_is_logged_when_a_timer_stops() -> None:
     program = """
 import rospy.rostime
 threading.excepthook = lambda args: print(args.exc_type.__name__, args.exc_value)

@@ -137,7 +137,7 @@ kept = [rospy.Publisher("/t", type_, queue_size=1) for type_ in (String, String,
     assert "[std_msgs/Int32]" in errors
 
 
-def test_bytes_that_do_not_fit_a_second_class_are_told_of(start: Start) -> None:
+def test_bytes_that_do_not_fit_a_second_class_are_reported(start: Start) -> None:
     output, errors = finished(
         start("""
 rospy.init_node("both")
@@ -180,7 +180,7 @@ print(eventually(lambda: got), got[0].point.y, repr(got[0].header.frame_id))
     assert output == "refused\nTrue 2.0 ''\n"
 
 
-def test_what_numpy_computes_is_a_value(start: Start) -> None:
+def test_numpy_scalars_are_values(start: Start) -> None:
     pytest.importorskip("numpy")
     output, _ = finished(
         start("""

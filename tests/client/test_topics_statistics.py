@@ -55,7 +55,7 @@ def test_gaps_and_ages() -> None:
     assert [round(value, 3) for value in report.period] == [0.667, 0.236, 1.0]
 
 
-def test_a_stamp_that_nobody_set_is_no_age() -> None:
+def test_unset_stamp_gives_no_age() -> None:
     counter = TopicStatisticsCounter(WindowLimits())
     counter.count(Stamped(1, 0), TALKER, 40, SECOND)
     report = counter.count(Stamped(2, 0), TALKER, 40, 3 * SECOND)

@@ -113,7 +113,7 @@ def test_a_service_answers_and_its_error_arrives(fleet: Fleet) -> None:
         fleet.run(client.call("/robot1/lamp", SetBool, False))
 
 
-def test_latched_topics_reach_those_who_come_later(fleet: Fleet) -> None:
+def test_latched_topics_reach_late_subscribers(fleet: Fleet) -> None:
     robot, first, second = fleet.place(), fleet.place(), fleet.place()
     maps = publisher(fleet, robot, "/map", OccupancyGrid, latch=True)
     fleet.run(maps.publish(OccupancyGrid(data=[1, 2, 3])))

@@ -147,7 +147,7 @@ def test_a_topic_that_is_closed_while_its_type_is_queried_is_not_published() -> 
     asyncio.run(check())
 
 
-def test_a_publisher_that_comes_back_at_once_is_heard() -> None:
+def test_publisher_that_returns_immediately_is_received() -> None:
     async def check() -> None:
         gate, sent = asyncio.Event(), []
         made = [

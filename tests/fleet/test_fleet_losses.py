@@ -344,7 +344,7 @@ def test_a_rate_limit_holds_back_at_the_robot(fleet: Fleet) -> None:
     assert [each.data for each in found] == [0]
 
 
-def test_what_is_not_of_the_form_is_left_out(fleet: Fleet) -> None:
+def test_malformed_items_are_left_out(fleet: Fleet) -> None:
     robot, control = fleet.place(), fleet.place()
     found = collect(fleet, robot, "/chat", String)
     secret = collect(fleet, robot, "/secret", String, "other")
@@ -575,7 +575,7 @@ def test_a_name_that_does_not_resolve_yet_is_named_once(
     ]
 
 
-def test_a_local_process_connects_to_nobody_else(
+def test_local_process_connects_to_no_other_host(
     master: str, start: Callable[..., subprocess.Popen[str]]
 ) -> None:
     for words in (("control", "--listen", "0.0.0.0"), ("control", "--scout")):
@@ -632,7 +632,7 @@ def test_a_second_start_that_cannot_listen_does_not_end_the_first(
     assert ended(running)[0] == 0
 
 
-def test_robot_stops_where_its_commands_do_not_arrive_any_more(fleet: Fleet) -> None:
+def test_robot_stops_if_commands_stop_arriving(fleet: Fleet) -> None:
     """The link is cut, and the loop of the robot's gateway is blocked: publishing zero needs neither."""
     robot, control = fleet.place(), fleet.place()
     control.gateway(listens=True)

@@ -247,7 +247,7 @@ def test_a_service_of_this_master_is_not_replaced(fleet: Fleet, peer: Callable[.
     assert (asked, later) == ([True], [True])
 
 
-def test_what_ends_there_leaves_this_master_and_comes_again(
+def test_topics_removed_there_leave_this_master_and_return(
     fleet: Fleet, peer: Callable[..., Ros1Peer], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ros1_keys, "LOST_SECONDS", LOST_SECONDS)
@@ -280,7 +280,7 @@ def test_what_ends_there_leaves_this_master_and_comes_again(
     fleet.until(lambda: [each.data for each in found] == ["back"])
 
 
-def test_what_ends_here_is_announced_no_more(fleet: Fleet, peer: Callable[..., Ros1Peer]) -> None:
+def test_removed_topics_are_not_announced_any_more(fleet: Fleet, peer: Callable[..., Ros1Peer]) -> None:
     place = fleet.place()
     chat = publisher(fleet, place, "/chat", String)
     other = publisher(fleet, place, "/other", String, name="other")
@@ -364,7 +364,7 @@ def test_a_second_gateway_of_these_keys_is_refused(fleet: Fleet) -> None:
         gateway(place, name="robot1")
 
 
-def test_what_another_gateway_of_this_master_passes_is_not_announced(
+def test_topics_of_another_gateway_of_this_master_are_not_announced(
     fleet: Fleet, peer: Callable[..., Ros1Peer], caplog: pytest.LogCaptureFixture
 ) -> None:
     """As if two start at the same moment, or zenoh-bridge-ros1 itself starts later."""

@@ -131,7 +131,7 @@ def test_flags_that_do_not_change_messages_keep_a_link() -> None:
 # --- rules
 
 
-def test_exports_are_what_others_have() -> None:
+def test_exports_are_topics_of_other_nodes() -> None:
     snapshot = Snapshot(
         {"/scan": ("/laser",), "/own": ("/gw",), "/robot2/scan": ("/gw", "/x"), "/a b": ("/x",)},
         {"/cmd_vel": ("/base", "/gw"), "/untyped": ("/x",), "/scan": ("/gw",)},

@@ -51,7 +51,7 @@ def joy(axis: float, button: int) -> Joy:
         (joy(0, 1), joy(0, 0)),
     ],
 )
-def test_what_moves_has_a_message_that_stops_it(moving: Any, rest: Any) -> None:
+def test_driving_types_have_a_stop_message(moving: Any, rest: Any) -> None:
     assert at_rest(moving._type, body(moving)) == body(rest)
     assert at_rest(rest._type, body(rest)) is None
 

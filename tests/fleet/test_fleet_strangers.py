@@ -57,7 +57,7 @@ def serve_lamp(fleet: Fleet, robot: Any) -> None:
 
 
 @pytest.mark.parametrize("handler", [silence, rubbish])
-def test_answers_that_are_rubbish_or_never_come_harm_nobody(fleet: Fleet, handler: Any) -> None:
+def test_invalid_and_missing_answers_are_harmless(fleet: Fleet, handler: Any) -> None:
     robot, control = fleet.place(), fleet.place()
     thing = class_from_text("my_msgs/Thing", TEXT)
     things = publisher(fleet, robot, "/things", thing)
@@ -133,7 +133,7 @@ def test_only_as_many_replies_as_wanted_are_kept() -> None:
     asyncio.run(asyncio.wait_for(check(), 60.0))
 
 
-def test_a_gateway_that_tells_no_types_takes_its_own_places_only() -> None:
+def test_gateway_without_types_uses_only_its_own_slots() -> None:
     async def check() -> None:
         asked: list[str] = []
 

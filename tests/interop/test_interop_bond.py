@@ -62,7 +62,7 @@ ENDED = ["broken", "waited True True True"]
 
 
 @pytest.mark.parametrize(("one", "other"), PAIRS)
-def test_bond_that_one_end_breaks_breaks_at_the_other(one: str, other: str, end: Start) -> None:
+def test_bond_broken_by_one_endpoint_breaks_at_the_other(one: str, other: str, end: Start) -> None:
     ends = end(one), end(other)
     assert [lines(each, 1) for each in ends] == [["formed"], ["formed"]]
     send(ends[0], "break")

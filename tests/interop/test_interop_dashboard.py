@@ -106,7 +106,7 @@ def test_codec_of_the_page_reads_and_writes_every_type() -> None:
 
 
 @needs_node
-def test_codec_of_the_page_gives_the_values_and_refuses_what_does_not_fit() -> None:
+def test_codec_of_the_page_decodes_values_and_refuses_invalid_bytes() -> None:
     text = (
         "uint8 A=1 # no field\nstring B=a#b\nint64 big\nfloat64[] list\nT[2] two\n"
         + "=" * 80
@@ -698,7 +698,7 @@ def test_form_stays_when_the_publisher_of_its_topic_leaves(
 
 
 @needs_chromium
-def test_topic_that_nobody_publishes_is_published(
+def test_topic_without_publisher_is_published(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:
     served = serve()
@@ -861,7 +861,7 @@ def press(page: Page, kind: str, key: str) -> None:
 
 
 @needs_chromium
-def test_stick_drives_a_topic_that_nobody_publishes_and_stops_when_released(
+def test_stick_drives_an_unpublished_topic_and_stops_when_released(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:
     served = serve()
@@ -998,7 +998,7 @@ def test_history_of_a_status_has_its_changes(
 
 
 @needs_chromium
-def test_diagnostics_that_nobody_aggregates_are_a_list(
+def test_diagnostics_without_aggregator_are_a_list(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:
     served = serve()

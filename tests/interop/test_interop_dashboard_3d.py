@@ -250,7 +250,7 @@ def test_tools_publish_poses_goals_and_points(serve: Serve, browse: Browse) -> N
     assert (point.x, point.y, point.z) == pytest.approx((2, -2, 0), abs=0.05)
 
 
-def test_measure_and_focus_find_what_is_under_the_mouse(serve: Serve, browse: Browse) -> None:
+def test_measure_and_focus_find_the_object_under_the_mouse(serve: Serve, browse: Browse) -> None:
     served = serve()
     cube = robot_scene.marker(Marker.CUBE, 0, 0)
     cube.scale.z = 1.0

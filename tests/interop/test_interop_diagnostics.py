@@ -23,7 +23,7 @@ REAL = Path("/usr/lib/diagnostic_aggregator")
         pytest.param(sys.executable, [str(REAL)], id="real programs, our rospy"),
     ],
 )
-def test_programs_publish_what_is_recorded(python: str, programs: list[str], master: str) -> None:
+def test_programs_publish_the_recorded_messages(python: str, programs: list[str], master: str) -> None:
     done = subprocess.run(
         [python, str(HERE / "drive.py"), *programs],
         env=environment(master, "rospy"),

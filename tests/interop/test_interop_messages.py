@@ -499,7 +499,7 @@ OURS_ONLY = {
 
 
 @pytest.mark.parametrize(("text", "constants"), OURS_ONLY.values(), ids=OURS_ONLY.keys())
-def test_definitions_that_only_ours_takes(
+def test_definitions_that_only_minirospy_accepts(
     real: Callable[[str], Peer], text: str, constants: dict[str, str]
 ) -> None:
     """genpy itself fails on these and minirospy does what was meant; avoid them in definitions for both."""
@@ -688,7 +688,7 @@ def test_wrong_values(real: Callable[[str], Peer], name: str, value: Plain) -> N
 
 
 @pytest.mark.parametrize(("name", "value", "kind", "text"), WRONG_OTHERWISE, ids=lambda item: str(item)[:60])
-def test_wrong_values_that_only_ours_names(
+def test_wrong_values_that_only_minirospy_reports(
     real: Callable[[str], Peer], name: str, value: Plain, kind: str, text: str
 ) -> None:
     """minirospy raises a SerializationError that names the fault; real genpy raises various errors."""

@@ -60,7 +60,7 @@ def test_nodes_of_each_kind_are_shown_pinged_and_killed(
 
 
 @needs_chromium
-def test_nodes_are_sorted_by_what_they_cost(
+def test_nodes_are_sorted_by_cost(
     serve: Callable[..., Served],
     peer: Callable[[str, str, str], subprocess.Popen[str]],
     browse: Callable[..., Page],

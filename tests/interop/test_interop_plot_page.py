@@ -61,7 +61,7 @@ def test_derivative_is_the_slope_from_point_to_point_in_any_parts() -> None:
 
 
 @needs_node
-def test_derivative_is_by_the_stamps_of_headers_where_there_are_some() -> None:
+def test_derivative_uses_header_stamps_if_present() -> None:
     assert evaluated(
         "[...derivedOf('derivative').append([0, 5, 5, 5.1], [0, 1, 2, 4], [10, 10.5, 11, 12])]"
     ) == [

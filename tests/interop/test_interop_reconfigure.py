@@ -210,7 +210,7 @@ def dynparam(stack: str, uri: str, *words: str, share: Path = OUR_SHARE) -> tupl
 
 
 @pytest.mark.parametrize(("server", "tool"), [("ours", "rospy"), ("rospy", "ours"), ("ours", "ours")])
-def test_dynparam_prints_what_the_real_one_prints(
+def test_dynparam_prints_the_same_as_the_real_one(
     server: str,
     tool: str,
     real_master: str,

@@ -338,7 +338,7 @@ def test_messages_are_those_that_rosbags_converts(scene: Scene) -> None:
         scene.end(subscription)
 
 
-def test_who_joins_later_gets_what_was_latched(scene: Scene) -> None:
+def test_late_subscriber_receives_latched_messages(scene: Scene) -> None:
     data = sample("std_msgs/String")
     publisher = scene.advertise("/late/to_ros2", "std_msgs/String", latch=True)
     scene.publish(publisher, data)
@@ -377,7 +377,7 @@ def test_the_bridge_leaves_a_topic_with_its_last_end(scene: Scene) -> None:
     scene.peer.do("close", "/left/back")
 
 
-def test_no_message_comes_back_where_both_sides_publish_and_subscribe(scene: Scene) -> None:
+def test_no_message_returns_if_both_sides_publish_and_subscribe(scene: Scene) -> None:
     bridge = "/minirospy_ros2_bridge"
     topic = "/both"
     publisher = scene.advertise(topic, "std_msgs/Int8")
@@ -899,7 +899,7 @@ def running(words: list[str], environment: dict[str, str]) -> Iterator[subproces
             program.kill()
 
 
-def test_examples_of_the_page_do_what_it_says(scene: Scene, tmp_path: Path) -> None:
+def test_examples_of_the_page_run_as_described(scene: Scene, tmp_path: Path) -> None:
     def line_of(program: subprocess.Popen[str]) -> str:
         assert program.stdout
         return program.stdout.readline().strip()

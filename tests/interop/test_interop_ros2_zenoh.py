@@ -137,7 +137,7 @@ def said(peer: Peer, topic: str) -> Any:
     return peer.wait(lambda each: each["op"] == "message" and each["topic"] == topic)["value"]
 
 
-def test_who_joins_later_gets_what_was_latched(scene: ZenohScene, request: pytest.FixtureRequest) -> None:
+def test_late_subscriber_receives_latched_messages(scene: ZenohScene, request: pytest.FixtureRequest) -> None:
     # pyzeros does not support transient local.
     only(scene, "sdk", request)
     publisher = scene.advertise("/late", "std_msgs/String", latch=True)

@@ -169,7 +169,7 @@ def test_a_type_that_comes_later_is_recorded(
 
 
 @pytest.mark.parametrize("words", [(), ("-j",), ("--lz4",)], ids=["none", "bz2", "lz4"])
-def test_ros_reads_what_is_recorded(
+def test_ros_reads_the_recording(
     words: tuple[str, ...], talkers: tuple[Talker, Talker], run: Run, tmp_path: Path
 ) -> None:
     chatter = talkers[0].advertise("/chatter")
@@ -262,7 +262,7 @@ def make_bag(path: Path) -> None:
 
 
 @pytest.mark.parametrize(("player", "recorder"), [("cpp", "ours"), ("ours", "cpp"), ("ours", "ours")])
-def test_what_is_played_is_recorded(player: str, recorder: str, run: Run, tmp_path: Path) -> None:
+def test_played_messages_are_recorded(player: str, recorder: str, run: Run, tmp_path: Path) -> None:
     make_bag(tmp_path / "in.bag")
     recording = run(recorder, "record", "--chunksize", "0", "-O", "out", "/chatter", "/map")
     start = time.monotonic()

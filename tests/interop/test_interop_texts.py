@@ -135,7 +135,7 @@ def test_views_have_no_text_without_its_german_one(
 
 
 @needs_chromium
-def test_what_a_form_and_the_joints_refuse_is_said_in_german(
+def test_errors_of_forms_and_joints_are_in_german(
     serve: Callable[..., Served], browse: Callable[..., Page]
 ) -> None:
     served = serve()
@@ -262,7 +262,7 @@ def test_whatever_can_be_used_has_a_name_for_screen_readers(
 
 
 @needs_node
-def test_quoted_text_does_not_turn_what_is_around_it() -> None:
+def test_quoted_text_does_not_change_the_direction_around_it() -> None:
     text = 'a"\u202eb\u2067\u200f\u05d0'
     (found,) = page_functions(("dom", "quoted", [text]))
     assert found == '"a\\"\\u202eb\\u2067\\u200f\u05d0"'

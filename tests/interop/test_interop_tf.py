@@ -69,7 +69,7 @@ def test_ten_thousand_lookups_are_equal(lazily: bool) -> None:
     assert different == []
 
 
-def test_the_record_is_what_the_real_tf2_answers() -> None:
+def test_record_matches_answers_of_real_tf2() -> None:
     recorded = json.loads(RECORDED.read_text(encoding="utf-8"))
     conversations = [queries for queries, _ in recorded]
     assert conversations[: len(edge_cases())] == edge_cases()
@@ -79,7 +79,7 @@ def test_the_record_is_what_the_real_tf2_answers() -> None:
         ]
 
 
-def test_transformations_return_what_the_real_module_returns() -> None:
+def test_transformations_return_the_same_as_the_real_module() -> None:
     done = subprocess.run(
         [REAL_PYTHON, transformations_calls.__file__, *map(str, range(100, 115))],
         capture_output=True,
@@ -133,7 +133,7 @@ def running(stack: str, role: str, program: Path, uri: str) -> Iterator[Peer]:
 
 
 @pytest.mark.parametrize(("sender", "listener"), [("ours", "roscpp"), ("roscpp", "ours")])
-def test_transforms_between_ours_and_roscpp(
+def test_transforms_between_minirospy_and_roscpp(
     sender: str, listener: str, tf_peer: Path, real_master: str
 ) -> None:
     rng = random.Random(7)

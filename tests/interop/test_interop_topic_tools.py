@@ -13,7 +13,7 @@ from tests.interop.conftest import PATIENCE, REAL_PYTHON, environment
 DRIVE = Path(__file__).parents[1] / "ros" / "topic_tools" / "drive.py"
 
 
-def test_real_programs_pass_on_what_is_recorded(real_master: str) -> None:
+def test_real_programs_forward_the_recorded_messages(real_master: str) -> None:
     done = subprocess.run(
         [REAL_PYTHON, str(DRIVE), "/usr/lib/topic_tools"],
         env=environment(real_master, "rospy"),

@@ -197,7 +197,7 @@ def test_variables(environ: dict[str, str], place: MasterLocation, status: str, 
     assert bool(finding.advice) == (status != "ok")
 
 
-def test_a_folder_of_somebody_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_folder_of_another_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As `sudo roscore` leaves it; the advice never covers a folder above the one in question."""
     monkeypatch.setattr(os, "access", lambda path, _: Path(path) != tmp_path)
     environ = {"ROS_HOSTNAME": "localhost", "ROS_HOME": str(tmp_path)}

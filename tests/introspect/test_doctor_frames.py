@@ -102,7 +102,7 @@ def test_stamps_of_one_node_ahead_and_behind_are_both_reported() -> None:
     ]
 
 
-def test_transform_that_is_wrong_is_told_in_the_words_of_tf2() -> None:
+def test_wrong_transform_is_reported_with_tf2s_text() -> None:
     ((status, text),) = said(frame("b", "a", faults={"TF_NAN_INPUT: Ignoring transform ..."}))
     assert (status, text) == (Status.PROBLEM, "TF_NAN_INPUT: Ignoring transform ...")
 

@@ -107,7 +107,7 @@ def test_a_type_that_is_not_installed_comes_from_the_publishers_text() -> None:
     )
 
 
-def test_a_type_that_nobody_describes_is_said() -> None:
+def test_type_without_definition_is_reported() -> None:
     with pytest.raises(NotFoundError, match="not installed"):
         MessageClasses().for_header({"type": "far_away_msgs/Thing", "md5sum": "0123"})
 

@@ -90,7 +90,7 @@ def test_a_node_that_hangs_is_queried_once_at_a_time(monkeypatch: pytest.MonkeyP
     queried(scene)
 
 
-def test_an_answer_that_nobody_waited_for_is_reported() -> None:
+def test_unexpected_answer_is_reported() -> None:
     async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
         nodes.silent.add("late")
         await queries.look(["soon"], LIMIT)
@@ -104,7 +104,7 @@ def test_an_answer_that_nobody_waited_for_is_reported() -> None:
     queried(scene)
 
 
-def test_an_answer_for_what_has_gone_meanwhile_is_forgotten() -> None:
+def test_answer_of_a_removed_node_is_discarded() -> None:
     async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
         nodes.silent.add("moved")
         await queries.look(["moved"], 0.0)
@@ -211,7 +211,7 @@ def test_many_nodes_that_do_not_answer_keep_a_new_one_waiting_for_nothing(
     queried(scene)
 
 
-def test_what_nobody_foresaw_of_one_node_is_reported(caplog: pytest.LogCaptureFixture) -> None:
+def test_unexpected_error_of_one_node_is_reported(caplog: pytest.LogCaptureFixture) -> None:
     async def run() -> None:
         async def answer(name: str) -> str:
             if name == "odd":

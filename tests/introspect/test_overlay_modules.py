@@ -208,7 +208,7 @@ def test_windows_of_rates(capsys: pytest.CaptureFixture[str]) -> None:
         rostopic.ROSTopicHz(10).callback_hz(Bool())
 
 
-def test_a_node_that_nobody_knows(master: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unknown_node(master: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert not rosnode.rosnode_ping("/nobody", max_count=1, verbose=True)
     assert capsys.readouterr() == ("", "cannot ping [/nobody]: unknown node\n")
     with pytest.raises(rosnode.ROSNodeException, match="cannot resolve machine name"):

@@ -12,7 +12,7 @@ import psutil
 from minirospy.introspect.processes import ProcessLoads
 
 
-def test_load_of_a_process_is_what_psutil_measures() -> None:
+def test_load_of_a_process_matches_psutil() -> None:
     loads = ProcessLoads()
     first = loads.look([os.getpid()])[os.getpid()]
     assert first.cpu is None, "there is nothing to compare with"
@@ -33,7 +33,7 @@ def test_processes_that_have_ended_are_left_out() -> None:
     assert program.pid not in loads._known
 
 
-def test_another_process_of_the_same_id_starts_anew() -> None:
+def test_process_with_a_reused_id_starts_from_zero() -> None:
     loads = ProcessLoads()
     loads.look([os.getpid()])
     # As psutil does if the process id now belongs to another process.

@@ -56,14 +56,14 @@ def looked(seconds: float, stats: object, pid: int = 5) -> Survey:
         ([["/t", [[1, 100, 90, 10, 0], [2, 0, 0, 0, 0]]]], [["/t", [[1, 300, 280, 20, 0], [2, 8, 4, 1, 0]]]]),
     ],
 )
-def test_traffic_is_what_was_counted_between_two_moments(before: object, after: object) -> None:
+def test_traffic_is_the_difference_of_two_counts(before: object, after: object) -> None:
     assert traffic(looked(10, before), looked(12, after)) == {
         Edge("/a", "/t", "/b"): (5.0, 100.0),
         Edge("/a", "/t", "/c"): (0.5, 4.0),
     }
 
 
-def test_traffic_leaves_out_what_cannot_be_compared() -> None:
+def test_traffic_omits_incomparable_counts() -> None:
     first = looked(10, [["/t", 0, [[1, 100, 10, True]]]])
     assert traffic(None, first) == {}
     assert traffic(first, first) == {}

@@ -226,7 +226,7 @@ def test_a_long_integer_is_no_parameter_and_not_shown_in_full() -> None:
 
 
 @pytest.mark.parametrize("value", [None, 0.5, object()])
-def test_what_is_not_a_text_is_a_type_error_as_with_pyyaml(value: object) -> None:
+def test_non_string_raises_type_error_as_in_pyyaml(value: object) -> None:
     with pytest.raises(TypeError, match="YAML is a text, not "):
         yaml_text.safe_load(value)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="YAML is a text, not "):

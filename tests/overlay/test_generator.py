@@ -1,4 +1,4 @@
-"""genpy.generator: modules that programs make of definitions themselves."""
+"""genpy.generator: modules that programs generate from definitions."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_generated_package_can_be_imported(tmp_path: Path, search_path: dict[str
         text=True,
         check=False,
     )
-    # The md5sum that real genmsg computes of the same texts.
+    # The md5sum that real genmsg computes for the same texts.
     assert done.stdout == "7d6f54838e6b08a7ad004e13b48e4d3d data: False\n", done.stderr
 
 

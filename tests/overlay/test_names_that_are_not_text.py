@@ -1,4 +1,4 @@
-"""Names that are None or a number: the errors of ROS, by which programs see that something does not exist."""
+"""Names that are None or a number: ROS's errors, with which programs detect that something does not exist."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def test_fields_other_than_arrays_of_numbers_stay() -> None:
 
 
 def test_no_number_of_python_in_between() -> None:
-    """The array shares the bytes that came."""
+    """The array shares the received bytes."""
     received = numpy_msg(LaserScan)().deserialize(wire(LaserScan(ranges=[1.0, 2.0])))
     assert received.ranges.base is not None
 
@@ -177,7 +177,7 @@ for message in sorted(heard, key=lambda each: type(each).__name__):
 
 
 def test_between_nodes(master: str) -> None:
-    """The listing of the wiki's tutorial: a node publishes an array, and receives it."""
+    """The example of the wiki's tutorial: a node publishes an array, and receives it."""
     out = subprocess.run(
         [sys.executable, "-c", NODE], capture_output=True, text=True, timeout=200, check=False
     )

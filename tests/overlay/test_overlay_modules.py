@@ -1,4 +1,4 @@
-"""The modules of `overlay/` are generated from those of `ros/`: each offers what the `__all__` of its source names."""
+"""The modules of `overlay/` are generated from those of `ros/`: each exports the names in the `__all__` of its source."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from minirospy.ros.overlay_modules import PACKAGE, Origin, exported, modules, ov
 OVERLAY = PACKAGE / "overlay"
 NAMES = sorted(
     set(modules()) - {"RPi._GPIO"}
-)  # which has the list of RPi.GPIO, and answers for its names by a function
+)  # which has RPi.GPIO's list, and resolves its names with a function
 
 
 def names_of(path: Path) -> list[str]:
@@ -37,7 +37,7 @@ def test_module_offers_what_its_source_names(name: str) -> None:
 
 
 def test_every_package_with_a_python_module_is_offered() -> None:
-    # The folder of a ROS package that has the package's name is what `import` of that name offers.
+    # In a ROS package's folder, `import` of its name offers the folder of the same name.
     named = {
         folder.name
         for folder in (PACKAGE / "ros").iterdir()
@@ -57,7 +57,7 @@ def test_each_folder_of_the_tables_exists() -> None:
 
 
 def test_folder_has_what_would_be_written_now() -> None:
-    """`make` writes it again if a source changes; `python -m minirospy.ros.overlay_modules` does so by itself."""
+    """`make` regenerates it if a source changes; `python -m minirospy.ros.overlay_modules` does so without make."""
     for name, text in overlay_files().items():
         assert (OVERLAY / name).read_text(encoding="utf-8") == text, name
 
@@ -105,7 +105,7 @@ def test_names_are_imported_from_where_they_are_defined(sources: Path) -> None:
         "__all__ = ['start']\n"
     )
     (sources / "__init__.py").write_text("from minirospy.ros.pack.pack import first as first\n")
-    # What is imported in the form `as` the same name is offered, too; Any and TYPE_CHECKING are not.
+    # Imports in the form `x as x` are exported, too; Any and TYPE_CHECKING are not.
     assert exported(sources / "second.py") == {
         "start": Origin("minirospy.ros.pack.pack.first", "run"),
         "pi": Origin("math", "pi"),

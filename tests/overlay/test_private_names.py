@@ -1,4 +1,4 @@
-"""Private names of ROS's modules that programs use all the same."""
+"""Private names of ROS's modules that programs use nevertheless."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_fullusage_prints_the_commands_and_exits(
     with pytest.raises(SystemExit) as raised:
         module._fullusage()
     out, err = capsys.readouterr()
-    # rosparam alone exits with 0, as the real one does.
+    # Only rosparam exits with 0, as the real one does.
     assert (raised.value.code == 0) == (module is rosparam)
     assert "Commands:" in out + err
 

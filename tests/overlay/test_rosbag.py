@@ -135,7 +135,7 @@ def test_two_types_on_a_topic_keep_their_types(tmp_path: Path) -> None:
         assert bag.get_type_and_topic_info().topics["/mixed"].connections == 2
 
 
-def test_info_is_what_rosbag_info_prints(path: str) -> None:
+def test_info_matches_rosbag_info(path: str) -> None:
     start, end = (time.strftime("%b %d %Y %H:%M:%S.00", time.localtime(each)) for each in (100, 109))
 
     with rosbag.Bag(path) as bag:
@@ -231,7 +231,7 @@ def test_unindexed_bag_is_reindexed(tmp_path: Path) -> None:
         (b"#ROSBAG V2.0\n", rosbag.ROSBagUnindexedException, "Unindexed bag"),
     ],
 )
-def test_what_is_not_a_bag_is_refused_in_rosbags_words(
+def test_file_that_is_not_a_bag_is_refused_with_rosbags_text(
     tmp_path: Path, data: bytes, kind: type[Exception], what: str
 ) -> None:
     (tmp_path / "a.bag").write_bytes(data)
@@ -265,7 +265,7 @@ def test_closed_bag_refuses(path: str) -> None:
             call()
 
 
-def test_closed_bag_still_knows_what_it_has(path: str) -> None:
+def test_closed_bag_keeps_its_info(path: str) -> None:
     with rosbag.Bag(path) as bag:
         pass
     assert (bag.get_message_count(), bag.get_start_time(), bag.get_end_time()) == (15, 100.0, 109.0)
@@ -289,7 +289,7 @@ def test_limits_of_time_are_times(path: str, limit: Any) -> None:
 
 
 def test_classes_have_the_names_that_genpy_gives_them(path: str) -> None:
-    """Programs select messages by them, as `type(msg).__name__ == "_sensor_msgs__Image"`."""
+    """Programs select messages by class name, as `type(msg).__name__ == "_sensor_msgs__Image"`."""
     with rosbag.Bag(path) as bag:
         found = {type(each.message).__name__ for each in bag}
     assert found == {"_std_msgs__String", "_std_msgs__Int32"}
@@ -326,7 +326,7 @@ def test_wrong_messages_are_refused(tmp_path: Path) -> None:
         assert bag.get_message_count() == 1
 
 
-def test_raw_text_is_encoded_and_what_is_no_bytes_leaves_the_bag_whole(tmp_path: Path) -> None:
+def test_raw_text_is_encoded_and_other_types_leave_the_bag_intact(tmp_path: Path) -> None:
     with rosbag.Bag(tmp_path / "a.bag", "w") as bag:
         bag.write(b"/a", Int32(1), at(1))  # type: ignore[arg-type]
         bag.write("/b", ("std_msgs/Int32", "\2\0\0\0", Int32._md5sum, Int32), at(2), raw=True)

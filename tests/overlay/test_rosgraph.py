@@ -1,4 +1,4 @@
-"""rosgraph's servers, graph and sockets, as tools of others use them; what the referee's cases do not show."""
+"""rosgraph's servers, graph and sockets, as third-party tools use them; the referee's cases test the rest."""
 
 from __future__ import annotations
 

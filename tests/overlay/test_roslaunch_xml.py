@@ -1,4 +1,4 @@
-"""Nodes and tests of `import roslaunch` as the text of a launch file: what Debian's roslaunch writes."""
+"""Nodes and tests of `import roslaunch` as launch-file text: compared with Debian's roslaunch."""
 
 from __future__ import annotations
 

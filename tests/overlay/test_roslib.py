@@ -18,7 +18,7 @@ from std_srvs.srv import Empty
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """beginner_tutorials, with a module in src and a script."""
+    """Return the package beginner_tutorials, with a module in src and a script."""
     folder = tmp_path / "ws" / "beginner_tutorials"
     (folder / "src" / "beginner_tutorials").mkdir(parents=True)
     (folder / "src" / "beginner_tutorials" / "__init__.py").write_text("ANSWER = 42\n")
@@ -54,7 +54,7 @@ def test_load_manifest_finds_sources_of_a_package_and_its_dependencies(package: 
 def test_load_manifest_leaves_a_built_package_as_it_is_sourced(
     package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The devel folder has the messages of the package, which its src folder lacks."""
+    """The devel folder has the package's messages, which its src folder lacks."""
     built = tmp_path / "devel" / "beginner_tutorials"
     (built / "msg").mkdir(parents=True)
     (built / "__init__.py").touch()
@@ -67,7 +67,7 @@ def test_load_manifest_leaves_a_built_package_as_it_is_sourced(
 def test_load_manifest_in_a_script(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     script = str(package / "scripts" / "talker.py")
     assert subprocess.check_output([sys.executable, script], text=True) == "42\n"
-    # The package that contains the script is also found without any variable.
+    # The package that contains the script is found without any variable, too.
     monkeypatch.delenv("ROS_PACKAGE_PATH")
     assert subprocess.check_output([sys.executable, script], text=True) == "42\n"
 

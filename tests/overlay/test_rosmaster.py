@@ -1,4 +1,4 @@
-"""A master inside a program, as tests of others start one."""
+"""A master inside a program, as third-party tests start one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""rospkg: packages and what they need, the environment."""
+"""rospkg: packages and their dependencies, the environment."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_the_environment_names_the_folders(tree: Path, monkeypatch: pytest.Monke
     assert rospkg.get_package_name("/") is None
 
 
-def test_where_things_are_kept() -> None:
+def test_storage_locations() -> None:
     home = {"ROS_HOME": "/x"}
     assert rospkg.get_ros_home(home) == "/x"
     assert rospkg.get_ros_home({}) == os.path.join(os.path.expanduser("~"), ".ros")

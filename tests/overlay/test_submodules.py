@@ -1,4 +1,4 @@
-"""The submodules of ROS's packages that programs import: each can be imported, or the table says what it is instead."""
+"""The submodules of ROS's packages that programs import: each can be imported, or the table gives its replacement."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_submodule_of_real_ros_is_offered(module: str) -> None:
 
 @pytest.mark.parametrize("module", RECORD["not offered"])
 def test_module_that_is_listed_as_missing_is_missing(module: str) -> None:
-    """The list in docs/compatibility/modules.md is true."""
+    """The list in docs/compatibility/modules.md is correct."""
     with pytest.raises(ImportError):
         importlib.import_module(module)
 
@@ -58,7 +58,7 @@ LOADED = {
     ],
     "rosunit": ["pmon"],
 }
-"""Submodules that real ROS imports with the package, and that are imported here when they are used."""
+"""Submodules that real ROS imports with the package, and minirospy at first use."""
 
 
 @pytest.mark.parametrize("package", LOADED)
@@ -111,7 +111,7 @@ def test_operating_system_may_be_overridden(monkeypatch: pytest.MonkeyPatch) -> 
     assert OsDetect().detect_os() == ("ubuntu", "", "")
 
 
-def test_operating_system_that_nobody_knows(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unknown_operating_system(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_OS_OVERRIDE", raising=False)
     with pytest.raises(OsNotDetected, match=r"Could not detect OS, tried \[\]"):
         OsDetect([]).detect_os()
@@ -136,7 +136,7 @@ CHECKS = ["", None, 3, "x", "/x", "a b", "~x", "http://h:1", "rosrpc://h:1", "st
 
 
 def test_validators_answer_as_recorded() -> None:
-    """Recorded under rosmaster; but for global_name, which raises NameError there."""
+    """Recorded under rosmaster, except for global_name, which raises NameError there."""
     recorded = json.loads((Path(__file__).parent / "validators.json").read_text())
     assert dict(_validated()) == recorded
 
@@ -225,7 +225,7 @@ def test_parameters_as_an_object_notify() -> None:
 
 
 def test_namespaces_to_clear_are_unified() -> None:
-    """As real roslaunch answers."""
+    """As in real roslaunch."""
     assert _unify_clear_params(["/a/", "/a/b/", "/c/"]) == ["/a/", "/c/"]
     assert _unify_clear_params(["/a/b", "/a"]) == ["/a/"]
     assert _unify_clear_params(["/ab/", "/a/"]) == ["/ab/", "/a/"]

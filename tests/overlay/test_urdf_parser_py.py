@@ -18,7 +18,7 @@ URDFS = Path(__file__).parents[1] / "core" / "urdf"
 ARM = (URDFS / "arm.urdf").read_text(encoding="utf-8")
 
 
-def test_programs_print_what_the_real_one_makes_them_print() -> None:
+def test_programs_print_the_same_as_with_the_real_module() -> None:
     case = [sys.executable, URDFS / "urdf_parser_py_case.py", URDFS / "arm.urdf"]
     printed = subprocess.run(case, capture_output=True, encoding="utf-8", check=True).stdout
     assert printed == (URDFS / "urdf_parser_py.txt").read_text(encoding="utf-8")

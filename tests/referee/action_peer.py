@@ -1,4 +1,4 @@
-"""What the cases of actions share: both ends of an action by hand, on its five topics, and the log lines of actionlib."""
+"""Helpers of the actions cases: scripted endpoints of an action on its five topics, and the log lines of actionlib."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from referee import eventually, show
 _NAMES = {
     value: name for name, value in vars(GoalStatus).items() if name.isupper() and isinstance(value, int)
 }
-# Lines of rospy itself, which are its own business.
+# Log lines of rospy itself, which are not compared.
 _OTHERS = re.compile(
     r"connecting to |\[/.*failed to receive|.*topic|.*TCPROS|node|init_node|signal_shutdown|the first message"
 )
@@ -23,21 +23,18 @@ _ID = re.compile(r"(/\w+)-(\d+)-1[5-9]\d{8}\.\d+")
 
 
 def name_of(status):
-    """PENDING and its kin."""
+    """Return the name of a status, such as PENDING."""
     return _NAMES.get(status, status)
 
 
 def mask(text):
-    """Return a text without the times in it."""
+    """Return a string with the times masked."""
     text = _STAMP.sub("stamp: <stamp>", _ID.sub(r"\1-\2-<stamp>", text))
     return re.sub(r"<bound method (\S+) of .*?>>", r"\1", text)
 
 
 class Story:
-    """What callbacks say and what is logged, from whichever thread, in order; shown where the case requests it.
-
-    The terminal's log lines are turned off: other cases cover them.
-    """
+    """Records callbacks and log lines from all threads, in order; prints them when the case requests it."""
 
     def __init__(self, level=logging.DEBUG):
         self._changed = threading.Condition()
@@ -61,17 +58,17 @@ class Story:
             self._changed.notify_all()
 
     def wait(self, count, seconds=30):
-        """Whether callbacks come to have said so many things since the last tell."""
+        """Return whether callbacks make so many entries, counted since the last tell, in time."""
         with self._changed:
             return self._changed.wait_for(lambda: self._said >= count, seconds)
 
     def wait_log(self, text, seconds=30):
-        """Whether a line with this text comes to be logged, or has been since the last tell."""
+        """Return whether a line with this text is logged in time, or has been since the last tell."""
         with self._changed:
             return self._changed.wait_for(lambda: any(text in line for line in self._lines), seconds)
 
     def tell(self):
-        """Show what was said since the last time."""
+        """Print the entries since the last call."""
         with self._changed:
             for line in self._lines:
                 show("  ", mask(line))
@@ -87,7 +84,7 @@ class _LogLines(logging.Handler):
     def emit(self, record):
         text = record.getMessage()
         if not _OTHERS.match(text):
-            # Of a traceback only what happened: its lines of code differ.
+            # Print only the exception of a traceback: its lines of code differ.
             lines = text.splitlines() or [""]
             self._story.log(
                 "log", record.levelname, lines[0], *(["...", lines[-1]] if len(lines) > 1 else [])
@@ -95,10 +92,7 @@ class _LogLines(logging.Handler):
 
 
 class RawClient:
-    """A scripted client: sends on demand, keeps what it receives.
-
-    ``hides_pending``: for a server that accepts goals when they arrive. Whether a list has PENDING before depends on its timer.
-    """
+    """A scripted client: sends on demand, records the messages that it receives."""
 
     def __init__(self, ns, hides_pending=False):
         self._hides_pending = hides_pending
@@ -128,41 +122,41 @@ class RawClient:
         self.goal_pub.publish(message)
 
     def cancel(self, id="", stamp=None):
-        """Send a cancel."""
+        """Send a cancel request."""
         message = GoalID(id=id)
         if stamp is not None:
             message.stamp = stamp
         self.cancel_pub.publish(message)
 
     def wait_status(self, id, status, seconds=30):
-        """Whether the list of statuses comes to tell this of a goal."""
+        """Return whether the status list comes to report this status of a goal."""
         with self._changed:
             return self._changed.wait_for(lambda: self.statuses.get(id) == status, seconds)
 
     def wait_told(self, id, name, seconds=30):
-        """Whether the lists come to tell this of a goal, or have since the last tell."""
+        """Return whether status lists come to report this status of a goal, or have since the last tell."""
         with self._changed:
             return self._changed.wait_for(
                 lambda: any(said.startswith(f"{name}(") for said in self.seen.get(id, ())), seconds
             )
 
     def wait_gone(self, id, seconds=30):
-        """Whether the list of statuses comes to leave a goal out."""
+        """Return whether the status list comes to omit a goal."""
         with self._changed:
             return self._changed.wait_for(lambda: self.arrays and id not in self.statuses, seconds)
 
     def wait_results(self, count, seconds=30):
-        """Whether there come to be so many results."""
+        """Return whether this many results arrive."""
         with self._changed:
             return self._changed.wait_for(lambda: len(self.results) >= count, seconds)
 
     def wait_feedback(self, count, seconds=30):
-        """Whether there come to be so many messages of feedback."""
+        """Return whether this many feedback messages arrive."""
         with self._changed:
             return self._changed.wait_for(lambda: len(self.feedback) >= count, seconds)
 
     def tell(self):
-        """Show what was heard of each goal since the last time, in order."""
+        """Print the messages about each goal since the last call, in order."""
         with self._changed:
             for id, statuses in sorted(self.seen.items()):
                 is_hidden = self._hides_pending and len(statuses) > 1 and statuses[0] == "PENDING()"
@@ -205,7 +199,7 @@ class RawClient:
 
 
 class RawServer:
-    """A scripted server: keeps the goals and cancels that it receives, publishes on demand."""
+    """A scripted server: records the goals and cancel requests that it receives, publishes on demand."""
 
     def __init__(self, ns):
         self._changed = threading.Condition()
@@ -220,35 +214,35 @@ class RawServer:
         ]
 
     def connected(self):
-        """Whether a client comes to be connected by all topics."""
+        """Return whether a client connects to all topics."""
         ends = [self.status_pub, self.result_pub, self.feedback_pub, *self.subscribers]
         return eventually(lambda: all(end.get_num_connections() for end in ends))
 
     def wait_goals(self, count, seconds=30):
-        """Whether there come to be so many goals."""
+        """Return whether this many goals arrive."""
         with self._changed:
             return self._changed.wait_for(lambda: len(self.goals) >= count, seconds)
 
     def wait_cancels(self, count, seconds=30):
-        """Whether there come to be so many cancels."""
+        """Return whether this many cancel requests arrive."""
         with self._changed:
             return self._changed.wait_for(lambda: len(self.cancels) >= count, seconds)
 
     def status(self, *statuses):
-        """Tell a list of (id, status, text)."""
+        """Publish a status list of (id, status, text)."""
         said = [GoalStatus(GoalID(id=id), status, text) for id, status, text in statuses]
         message = GoalStatusArray(status_list=said)
         message.header.stamp = rospy.Time.now()
         self.status_pub.publish(message)
 
     def result(self, id, status, text="", result=0):
-        """Tell the result of a goal."""
+        """Publish the result of a goal."""
         message = TestActionResult(status=GoalStatus(GoalID(id=id), status, text))
         message.result.result = result
         self.result_pub.publish(message)
 
     def feedback(self, id, feedback):
-        """Tell the feedback of a goal."""
+        """Publish the feedback of a goal."""
         message = TestActionFeedback(status=GoalStatus(GoalID(id=id), GoalStatus.ACTIVE, ""))
         message.feedback.feedback = feedback
         self.feedback_pub.publish(message)

@@ -1,12 +1,12 @@
-"""Every public name and signature of real rospy, and of the modules around it, beside ours: writes three pages of docs.
+"""Compare every public name and signature of rospy and similar modules in real ROS and minirospy: write three pages of docs.
 
-docs/compatibility/rospy.md compares rospy; docs/compatibility/modules.md rosgraph, rosnode, rostopic and their kin;
+docs/compatibility/rospy.md compares rospy; docs/compatibility/modules.md rosgraph, rosnode, rostopic and similar modules;
 docs/compatibility/tf.md tf2_ros, tf and PyKDL.
 
     .venv/bin/python tests/referee/compare_surface.py            write the pages
-    .venv/bin/python tests/referee/compare_surface.py --check    exit status 1 where one would change
+    .venv/bin/python tests/referee/compare_surface.py --check    exit status 1 if one would change
 
-Real rospy is what /usr/bin/python3 imports. The same file describes one of the two with --describe, so it runs
+Real rospy is the one that /usr/bin/python3 imports. With --describe, the same file describes one of the two, so it runs
 under both.
 """
 
@@ -264,7 +264,7 @@ REASONS = {
         ("ROS_LOG_DIR", "makedirs_with_parent_perms", "renew_latest_logdir"), "the inside of rospy's logging"
     ),
 }
-"""Why a name of real rospy is not offered: nothing but rospy itself has a use for it."""
+"""Name of real rospy -> the reason why it is not offered: only rospy itself uses it."""
 
 MEMBERS_INSIDE = {
     "acquire_impl": "rospy's inside",
@@ -320,16 +320,16 @@ PACKAGES = (
     "rospkg", "roslaunch", "rosmaster", "roswtf", "rostest", "rosunit", "rospy", "actionlib", "rosbag", "dynamic_reconfigure",
     "topic_tools", "message_filters",
 )  # fmt: skip
-"""The packages whose submodules are listed, with the names that start with an underscore."""
+"""The packages whose submodules and private names are listed."""
 
 
 def private_names(not_only_own: bool = False) -> dict[str, list[str]]:
-    """Return submodule -> its own functions and classes whose names start with an underscore, or all that it has."""
+    """Return submodule -> its own functions and classes whose names start with an underscore, or all of its names."""
     found = {}
     for name in submodules():
         try:
             module = importlib.import_module(name)
-        except (AttributeError, ImportError):  # of real ROS: rospy.impl.udpros
+        except (AttributeError, ImportError):  # in real ROS: rospy.impl.udpros
             continue
         found[name] = sorted(
             each
@@ -342,7 +342,7 @@ def private_names(not_only_own: bool = False) -> dict[str, list[str]]:
 
 
 def submodules() -> list[str]:
-    """Return the importable modules of :data:`PACKAGES`; generated messages left out."""
+    """Return the importable modules of :data:`PACKAGES`, without generated messages."""
     found = []
     for package in PACKAGES:
         path = getattr(importlib.import_module(package), "__path__", [])
@@ -365,7 +365,7 @@ def describe() -> Description:
 
 
 def describe_value(value: Any) -> dict[str, Any] | None:
-    """Return what there is to compare of a value; None of one that is not rospy's own."""
+    """Return the parts of a value that are compared; None if it is not rospy's own."""
     if isinstance(value, (bool, int, float, str)):
         return {"home": "", "is": repr(value)}
     home = getattr(value, "__module__", None) or ""
@@ -384,7 +384,7 @@ def describe_value(value: Any) -> dict[str, Any] | None:
 
 
 def parameters(value: Any) -> list[list[str]] | None:
-    """[name, default, kind] of each parameter; None if it cannot be determined."""
+    """Return [name, default, kind] of each parameter; None if it cannot be determined."""
     try:
         signature = inspect.signature(value)
     except (TypeError, ValueError):
@@ -406,7 +406,7 @@ def shown_default(default: Any) -> str:
 
 
 def compare(real: Any, ours: Any) -> str:
-    """Return one of: same; wider (ours takes every call that real rospy takes); differs."""
+    """Return one of: same; wider (minirospy accepts every call that real rospy accepts); differs."""
     if real == ours or real is None:
         return "same"
     if not isinstance(real, list) or not isinstance(ours, list):
@@ -421,7 +421,7 @@ def compare(real: Any, ours: Any) -> str:
 
 
 def shown(value: Any) -> str:
-    """Return a signature as it is written."""
+    """Return a signature in Python's syntax."""
     if not isinstance(value, list):
         return "" if value is None else str(value)
     stars = {"VAR_POSITIONAL": "*", "VAR_KEYWORD": "**"}
@@ -435,7 +435,7 @@ def shown(value: Any) -> str:
 
 
 def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """(name, real's signature, state, note) of a module; of what it only passes on, just what is missing."""
+    """Return (name, real signature, state, note) of a module's names; of those that it only re-exports, the missing ones."""
     rows = []
 
     for name, is_real in sorted(real.items(), key=lambda item: item[0].lower()):
@@ -544,7 +544,7 @@ def _code(names: list[str]) -> str:
 
 
 def reason_of(module: str) -> str:
-    """Return why a submodule is not offered."""
+    """Return the reason why a submodule is not offered."""
     return next(reason for start, reason in NOT_OFFERED.items() if module.startswith(start))
 
 
@@ -561,7 +561,7 @@ NOT_OFFERED = {
     "rospy.impl": "rospy's threads and sockets; ours are minirospy.runtime",
     "": "its command's inside",
 }
-"""Start of a module's name -> what it is."""
+"""Prefix of a module's name -> what it is."""
 
 
 def described_by(python: str, option: str = "--describe") -> dict[str, Any]:

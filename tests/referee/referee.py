@@ -1,7 +1,7 @@
-"""What the cases in this folder print with. It runs under real rospy as well as under ours: only public names of rospy.
+"""Functions with which the cases in this folder print. Runs under real rospy and under minirospy: only public names of rospy.
 
-A case is a program of a user; what it prints is the same under both, line for line, once numbers that no two runs share
-(ports, process ids, times of the wall clock, temporary folders) are replaced by a word.
+A case is a user's program; its output is the same under both, line by line, after numbers that differ between runs
+(ports, process ids, wall-clock times, temporary folders) are replaced by a word.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _lock = threading.Lock()
 
 
 def show(*values: object) -> None:
-    """Print a line, with what differs between two runs replaced."""
+    """Print a line, with parts that differ between runs replaced."""
     text = " ".join(map(str, values))
     for pattern, word in _MASKS:
         text = pattern.sub(word, text)
@@ -42,7 +42,7 @@ def show(*values: object) -> None:
 
 
 def outcome(label: str, call: Callable[[], Any]) -> None:
-    """Show what a call gives: its value, or the type and text of what it raises."""
+    """Print a call's result: its value, or the type and text of its exception."""
     try:
         value = call()
     except Exception as error:  # noqa: BLE001 - any error is printed
@@ -52,9 +52,9 @@ def outcome(label: str, call: Callable[[], Any]) -> None:
 
 
 def printed(label: str, call: Callable[[], Any], *masks: tuple[str, str], texts: bool = True) -> None:
-    """Show what a call gives, what it prints on stdout, and whether it prints on stderr.
+    """Print a call's result, its stdout, and whether it prints to stderr.
 
-    ``masks``: pattern and word for what differs each time in what it prints. Without ``texts`` an error is its type alone.
+    ``masks``: pattern and word for output that differs each time. Without ``texts``, only an error's type is printed.
     """
     out = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(io.StringIO()) as errors:
@@ -71,7 +71,7 @@ def printed(label: str, call: Callable[[], Any], *masks: tuple[str, str], texts:
 
 
 class Other:
-    """Another program of the same stack: ``code`` runs in it; ``read()`` gives its next line, ``close()`` ends it."""
+    """Another program of the same stack: it runs ``code``; ``read()`` returns its next line, ``close()`` stops it."""
 
     def __init__(self, code: str, *arguments: str, environment: dict[str, str] | None = None) -> None:
         self.process = subprocess.Popen(
@@ -88,7 +88,7 @@ class Other:
         return self.process.stdout.readline().rstrip("\n")
 
     def close(self, seconds: float = 30.0) -> int:
-        """Close its input, and interrupt it where that does not end it within some time; its exit status."""
+        """Close its stdin, and interrupt it if it does not exit in time; return its exit status."""
         assert self.process.stdin
         assert self.process.stdout
         self.process.stdin.close()
@@ -106,9 +106,9 @@ class Other:
 
 
 def of_ten_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
-    """Return what ``look()`` finds, at the first of ten looks where all of it is true.
+    """Return the result of ``look()``, called at most ten times until all of it is true.
 
-    For what takes a certain time: on a machine that stalls now and then it takes longer, but not ten times.
+    For durations: they are longer on a machine that stalls now and then, but not ten times in a row.
     """
     for _ in range(10):
         found = look()
@@ -118,7 +118,7 @@ def of_ten_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
 
 
 def is_waiting(thread: threading.Thread) -> bool:
-    """Return whether a thread waits for a condition or an event, as in rospy.sleep() on simulated time."""
+    """Return whether a thread waits for a condition or an event, as in rospy.sleep() with simulated time."""
     frame, names = sys._current_frames().get(thread.ident or 0), set()
     while frame:
         names.add(frame.f_code.co_name)
@@ -127,7 +127,7 @@ def is_waiting(thread: threading.Thread) -> bool:
 
 
 def eventually(condition: Callable[[], bool], seconds: float = 30.0) -> bool:
-    """Return whether a condition holds within some time."""
+    """Return whether a condition becomes true within some seconds."""
     waiting = threading.Event()
     for _ in range(int(seconds / 0.02)):
         if condition():

@@ -1,4 +1,4 @@
-"""Running a case: its program under one stack, against a master, and what it printed."""
+"""Running a case: its program under one stack, with a master, and its output."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CASES = sorted(path.stem for path in (HERE / "cases").glob("*.py"))
 
 
 def run_case(name: str, python: str, uri: str, home: Path) -> str:
-    """Return what a case prints on stdout, and its exit status as the last line. Its stderr is shown where it fails."""
+    """Return a case's stdout, with its exit status as the last line. Print its stderr if it fails."""
     environment = {
         key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "MINIROSPY_"))
     }
@@ -40,18 +40,18 @@ def run_case(name: str, python: str, uri: str, home: Path) -> str:
 
 
 def differences(said: str, expected: str) -> str:
-    """Return the lines in which two outputs differ, for any Python version; nothing if they are the same."""
+    """Return the lines in which two outputs differ, for any Python version; an empty string if they are equal."""
     lines, others = (_as_every_python(text).splitlines() for text in (said, expected))
     return "\n".join(difflib.unified_diff(others, lines, "expected", "said", lineterm="", n=1))
 
 
 def _as_every_python(text: str) -> str:
-    """Without what Python adds to its messages from 3.13 on."""
+    """Return the text without Python's additions to its messages from 3.13 on."""
     text = text.replace(" and no __dict__ for setting new attributes", "")
-    # The source of a line of `python -c`, and what marks the place in it.
+    # The source line of `python -c`, and the marks below it.
     return re.sub(r'^(\s*)(File "<string>", .*\n)(?:\1 .*\n)+', r"\1\2", text, flags=re.MULTILINE)
 
 
 def recorded(name: str) -> Path:
-    """Return where what real rospy printed is kept."""
+    """Return the path of real rospy's recorded output."""
     return HERE / "recorded" / f"{name}.txt"

@@ -1,4 +1,4 @@
-"""Programs of users print under minirospy what they printed under real rospy (recorded/, made by make interop)."""
+"""Users' programs print the same under minirospy as under real rospy (recorded/, made by make interop)."""
 
 from __future__ import annotations
 

@@ -534,7 +534,7 @@ def test_messages_pass_to_ros1_but_not_those_that_came_from_it() -> None:
 
 
 @pytest.mark.usefixtures("master")
-def test_what_came_from_ros2_is_not_sent_back() -> None:
+def test_messages_from_ros2_are_not_sent_back() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         # As another bridge to the same domain would publish it.
         other = await node.advertise("/t", raw("std_msgs/Int8"), headers={"ros2_domain": "0"})

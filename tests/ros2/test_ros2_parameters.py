@@ -45,7 +45,7 @@ def test_values_pass_to_ros2_and_back(value: object, type_: int) -> None:
     assert ros1_value(ros2_value(value)) == value
 
 
-def test_values_that_ros2_has_not_become_what_is_nearest() -> None:
+def test_values_missing_in_ros2_become_the_nearest_ones() -> None:
     assert ros2_value([1, 0.5]) == Value(8, [1.0, 0.5])
     assert ros2_value([]) == Value(9, [])
     assert ros2_value([{"a": 1}]) == Value(4, '[{"a": 1}]')

@@ -82,7 +82,7 @@ def test_a_later_server_without_answers_delays_requests_by_ten_seconds() -> None
     of(scene)
 
 
-def test_a_server_is_reached_where_one_that_did_not_answer_has_left() -> None:
+def test_server_is_reached_after_a_silent_one_has_left() -> None:
     async def scene(loop: ManualLoop, client: FakeReachable, reach: Reach) -> None:
         crashed = client.prober
         assert crashed
@@ -136,7 +136,7 @@ def test_a_server_without_anything_to_reach_it_by_gets_a_second() -> None:
     of(scene, prober=None)
 
 
-def test_nothing_is_waited_for_where_no_response_is_lost() -> None:
+def test_no_wait_if_no_response_is_lost() -> None:
     async def scene(_: ManualLoop, client: FakeReachable, reach: Reach) -> None:
         reach.start()
         await asyncio.wait_for(reach.wait(), 1)
@@ -181,7 +181,7 @@ def test_a_probe_that_fails_is_sent_again_after_a_pause() -> None:
     of(scene, prober=probe)
 
 
-def test_what_waits_returns_at_the_end() -> None:
+def test_waiting_calls_return_at_shutdown() -> None:
     async def scene(loop: ManualLoop, client: FakeReachable, reach: Reach) -> None:
         waiting = asyncio.ensure_future(reach.wait())
         await loop.advance(0)

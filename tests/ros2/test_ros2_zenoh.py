@@ -197,7 +197,7 @@ def test_own_subscription_is_not_the_subscriber_that_is_waited_for(node: RmwNode
     wait_until(lambda: publisher.subscribers == 1)
 
 
-def test_who_joins_later_in_ros2_gets_what_was_latched(node: RmwNode, side: ZenohSide) -> None:
+def test_late_ros2_subscriber_receives_latched_messages(node: RmwNode, side: ZenohSide) -> None:
     there = node.subscribe(CHATTER)
     publisher = side.publisher("/chatter", "std_msgs/String", depth=1, is_latched=True)
     publisher.publish(b"old")
@@ -222,7 +222,7 @@ def test_who_joins_later_in_ros2_gets_what_was_latched(node: RmwNode, side: Zeno
     subscriber.undeclare()
 
 
-def test_what_ros2_has_kept_comes_to_a_latched_subscription(node: RmwNode, side: ZenohSide) -> None:
+def test_kept_ros2_messages_reach_a_latched_subscription(node: RmwNode, side: ZenohSide) -> None:
     def latched(text: bytes) -> Any:
         # As rmw_zenoh declares a transient local publisher.
         made = zenoh.ext.declare_advanced_publisher(

@@ -169,7 +169,7 @@ def test_transforms_pass_both_ways_over_zenoh(node: RmwNode, endpoint: str) -> N
 
 
 @pytest.mark.usefixtures("master")
-def test_static_transforms_of_all_publishers_reach_who_joins_later(node: RmwNode, endpoint: str) -> None:
+def test_static_transforms_of_all_publishers_reach_late_subscribers(node: RmwNode, endpoint: str) -> None:
     async def scene(other: Node, peer: RmwNode, bridge: Ros2Bridge) -> None:
         async with Node("second", rosout=False) as second:
             ros1 = [Ros1(each, bridge) for each in (other, second)]
@@ -187,7 +187,7 @@ def test_static_transforms_of_all_publishers_reach_who_joins_later(node: RmwNode
 
 
 @pytest.mark.usefixtures("master")
-def test_static_transforms_of_ros2_reach_who_joins_later_in_ros1(node: RmwNode, endpoint: str) -> None:
+def test_static_transforms_of_ros2_reach_late_ros1_subscribers(node: RmwNode, endpoint: str) -> None:
     async def scene(other: Node, peer: RmwNode, bridge: Ros2Bridge) -> None:
         second = RmwNode(endpoint)
         for each, child in ((peer, "a"), (second, "b")):

@@ -46,7 +46,7 @@ def stops(names: list[str], name: str) -> Callable[[], None]:
     return lambda: names.append(name)
 
 
-def test_what_is_silent_is_stopped_once_and_in_another_thread(guard: StopGuard, clock: Clock) -> None:
+def test_silent_item_is_stopped_once_in_another_thread(guard: StopGuard, clock: Clock) -> None:
     threads: list[str] = []
     called = threading.Event()
 
@@ -81,7 +81,7 @@ def test_deadlines_that_are_moved_or_removed_stop_nothing(guard: StopGuard, cloc
     assert sorted(names) == ["early", "moved", "second", "third"]
 
 
-def test_fault_of_one_leaves_the_others_stopped(
+def test_fault_of_one_does_not_prevent_stopping_others(
     guard: StopGuard, clock: Clock, caplog: pytest.LogCaptureFixture
 ) -> None:
     names: list[str] = []

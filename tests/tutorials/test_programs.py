@@ -1,4 +1,4 @@
-"""Programs of rospy_tutorials and actionlib_tutorials, as pages of the ROS wiki start them."""
+"""Programs of rospy_tutorials and actionlib_tutorials, started as on the pages of the ROS wiki."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_talker_says_hello(start: Start, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["listener", "listener.py"])
-def test_listener_logs_what_it_heard(start: Start, name: str) -> None:
+def test_listener_logs_received_messages(start: Start, name: str) -> None:
     process = start("rospy_tutorials", name)
 
     async def body() -> None:

@@ -47,7 +47,7 @@ def test_rights_are_ranks() -> None:
 
 
 @pytest.mark.parametrize("rank", list(Rank))
-def test_nobody_gives_way_to_a_stranger_if_all_are_active(rank: Rank) -> None:
+def test_active_clients_are_not_displaced_by_a_stranger(rank: Rank) -> None:
     assert choose([], rank=rank) is None
     active = [Seat(f"a{number}", Rank.OWN, 0.0) for number in range(20)]
     assert choose(active, rank=rank) is None

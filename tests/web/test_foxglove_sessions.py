@@ -350,7 +350,7 @@ def test_assets_are_read_from_known_packages_alone(
         assert b"secret\n" not in frame
 
 
-def test_asset_larger_than_what_may_wait_is_sent(
+def test_asset_larger_than_the_queue_limit_is_sent(
     run_bridge: Callable[..., Running], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_files(tmp_path / "arm", {"package.xml": "<package><name>arm</name></package>"})

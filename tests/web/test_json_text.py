@@ -45,17 +45,19 @@ def _small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @given(VALUES, st.sampled_from([None, 0, 3]), st.booleans())
-def test_pieces_give_what_the_library_gives(value: object, indent: int | None, is_ascii: bool) -> None:
+def test_pieces_give_the_same_results_as_the_library(
+    value: object, indent: int | None, is_ascii: bool
+) -> None:
     text = json.dumps(value, indent=indent, ensure_ascii=is_ascii)
     assert outcome(load_json_in_pieces, text) == outcome(json.loads, text)
 
 
 @given(st.text(ALPHABET, max_size=40))
-def test_what_the_library_refuses_is_refused(text: str) -> None:
+def test_values_refused_by_the_library_are_refused(text: str) -> None:
     assert outcome(load_json_in_pieces, text) == outcome(json.loads, text)
 
 
-def test_mutations_give_what_the_library_gives() -> None:
+def test_mutations_give_the_same_results_as_the_library() -> None:
     chosen = random.Random(1)
     base = json.dumps(
         {"op": "publish", "msg": {"data": [1.5, -2, 3e9] * 8, "points": [{"x": 1}, [], [2, "a,]"]] * 3}}

@@ -65,7 +65,7 @@ def test_owner_of_a_socket_is_known_in_each_state(
             assert owner_of(own, other) is None
 
 
-def test_nobody_is_known_on_other_systems(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_owners_are_unknown_on_other_systems(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(owners.sys, "platform", "darwin")
     monkeypatch.setattr(owners, "owner_of", lambda *_: pytest.fail("there is no table"))
     assert not is_own_user(("127.0.0.1", 1), ("127.0.0.1", 2))

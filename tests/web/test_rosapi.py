@@ -56,7 +56,7 @@ def test_typedefs_give_lengths_of_arrays_and_constants() -> None:
 # --- transforms
 
 
-def test_pair_is_sent_where_it_moved_enough() -> None:
+def test_pair_is_sent_if_it_moved_enough() -> None:
     def at(x: float, z: float = 0.0) -> Transform:
         return Transform(Vector3(x, 0, 0), Quaternion(0, 0, z, (1 - z * z) ** 0.5))
 

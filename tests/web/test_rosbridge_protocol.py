@@ -230,7 +230,7 @@ def test_values_that_would_fill_the_memory_are_refused(data: str | bytes) -> Non
         protocol.decode(data)
 
 
-def test_heads_of_cbor_are_told_from_its_contents() -> None:
+def test_cbor_heads_are_distinguished_from_contents() -> None:
     message = {
         "text": "\xc9" * 300,
         "bytes": b"\xd8\x23" * 300,
@@ -390,7 +390,7 @@ def subscription(**fields: Any) -> Subscribe:
     return event
 
 
-def test_subscriptions_merge_to_what_satisfies_all() -> None:
+def test_subscriptions_merge_to_options_that_satisfy_all() -> None:
     assert merge([subscription()]) == Merged(0.0, 0, None, "none")
     assert merge(
         [

@@ -56,7 +56,7 @@ def test_message_larger_than_the_bound_waits_alone() -> None:
     assert drained(queue) == [bytes(60)]
 
 
-def test_only_the_newest_of_a_topic_waits_where_that_is_wanted() -> None:
+def test_only_the_newest_message_waits_on_request() -> None:
     queue = SendQueue()
     for number in range(4):
         queue.put("time", (b"%d" % number,), newest_only=True)
@@ -101,7 +101,7 @@ def filled(size: int) -> int:
     return tracemalloc.get_traced_memory()[0] - before
 
 
-def test_small_answers_that_nobody_reads_are_an_overrun() -> None:
+def test_unread_small_answers_are_an_overrun() -> None:
     queue = SendQueue()
     while not queue.is_overrun:
         queue.put_answer((b"1",))

@@ -37,7 +37,7 @@ def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running,
     bridge.run(advertise_and_close())
 
 
-def test_nodes_that_do_not_answer_keep_nobody_from_the_others(
+def test_silent_nodes_do_not_delay_queries_of_others(
     bridge: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("minirospy.web.foxglove.channels._SECONDS", 1.0)

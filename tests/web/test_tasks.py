@@ -173,7 +173,7 @@ def test_query_of_the_fleet_that_fails_is_no_answer_of_any_robot() -> None:
     asyncio.run(run())
 
 
-def test_robot_that_cannot_be_shown_keeps_no_other_away(
+def test_robot_that_cannot_be_shown_does_not_affect_others(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("minirospy.fleet.importer._AGAIN_SECONDS", 0.01)
@@ -264,7 +264,7 @@ def test_watch_of_both_graphs_goes_on(caplog: pytest.LogCaptureFixture) -> None:
 
 
 @pytest.mark.usefixtures("master")
-def test_link_that_rclpy_refuses_keeps_no_other_away() -> None:
+def test_link_that_rclpy_refuses_does_not_affect_others() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         made = side.publisher
 

@@ -180,7 +180,7 @@ def test_fault_of_one_client_leaves_the_others_their_turns(caplog: pytest.LogCap
     assert "a fault" in caplog.text
 
 
-def test_client_does_not_pay_while_other_processes_have_the_processor() -> None:
+def test_client_is_not_charged_while_other_processes_run() -> None:
     now, used = 100.0, 0.0
     soon: list[Callable[[], None]] = []
     done: list[str] = []
@@ -265,7 +265,7 @@ def test_bulk_client_becomes_interactive_after_a_short_burst() -> None:
     assert waits == [True, False]
 
 
-def test_clients_that_come_when_nobody_waits_start_at_the_same_tag() -> None:
+def test_new_clients_start_at_the_same_tag_if_none_waits() -> None:
     machine = Machine()
     for name, seconds in (("idle", 0.0006), ("good", 0.0005)):
         machine.join(name, seconds)

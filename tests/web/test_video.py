@@ -139,7 +139,7 @@ def test_compressed_image_passes_as_it_came() -> None:
         (String("x"), "messages of [std_msgs/String] are not images"),
     ],
 )
-def test_what_is_not_an_image_is_refused(message: Any, text: str) -> None:
+def test_invalid_image_is_refused(message: Any, text: str) -> None:
     with pytest.raises(BridgeError) as error:
         encoded(message._type, serialized(message), Picture())
     assert text in str(error.value)

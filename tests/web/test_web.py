@@ -141,7 +141,7 @@ def test_wrong_token_is_refused_and_never_logged(
         b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + b"\0" * 60 + b"\r\n",
     ],
 )
-def test_what_is_not_http_gets_a_clear_status(bridge: Running, request_: bytes) -> None:
+def test_invalid_http_gets_a_clear_status(bridge: Running, request_: bytes) -> None:
     answer = raw_answer(bridge.port, request_)
     assert answer.startswith((b"HTTP/1.1 4", b"HTTP/1.1 5")), answer[:80]
     assert_alive(bridge.client())
@@ -221,7 +221,7 @@ def test_unfinished_messages_of_all_clients_are_limited(run_bridge: Callable[...
     assert_alive(other)
 
 
-def test_client_that_answers_pings_is_heard(run_bridge: Callable[..., Running]) -> None:
+def test_client_that_answers_pings_stays_connected(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(limits=Limits(ping_seconds=0.05))
     client = bridge.client()
     client.next("serverInfo")
@@ -323,7 +323,7 @@ def idle_clients(bridge: Running, count: int) -> list[socket.socket]:
 
 
 @pytest.mark.usefixtures("strangers")
-def test_idle_clients_keep_nobody_out(run_bridge: Callable[..., Running]) -> None:
+def test_idle_clients_do_not_block_new_ones(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(limits=Limits(connections=20))
     listener = bridge.bridge.listeners["foxglove"]
     with contextlib.ExitStack() as stack:
@@ -351,7 +351,7 @@ def test_idle_clients_keep_nobody_out(run_bridge: Callable[..., Running]) -> Non
 
 
 @pytest.mark.usefixtures("strangers")
-def test_owner_gets_in_whoever_holds_the_connections(run_bridge: Callable[..., Running]) -> None:
+def test_owner_is_admitted_if_others_occupy_all_connections(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(
         limits=Limits(connections=20, reserve=2), access=Access(write_token="right-token-000")
     )
@@ -726,7 +726,7 @@ def test_work_that_fails_ends_its_client_alone(caplog: pytest.LogCaptureFixture)
     assert "a fault" in caplog.text
 
 
-def test_client_that_reads_at_once_is_sent_to_in_turns() -> None:
+def test_fast_reading_clients_are_sent_to_in_turns() -> None:
     loop, connection, pipe = connected(Limits(), 0.0)
     sent = 0
 

@@ -30,7 +30,7 @@ def test_demo(environ: dict[str, str], place: Path) -> None:
     no_process_left()
 
 
-def test_the_first_evening(start: Start, environ: dict[str, str], place: Path) -> None:
+def test_first_evening_of_the_course(start: Start, environ: dict[str, str], place: Path) -> None:
     """Run a master, a node of the workshop, and the commands for topics, services and parameters."""
 
     def run(name: str, *words: str) -> str:

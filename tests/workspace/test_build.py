@@ -64,7 +64,7 @@ def test_messages_services_and_actions(scene: Scene) -> None:
     assert said.splitlines() == ["0.0 0 True", str(scene.modules / "led_msgs" / "__init__.py")]
 
 
-def test_a_workspace_hides_a_package_of_ours(scene: Scene) -> None:
+def test_workspace_package_overrides_a_built_in_package(scene: Scene) -> None:
     scene.messages("rpi_msgs", {"msg/mine.msg": "int8 x\n"})
     scene.build()
     assert python(scene, "import rpi_msgs.msg; print(dir(rpi_msgs.msg))") == "['mine']\n"
@@ -723,7 +723,7 @@ def test_the_command(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
     assert not scene.devel.exists()
 
 
-def test_what_is_built_is_usable_beside_a_faulty_package(
+def test_built_packages_are_usable_despite_a_faulty_one(
     scene: Scene, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})

@@ -41,7 +41,7 @@ def test_a_package_comes_after_what_it_is_built_from(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["exec", "build_export", "doc"])
-def test_what_a_package_needs_to_run_alone_may_come_later(kind: str) -> None:
+def test_run_time_dependencies_may_be_built_later(kind: str) -> None:
     assert order(manifest("a", f"{kind}:b"), manifest("b")) == "a b"
 
 

@@ -43,7 +43,7 @@ def test_name_against_the_conventions_is_a_warning(
     )
 
 
-def test_beside_src(
+def test_package_created_outside_src_warns(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The package is in the workspace's folder, where catkin_make would never find it."""

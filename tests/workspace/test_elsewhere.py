@@ -46,7 +46,7 @@ def test_unknown_names_have_no_advice() -> None:
     assert advice("") == ""
 
 
-def test_packages_of_the_table_are_not_ours() -> None:
+def test_packages_of_the_table_are_not_included() -> None:
     # rqt_gui and rviz have programs of minirospy; their Python modules are those of Qt's windows.
     assert set(TABLE) & set(Packages.below(*built_in_roots()).names()) == {"rqt_gui", "rviz"}
 

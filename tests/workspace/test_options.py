@@ -62,7 +62,7 @@ def test_module_of_a_cfg_file(scene: Scene) -> None:
     ).read_text(encoding="utf-8")
 
 
-def test_module_is_made_again_where_the_cfg_file_changes_alone(scene: Scene) -> None:
+def test_module_is_regenerated_if_only_the_cfg_file_changes(scene: Scene) -> None:
     folder = lamp(scene)
     scene.build()
     assert scene.build()["lamp"].changed is False

@@ -34,7 +34,7 @@ def test_the_name_is_that_in_package_xml(tmp_path: Path) -> None:
     assert packages(tmp_path).find("its_name") == folder
 
 
-def test_a_workspace_hides_ours(tmp_path: Path) -> None:
+def test_workspace_overrides_built_in_packages(tmp_path: Path) -> None:
     folder = make_package(tmp_path / "rpi_feros", "rpi_feros")
     assert packages(tmp_path).find("rpi_feros") == folder
     assert packages(tmp_path).folders()["rpi_feros"] == folder

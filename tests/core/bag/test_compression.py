@@ -157,7 +157,7 @@ def test_many_bz2_streams_are_refused() -> None:
 
 
 @pytest.mark.parametrize("name", [BZ2, LZ4])
-def test_what_nobody_needs_any_more_is_not_decompressed(name: str) -> None:
+def test_unneeded_chunks_are_not_decompressed(name: str) -> None:
     asked: list[int] = []
 
     def is_cancelled() -> bool:

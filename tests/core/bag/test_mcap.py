@@ -132,7 +132,7 @@ def test_conversion_loses_nothing(suffix: str, tmp_path: Path) -> None:
     assert found[0] == found[1] == found[2]
 
 
-def test_conversion_spares_what_exists(tmp_path: Path) -> None:
+def test_conversion_does_not_overwrite_files(tmp_path: Path) -> None:
     source = tmp_path / "a.mcap"
     source.write_bytes(made().getvalue())
     target = tmp_path / "b.bag"
@@ -356,7 +356,7 @@ def test_messages_are_those_of_the_library_in_its_order(seed: int, index: str, k
 
 @pytest.mark.parametrize("mask", [0x80, 0xFF, 0x01])
 @pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
-def test_any_flipped_byte_gives_an_error_of_ours(compression: str, mask: int) -> None:
+def test_any_flipped_byte_raises_a_minirospy_error(compression: str, mask: int) -> None:
     # A length of 2^63 bytes was an OverflowError, one of 2^40 a MemoryError.
     whole = made(compression).getvalue()
     step = max(1, len(whole) // 1_500)

@@ -164,7 +164,7 @@ def test_opening_reads_neither_chunks_nor_indexes() -> None:
     assert stream.count < 20_000
 
 
-def test_reader_shows_what_is_written_meanwhile() -> None:
+def test_reader_shows_messages_written_meanwhile() -> None:
     data = make_bag([[Given(0, 1, b"a")], [Given(0, 2, b"b")]])
     whole = opened(data)
     chunks = list(whole.chunks[:1])

@@ -45,7 +45,7 @@ def test_every_end_can_be_reached_and_from_everywhere_an_end() -> None:
         assert any(row.get(state) in TERMINAL for row in SERVER_STEPS.values())
 
 
-def test_a_client_that_heard_nothing_takes_every_status() -> None:
+def test_client_without_status_accepts_every_status() -> None:
     for status in REPORTED:
         steps = client_steps(ClientState.WAITING_FOR_GOAL_ACK, status)
         assert steps

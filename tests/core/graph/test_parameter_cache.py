@@ -58,7 +58,7 @@ steps = st.lists(
 
 
 @given(steps)
-def test_what_it_knows_is_what_the_master_says(program: list[tuple[str, str, object]]) -> None:
+def test_cached_parameters_match_the_master(program: list[tuple[str, str, object]]) -> None:
     tree, cache, subscribed = ParameterTree(), ParameterCache(), set[str]()
 
     for verb, key, value in program:

@@ -73,7 +73,7 @@ def test_search_goes_upwards() -> None:
     assert tree.search("/a", "/y") is None
 
 
-def test_what_was_returned_is_not_changed_by_later_calls() -> None:
+def test_returned_values_are_not_changed_by_later_calls() -> None:
     tree = tree_of(a={"b": {"c": 1}, "l": [1]})
     before, inner = tree.get("/"), tree.get("/a/b")
     tree.set("/a/b/c", 2, "")
@@ -229,7 +229,7 @@ def test_small_values_find_room_where_large_ones_have_filled_it() -> None:
         tree.set("/robot_description", "x" * 200_000, "", weight)
 
 
-def test_namespaces_count_what_they_take_in_memory() -> None:
+def test_namespaces_count_their_memory() -> None:
     tree = ParameterTree()
     tracemalloc.start()
     try:

@@ -233,7 +233,7 @@ def size_of(value: Any, seen: set[int]) -> int:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_registrations_count_what_they_take_in_memory(kind: str) -> None:
+def test_registrations_count_their_memory(kind: str) -> None:
     registry, count = Registry(), 2000
     for number in range(count):
         KINDS[kind](registry, number)

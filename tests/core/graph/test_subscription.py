@@ -60,7 +60,7 @@ def test_a_publisher_that_left_is_not_tried_again() -> None:
     assert plan.lost("http://a") is None
 
 
-def test_what_happens_to_a_publisher_that_left_changes_nothing() -> None:
+def test_events_of_a_publisher_that_left_are_ignored() -> None:
     plan = SubscriptionPlan()
     plan.worked("http://a")
     plan.refused("http://a")
@@ -76,7 +76,7 @@ def test_refusing_publisher_is_retried_at_the_next_update() -> None:
     assert plan.publishers_changed(["http://a", "http://b"]) == []
 
 
-def test_a_list_that_is_not_full_yet_leaves_nobody() -> None:
+def test_incomplete_list_disconnects_no_publisher() -> None:
     plan = SubscriptionPlan()
     plan.publishers_changed(["http://a", "http://b"])
     assert plan.publishers_changed(["http://c"], keep=True) == [Connect("http://c")]

@@ -22,7 +22,7 @@ def test_chain_of_names_that_do_not_exist_is_empty(buffer: TransformBuffer, time
     assert buffer.chain("x", time, "y", time, "z") == []
 
 
-def test_chain_ends_where_a_name_does_not_exist(buffer: TransformBuffer) -> None:
+def test_chain_stops_at_a_name_that_does_not_exist(buffer: TransformBuffer) -> None:
     with pytest.raises(ConnectivityException, match="between 'a' and 'NO_PARENT'"):
         buffer.chain("a", SECOND, "x", SECOND, "y")
     with pytest.raises(ConnectivityException, match="between 'NO_PARENT' and 'b'"):

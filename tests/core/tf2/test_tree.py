@@ -283,7 +283,7 @@ def test_a_frame_whose_stamp_stands_still_does_not_keep_the_others() -> None:
     assert buffer.lookup("b", "fixed", 0).stamp == SECOND
 
 
-def test_what_all_frames_have_decoded_is_not_kept() -> None:
+def test_data_decoded_by_all_frames_is_released() -> None:
     buffer = TransformBuffer(cache_time=1000 * SECOND)
     for _ in range(10):
         stream(buffer, 64)

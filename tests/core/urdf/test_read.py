@@ -67,7 +67,7 @@ def test_reader_agrees_with_urdfdom(name: str) -> None:
         ("twoparents", "link [c] has two parents: joint [j] and joint [k]"),
     ],
 )
-def test_reader_says_what_urdfdom_accepts_in_silence(name: str, words: str) -> None:
+def test_reader_reports_faults_that_urdfdom_accepts_silently(name: str, words: str) -> None:
     assert words in "\n".join(lines_of(GOLDEN[name]["urdf"])[1])
 
 
@@ -114,7 +114,7 @@ def test_errors_name_file_and_line() -> None:
     ],
     ids=["nothing", "blanks", "deep", "surrogate", "version", "bytes", "encoding", "entities"],
 )
-def test_what_is_not_a_description_is_refused(text: str | bytes) -> None:
+def test_invalid_description_is_refused(text: str | bytes) -> None:
     with pytest.raises(UrdfError):
         parse_robot(text)
 

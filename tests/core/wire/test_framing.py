@@ -174,7 +174,7 @@ def test_buffers_of_a_large_message() -> None:
         (b"", CHUNK, False),
     ],
 )
-def test_may_split_where_the_head_ends_with_the_length_of_the_array(
+def test_split_is_allowed_if_the_head_ends_with_the_array_length(
     head: bytes, tail: int, begins: bool
 ) -> None:
     assert may_split(head, tail) == begins

@@ -109,7 +109,7 @@ def test_who_keeps_the_connection() -> None:
     assert not feed(serialize_response(b"x", keep_alive=False), 99)[0].keep_alive
 
 
-def test_a_peer_that_waits_before_its_body_is_told_to_go_on() -> None:
+def test_peer_that_expects_continue_receives_it() -> None:
     reader = HttpReader()
     head = b"POST / HTTP/1.1\r\nExpect: 100-continue\r\nContent-Length: 2\r\n\r\n"
     assert reader.feed(head) == []

@@ -98,7 +98,7 @@ def test_bytes_of_a_record() -> None:
 
 
 @pytest.mark.parametrize("value", [object(), {1, 2}, 2**70])
-def test_what_no_journal_holds(value: object) -> None:
+def test_invalid_journal_records_are_refused(value: object) -> None:
     with pytest.raises((TypeError, ValueError)):
         serialize_record(["set", "/a", value])
 
@@ -191,6 +191,6 @@ def test_pieces_hold_dates_and_refuse_what_no_journal_holds() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"\xc1", b"\x91", b"\x91\xc7\1\5x", b"\1\1"])
-def test_what_was_not_packed_is_refused(data: bytes) -> None:
+def test_invalid_packed_data_is_refused(data: bytes) -> None:
     with pytest.raises(ValueError, match=r"."):
         unpack(data)

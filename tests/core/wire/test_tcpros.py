@@ -42,7 +42,7 @@ def test_a_fitting_pair_accepts_each_other(mine: InterfaceType, theirs: Interfac
     check_publisher(publisher_header("/t", mine, "/pub", latch=False), "/t", theirs)
 
 
-def test_types_that_differ_are_told_apart_by_name() -> None:
+def test_different_types_are_distinguished_by_name() -> None:
     why = check_subscriber(subscriber_header("/t", STRING, "/sub"), "/t", BOOL)
     assert why == "topic types do not match: [std_msgs/String] vs. [std_msgs/Bool]"
 

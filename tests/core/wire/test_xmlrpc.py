@@ -49,13 +49,13 @@ VALUES = st.recursive(
 
 
 @given(VALUES)
-def test_we_read_what_the_standard_library_writes(value: Any) -> None:
+def test_output_of_the_standard_library_is_read(value: Any) -> None:
     body = xmlrpc.client.dumps((value,), methodresponse=True).encode()
     assert parse_response(body) == value
 
 
 @given(VALUES)
-def test_the_standard_library_reads_what_we_write(value: Any) -> None:
+def test_standard_library_reads_our_output(value: Any) -> None:
     assert xmlrpc.client.loads(serialize_response(value)) == ((value,), None)
 
 
@@ -110,7 +110,7 @@ def wrapped(value: bytes) -> bytes:
         serialize_response(1)[:-20],
     ],
 )
-def test_what_is_no_answer_is_refused(body: bytes) -> None:
+def test_invalid_answers_are_refused(body: bytes) -> None:
     with pytest.raises(RpcProtocolError):
         parse_response(body)
 
@@ -529,7 +529,7 @@ def test_each_step_is_short() -> None:
         ),
     ],
 )
-def test_what_would_take_too_much_is_refused_before_its_end(
+def test_too_large_input_is_refused_before_its_end(
     body: bytes, why: str, status: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(xmlrpc_reader, "_MAX_MEMORY", 1024 * 1024)

@@ -81,7 +81,7 @@ def test_any_pieces(pieces: bytes) -> None:
     check(b"<methodCall><methodName>x</methodName><params>" + pieces + b"</params></methodCall>")
 
 
-def test_what_ros_sends_is_plain() -> None:
+def test_messages_of_ros_are_plain() -> None:
     """Calls and responses of rosmaster, rospy, roscpp and minirospy."""
     for args in (
         ("/node", "/topic", "std_msgs/String", "http://here:1/"),
@@ -104,11 +104,11 @@ def test_what_ros_sends_is_plain() -> None:
     "value",
     ["<", "&", "ä", "\r", 1e400, b"x"],
 )
-def test_what_is_left_to_the_parser(value: Any) -> None:
+def test_other_messages_are_left_to_the_parser(value: Any) -> None:
     assert read_plain(serialize_response([value])) is None
 
 
-def test_what_is_too_deep_or_too_long_is_left_to_the_parser() -> None:
+def test_deep_or_long_values_are_left_to_the_parser() -> None:
     value: Any = "x"
     for _ in range(61):
         value = [value]

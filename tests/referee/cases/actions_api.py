@@ -1,4 +1,4 @@
-"""What `import actionlib` has: names, signatures, constants, the names of constants."""
+"""The contents of `import actionlib`: names, signatures, constants, the names of constants."""
 
 import importlib
 import inspect

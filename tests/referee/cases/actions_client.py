@@ -1,4 +1,4 @@
-"""ActionClient: several goals at a time, their handles, which callbacks are called; a handle that is dropped."""
+"""ActionClient: several goals at a time, their handles, the callbacks; a handle that is dropped."""
 
 import gc
 

@@ -49,7 +49,7 @@ def tell(made):
     )
 
 
-# Real actionlib names PENDING wrongly in one line of the log; LOST is not a state that a machine gets into.
+# Real actionlib logs a wrong name for PENDING in one line; LOST is not a state of a machine.
 STATES = range(8)
 for state in STATES:
     for status in range(10):
@@ -101,7 +101,7 @@ story.tell()
 
 
 class Server:
-    """What a handle wants of its server."""
+    """The part of a server that a handle uses."""
 
     ActionResultType = TestResult
 

@@ -1,4 +1,4 @@
-"""The modules of actionlib, as programs name them after `import actionlib`."""
+"""The modules of actionlib that programs use after `import actionlib`."""
 
 import actionlib
 import rospy

@@ -1,4 +1,4 @@
-"""Servers that die or restart in mid-goal, clients that die: what the other side sees."""
+"""Servers that die or restart during a goal, clients that die: the effects on the other side."""
 
 import actionlib
 import rospy

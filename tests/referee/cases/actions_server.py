@@ -1,4 +1,4 @@
-"""ActionServer: what it calls, and what it publishes of each goal, by hand on the topics."""
+"""ActionServer: its callbacks and its messages for each goal, with a scripted client."""
 
 import actionlib
 import rospy

@@ -1,4 +1,4 @@
-"""ActionServer: cancels of all goals, by id, by time, of goals that have not come yet."""
+"""ActionServer: cancel requests for all goals, by id, by time, and for goals that have not arrived yet."""
 
 import actionlib
 import rospy

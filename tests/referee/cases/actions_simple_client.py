@@ -1,4 +1,4 @@
-"""SimpleActionClient: its state and its callbacks, with a server by hand that publishes every status and result."""
+"""SimpleActionClient: its state and its callbacks, with a scripted server that publishes every status and result."""
 
 import weakref
 
@@ -30,7 +30,7 @@ def feedback(message):
 
 
 def send(**callbacks):
-    """Send a goal; its id."""
+    """Send a goal; return its id."""
     count = len(server.goals)
     client.send_goal(TestGoal(count), **callbacks)
     show(server.wait_goals(count + 1), server.goals[-1].goal.goal)
@@ -142,7 +142,7 @@ show(story.wait_log("Invalid"))
 tell()
 
 show("== a new goal while one is tracked: the first is heard of no more")
-# It is heard of for as long as the thread that logged the last line has it.
+# It exists for as long as the thread that logged the last line refers to it.
 first = weakref.ref(client.gh.comm_state_machine)
 second = send(done_cb=done)
 show(eventually(lambda: first() is None))

@@ -1,4 +1,4 @@
-"""SimpleActionClient: what blocks, its timeouts, what is asked before there is a goal, cancels of others' goals."""
+"""SimpleActionClient: blocking calls, timeouts, calls before there is a goal, cancel requests for other clients' goals."""
 
 import threading
 
@@ -52,7 +52,7 @@ S = GoalStatus
 
 
 def goal_and_wait(goal, *timeouts):
-    """send_goal_and_wait in a thread; its answer, and the thread."""
+    """Run send_goal_and_wait in a thread; return its result, and the thread."""
     answers = []
     thread = threading.Thread(
         target=lambda: answers.append(name_of(client.send_goal_and_wait(TestGoal(goal), *timeouts)))

@@ -1,4 +1,4 @@
-"""SimpleActionServer with an execute callback: success, preemption by goal and by cancel, what the callback forgets."""
+"""SimpleActionServer with an execute callback: success, preemption by goal and by cancel, callbacks that set no result."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""SimpleActionServer without an execute callback: goal and preempt callbacks, goals accepted by hand."""
+"""SimpleActionServer without an execute callback: goal and preempt callbacks, goals accepted explicitly."""
 
 import actionlib
 import rospy

@@ -1,4 +1,4 @@
-"""SimpleActionServer: a goal older than the one that runs, or waits, or ran last."""
+"""SimpleActionServer: a goal older than the running, the waiting or the last one."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""The names of states, which actionlib gives to GoalStatus, too."""
+"""The names of states, which actionlib adds to GoalStatus, too."""
 
 import actionlib
 import actionlib.action_client

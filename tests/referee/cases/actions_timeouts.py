@@ -1,4 +1,4 @@
-"""Parameters of a server: how long it reports goals that ended, how often it reports; queue sizes."""
+"""Parameters of a server: how long it reports finished goals, how often it reports; queue sizes."""
 
 import time
 
@@ -25,7 +25,7 @@ server.start()
 show(server.action_server.status_frequency, server.action_server.status_list_timeout.to_sec())
 show(server.action_server.pub_queue_size, server.action_server.sub_queue_size)
 client = RawClient("server")
-# By default it would be five seconds.
+# The default would be five seconds.
 before = time.monotonic()
 client.goal("a", 1)
 show(client.wait_told("a", "SUCCEEDED"))

@@ -1,4 +1,4 @@
-"""wait_for_server: all five topics have to be connected; what comes while it waits; a server that leaves."""
+"""wait_for_server: all five topics must be connected; messages that arrive meanwhile; a server that leaves."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""angles: every function over a grid of angles and limits, the ends of the circle among them."""
+"""angles: every function over a grid of angles and limits, including the ends of the circle."""
 
 import hashlib
 from math import pi

@@ -1,4 +1,4 @@
-"""camera_calibration_parsers and resource_retriever: what is read from files and URLs, right and wrong."""
+"""camera_calibration_parsers and resource_retriever: valid and invalid files and URLs."""
 
 import tempfile
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""cv_bridge: which images come out of messages and back, in every encoding, and what is refused."""
+"""cv_bridge: conversion of messages to images and back, in every encoding, and refused ones."""
 
 import hashlib
 
@@ -35,7 +35,7 @@ WRONG = ["8UC", "9UC1", "8FC1", "foo", "BGR8", "nv21", ""]
 
 
 def pixels(encoding, big=False, width=7, height=5):
-    """Return a message with the same random pixels each time, the ends of the range among them."""
+    """Return a message with the same random pixels each time, including the extreme values."""
     dtype, channels = bridge.encoding_to_dtype_with_channels(encoding)
     dtype = np.dtype(dtype)
     state = (
@@ -127,7 +127,7 @@ show(issubclass(CvBridgeError, TypeError), sorted(bridge.cvtype_to_name.items())
 show(bridge.cvdepth_to_numpy_depth, sorted(bridge.numpy_type_to_cvtype.items()))
 show(bridge.dtype_with_channels_to_cvtype2(np.dtype("f4"), 3), bridge.cvtype2_to_dtype_with_channels(21))
 
-# Compressed: without loss the same pixels come back, in OpenCV's order.
+# Compressed: lossless formats give the same pixels, in OpenCV's order.
 for encoding in ("mono8", "bgr8", "bgra8", "mono16"):
     image = bridge.imgmsg_to_cv2(pixels(encoding))
     for format in ("png", "bmp", "tiff", "jpg", "jpeg"):

@@ -1,4 +1,4 @@
-"""diagnostic_updater: what the tasks report, and what the updater publishes when."""
+"""diagnostic_updater: the reports of the tasks, and when the updater publishes them."""
 
 import queue
 
@@ -26,7 +26,7 @@ rospy.init_node("updating")
 
 
 class Clock:
-    """The time that rospy.Time.now() gives."""
+    """Controls the time that rospy.Time.now() returns."""
 
     now = 1000.0
 
@@ -123,7 +123,7 @@ eventually(lambda: updater.publisher.get_num_connections() and subscriber.get_nu
 
 
 def published(label, call):
-    """Show what a call publishes, and the number of arrays of it."""
+    """Print a call's published messages, and the number of arrays."""
     call()
     updater.publish(DiagnosticStatusWrapper(name="end"))
     while True:

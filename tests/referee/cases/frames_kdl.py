@@ -1,4 +1,4 @@
-"""PyKDL's frame types, and tf_conversions on them."""
+"""PyKDL's frame types, and tf_conversions for them."""
 
 import copy
 import math
@@ -15,7 +15,7 @@ from tf_conversions import transformations
 
 
 def near(value):
-    """Numbers of any type as text that rounding does not change."""
+    """Return numbers of any type as a string, rounded."""
     if isinstance(value, float):
         return f"{round(value, 9) + 0.0:.9f}"
     if isinstance(value, (tuple, list)):

@@ -1,4 +1,4 @@
-"""What tf and tf2 return is of Python's floats, whatever was set; wrong arguments, and conversions that lack."""
+"""tf and tf2 return Python floats for any input type; wrong arguments, and missing conversions."""
 
 import geometry_msgs.msg as geometry
 import numpy

@@ -1,4 +1,4 @@
-"""rosgraph.Master: answers, faults, and no master at all."""
+"""rosgraph.Master: answers, faults, and an unreachable master."""
 
 import rosgraph
 import rosgraph.masterapi

@@ -1,4 +1,4 @@
-"""The functions on names with None, bytes and other types, as programs pass them by mistake."""
+"""The functions on names with None, bytes and other types, which programs pass by mistake."""
 
 import genmsg.msgs
 import genpy.message
@@ -12,7 +12,7 @@ VALUES = (None, "", "a", "/a", "~a", "a b", "-a:=b", "~a:=b", 5, b"/a", ["a"], {
 
 
 def result(function, *arguments):
-    """Return what a call gives, or the type of what it raises; what is false is False."""
+    """Return a call's result, or the type of its exception; a false value becomes False."""
     try:
         return repr(function(*arguments) or False)
     except ValueError as error:

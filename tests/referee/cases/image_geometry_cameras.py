@@ -1,4 +1,4 @@
-"""image_geometry: pixels, rays and rectified images of cameras with every kind of distortion, binning and region."""
+"""image_geometry: pixels, rays and rectified images of cameras with every kind of distortion, binning and region of interest."""
 
 import math
 import warnings
@@ -23,7 +23,7 @@ ROTATION = [0.9999, -0.0101, 0.0085, 0.0102, 0.99993, -0.0061, -0.0084, 0.0062, 
 
 
 def rounded(value):
-    """Return a result with nine places of each number."""
+    """Return a result with its numbers rounded to nine places."""
     if isinstance(value, (np.ndarray, list, tuple)):
         return [rounded(each) for each in np.asarray(value).ravel().tolist()] if len(value) else []
     if isinstance(value, float) and not math.isfinite(value):
@@ -51,7 +51,7 @@ def region(info, x, y, width, height):
 
 
 def describe(label, info):
-    """Show all that a model answers."""
+    """Print all results of a model."""
     model = PinholeCameraModel()
     model.fromCameraInfo(info)
     for name in QUERIES.split():

@@ -1,4 +1,4 @@
-"""interactive_markers: what the server publishes for each change, whom it calls, and menus."""
+"""interactive_markers: the server's messages for each change, its callbacks, and menus."""
 
 import queue
 
@@ -20,7 +20,7 @@ rospy.init_node("markers")
 
 
 class Clock:
-    """The time that rospy.Time.now() gives."""
+    """Controls the time that rospy.Time.now() returns."""
 
     now = 1000.0
 
@@ -52,7 +52,7 @@ def update_text(update):
 
 
 def apply(label):
-    """Apply the changes, and show what is published of them."""
+    """Apply the changes, and print the published messages."""
     before = server.seq_num
     server.applyChanges()
     if server.seq_num == before:
@@ -137,7 +137,7 @@ server.get("stamped").header.stamp = rospy.Time(5)
 server.setCallback("a", callback("default"))
 server.setCallback("a", callback("clicked"), InteractiveMarkerFeedback.BUTTON_CLICK)
 apply("with callbacks")
-# For a second, a new marker takes no feedback.
+# For a second, a new marker accepts no feedback.
 Clock.now += 2
 for event, name in (
     (InteractiveMarkerFeedback.BUTTON_CLICK, "a"),

@@ -1,4 +1,4 @@
-"""rosmsg, roslib and genpy as Python code calls them."""
+"""rosmsg, roslib and genpy called from Python code."""
 
 import genpy
 import roslib

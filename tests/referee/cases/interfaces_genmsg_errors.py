@@ -1,4 +1,4 @@
-"""genmsg's words for what does not parse, and genmsg.deps: the files that a definition needs."""
+"""genmsg's error messages for invalid definitions, and genmsg.deps: the files on which a definition depends."""
 
 import os
 

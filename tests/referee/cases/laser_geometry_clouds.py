@@ -30,7 +30,7 @@ def scan(count=10, **changed):
 
 
 def described(cloud):
-    """Return all of a cloud but its header's time."""
+    """Return all fields of a cloud except its header's time."""
     fields = [(field.name, field.offset, field.datatype, field.count) for field in cloud.fields]
     data = bytes(cloud.data).hex()
     numbers = cloud.height, cloud.width, cloud.point_step, cloud.row_step, cloud.is_dense, cloud.is_bigendian
@@ -47,7 +47,7 @@ projection = LaserProjection()
 
 
 def project(*arguments, **options):
-    """Show the cloud that these arguments give."""
+    """Print the cloud for these arguments."""
     show(arguments[1:], options, described(projection.projectLaser(*arguments, **options)))
 
 

@@ -1,5 +1,5 @@
 # ruff: noqa: E501, SIM115, BLE001
-"""Launching from a program: what users take from roslaunch's modules, and what it gives them."""
+"""Launching from a program: the functions of roslaunch's modules, and their results."""
 
 import os
 import sys
@@ -50,7 +50,7 @@ def raises(call):
     return "nothing"
 
 
-# What roslaunch itself prints is not asked for here.
+# Discard roslaunch's own output.
 lines, out = [], sys.stdout
 sys.stdout = sys.stderr = open(os.devnull, "w")
 
@@ -60,7 +60,7 @@ def tell(*values):
 
 
 def waits(count):
-    """Wait until `count` programs more are at work."""
+    """Wait until `count` more programs are running."""
     seen = eventually(lambda: os.path.isfile(MARK) and os.path.getsize(MARK) == count)
     os.unlink(MARK)
     return seen
@@ -393,7 +393,7 @@ show(
     roslaunch.nodeprocess.DEFAULT_TIMEOUT_SIGINT,
 )
 
-# What a file leaves unset.
+# Attributes that a file does not set.
 with open(os.path.join(ROOT, "unset.launch"), "w") as file:
     file.write(
         '<launch><group ns="g" clear_params="true"><node name="a" pkg="robot" type="t" clear_params="true"/></group>'
@@ -449,7 +449,7 @@ config.add_node(roslaunch.core.Node("p", "x", "n"), verbose=False)
 show(config.resolved_node_names, len(config.tests))
 show(roslaunch.substitution_args.convert_value("1", "auto"))
 
-# The content of a file as a parameter's value.
+# A file's content as a parameter value.
 with open(os.path.join(ROOT, "content"), "wb") as file:
     file.write(b"\x00a")
 with open(os.path.join(ROOT, "binary.launch"), "w") as file:
@@ -463,7 +463,7 @@ parent.shutdown()
 sys.stdout, sys.stderr = out, sys.__stderr__
 show(rosgraph.Master("/case").getParam("/b").data)
 
-# Arguments of launch files, as a command line has them.
+# Arguments of launch files, in command-line form.
 with open(os.path.join(ROOT, "args.launch"), "w") as file:
     file.write('<launch><arg name="a" default="1"/><param name="p" value="$(arg a)"/></launch>')
 for argv in (

@@ -1,5 +1,5 @@
 # ruff: noqa: E501, BLE001
-"""Launch files: what each gives for its nodes, parameters and machines, through roslaunch's Python API."""
+"""Launch files: the resulting nodes, parameters and machines, through roslaunch's Python API."""
 
 import os
 

@@ -1,5 +1,5 @@
 # ruff: noqa: E501, BLE001
-"""The steps of roslaunch.substitution_args, as programs that read launch files by themselves call them."""
+"""The steps of roslaunch.substitution_args, called by programs that read launch files themselves."""
 
 import os
 

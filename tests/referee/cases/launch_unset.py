@@ -1,4 +1,4 @@
-"""Nodes and tests of roslaunch.core: the values of what is not set, and what their constructors refuse."""
+"""Nodes and tests of roslaunch.core: the default values, and the errors of their constructors."""
 
 import rosgraph.xmlrpc
 from referee import outcome, show
@@ -59,7 +59,7 @@ for attributes in ("", ' clear_params="true"', ' clear_params="false"', ' cwd="n
         attributes, config.clear_params, [(node.cwd, node.output, node.machine_name) for node in config.nodes]
     )
 
-# A test without a name is given one when it runs.
+# A test without a name gets one when it runs.
 TEST = '<test test-name="" pkg="p" type="t.py" {}><param name="~v" value="1"/></test>'
 for attributes in ("", 'ns="g"', 'name="x"', 'name=""'):
     config = ROSLaunchConfig()
@@ -70,7 +70,7 @@ for attributes in ("", 'ns="g"', 'name="x"', 'name=""'):
         list(config.params),
     )
 
-# The port that a node's server is asked for.
+# The port at which a node's server is queried.
 for port in (0, None, "", 3, "3", "x", ()):
     outcome(f"port {port!r}", lambda: rosgraph.xmlrpc.XmlRpcNode(port).port)
 show(rosgraph.xmlrpc.isstring("a"), rosgraph.xmlrpc.isstring(b"a"), rosgraph.xmlrpc.isstring(None))

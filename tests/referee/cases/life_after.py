@@ -1,4 +1,4 @@
-"""What the calls do once the node has shut down."""
+"""Calls after the node has shut down."""
 
 import rospy
 from referee import outcome, show

@@ -1,4 +1,4 @@
-"""Another node in the process of one that has shut down: what programs set in rospy's modules for it."""
+"""Another node in the process of one that has shut down: programs reset rospy's modules for it."""
 
 import os
 import threading

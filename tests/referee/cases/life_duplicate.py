@@ -1,4 +1,4 @@
-"""Two nodes of one name: the older goes down and says why."""
+"""Two nodes of one name: the older one shuts down and prints the reason."""
 
 from referee import Other, show
 
@@ -16,7 +16,7 @@ print("spun", rospy.is_shutdown(), flush=True)
 
 
 def shown(line):
-    """Without the time of a log line."""
+    """Return a log line without its time."""
     level, bracket, rest = line.partition("] [")
     return level + "]" + rest.partition("]")[2] if bracket else line
 

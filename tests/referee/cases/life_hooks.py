@@ -1,4 +1,4 @@
-"""The order of shutdown hooks, what they may do, and their arguments."""
+"""Shutdown hooks: their order, their permitted actions, and their arguments."""
 
 import sys
 import threading

@@ -1,4 +1,4 @@
-"""init_node: what may be asked before it, and calling it twice."""
+"""init_node: queries before it, and calling it twice."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""A configuration of Python's logging by ROS_PYTHON_LOG_CONFIG_FILE or in ROS_HOME."""
+"""Configuration of Python's logging by ROS_PYTHON_LOG_CONFIG_FILE or in ROS_HOME."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Log files: where they are, what they contain, the link to the latest."""
+"""Log files: their locations and contents, the link to the latest."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""The log_level of init_node, and levels set by hand."""
+"""The log_level of init_node, and levels set directly."""
 
 import logging
 
@@ -9,7 +9,7 @@ rospy.init_node("case", argv=[], log_level=rospy.WARN)
 show(rospy.DEBUG, rospy.INFO, rospy.WARN, rospy.ERROR, rospy.FATAL)
 logger = logging.getLogger("rosout")
 show(logger.level, logger.propagate == 1, logger.isEnabledFor(logging.INFO))
-logger.removeHandler(logger.handlers[0])  # the terminal's
+logger.removeHandler(logger.handlers[0])  # the terminal's handler
 lines = []
 
 

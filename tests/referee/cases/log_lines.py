@@ -1,4 +1,4 @@
-"""Log lines: what goes to stdout and to stderr, in which form; messages of all sorts."""
+"""Log lines: stdout or stderr, their format; messages of all types."""
 
 import subprocess
 import sys

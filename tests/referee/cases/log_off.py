@@ -1,4 +1,4 @@
-"""Logging switched off: without /rosout, and without the topics in its messages."""
+"""Disabled logging: without /rosout, and without the topics in its messages."""
 
 import rospy
 from referee import Other, show

@@ -1,4 +1,4 @@
-"""_once, _throttle and _throttle_identical, on simulated time."""
+"""_once, _throttle and _throttle_identical, with simulated time."""
 
 import logging
 
@@ -10,7 +10,7 @@ rospy.set_param("/use_sim_time", True)
 rospy.init_node("case", argv=[])
 publisher = rospy.Publisher("/clock", Clock, queue_size=1, latch=True)
 rosout = logging.getLogger("rosout")
-rosout.removeHandler(rosout.handlers[0])  # the terminal's
+rosout.removeHandler(rosout.handlers[0])  # the terminal's handler
 rosout.setLevel(logging.DEBUG)
 lines = []
 

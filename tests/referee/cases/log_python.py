@@ -1,4 +1,4 @@
-"""A program's own handlers, and loggers of Python's, next to rospy's."""
+"""A program's own handlers, and Python's loggers, together with rospy's."""
 
 import logging
 
@@ -19,7 +19,7 @@ rospy.init_node("case", argv=[])
 rosout, root = logging.getLogger("rosout"), logging.getLogger()
 show(rosout.level, rosout.propagate == 1, [type(handler).__name__ for handler in rosout.handlers])
 show(root.level, [type(handler).__name__ for handler in root.handlers])
-rosout.removeHandler(rosout.handlers[0])  # the terminal's
+rosout.removeHandler(rosout.handlers[0])  # the terminal's handler
 at_rosout, at_root, at_child = [], [], []
 rosout.addHandler(Keep(at_rosout))
 logging.getLogger("rosout.child").addHandler(Keep(at_child))

@@ -1,4 +1,4 @@
-"""A refused connection is a warning, which the level of the logger rosout hides or shows."""
+"""A refused connection is logged as a warning, which the level of the logger rosout hides or shows."""
 
 import contextlib
 import io
@@ -10,7 +10,7 @@ import rospy
 from referee import show
 from std_srvs.srv import SetBool, Trigger
 
-# Before the handlers are made, which may keep the stream.
+# Before the handlers are created, which may keep the stream.
 sys.stderr = io.StringIO()
 rospy.init_node("case", argv=[], log_level=rospy.WARN)
 service = rospy.Service("switch", SetBool, lambda request: (True, ""))
@@ -19,7 +19,7 @@ service = rospy.Service("switch", SetBool, lambda request: (True, ""))
 def refused():
     with contextlib.suppress(rospy.ServiceException):
         rospy.ServiceProxy("switch", Trigger)()
-    # The server has done with the first connection when it answers on the next.
+    # The server is done with the first connection when it answers on the next.
     return rospy.ServiceProxy("switch", SetBool)(True).success
 
 

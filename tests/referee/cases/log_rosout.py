@@ -1,4 +1,4 @@
-"""/rosout: what a message says of its line."""
+"""/rosout: the location fields of a message."""
 
 import logging
 
@@ -9,7 +9,7 @@ from std_msgs.msg import Bool
 
 rospy.init_node("case", argv=["__ns:=/somewhere"])
 rosout = logging.getLogger("rosout")
-rosout.removeHandler(rosout.handlers[0])  # the terminal's
+rosout.removeHandler(rosout.handlers[0])  # the terminal's handler
 got = []
 rospy.Subscriber("/rosout", Log, got.append)
 publisher = rospy.Publisher("here", Bool, queue_size=1)

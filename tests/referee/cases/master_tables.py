@@ -1,4 +1,4 @@
-"""The tables and threads of rosmaster, which masters of other projects are built on."""
+"""The tables and threads of rosmaster, which third-party masters use."""
 
 import threading
 
@@ -8,19 +8,19 @@ from rosmaster.threadpool import MarkedThreadPool
 
 
 class Pool:
-    """Shows what is queued."""
+    """Prints queued calls."""
 
     def queue_task(self, marker, task, args):
         show("task", marker, task.__name__, args)
 
 
 def state(table):
-    """Return what a table holds."""
+    """Return the contents of a table."""
     return table.type, table.get_state(), sorted(table.map.items()), table.service_api_map, bool(table)
 
 
 def refused(label, call):
-    """Show the type and text of an error."""
+    """Print the type and text of an error."""
     try:
         show(label, call())
     except Exception as error:  # noqa: BLE001 - any error is printed

@@ -1,4 +1,4 @@
-"""message_filters: which messages the synchronizers pass on together, and what the cache finds."""
+"""message_filters: which messages the synchronizers pass on together, and the results of the cache."""
 
 import hashlib
 
@@ -17,7 +17,7 @@ class Stamped:
 
 
 class Numbers:
-    """The same random numbers with every Python."""
+    """Random numbers that are the same in every Python."""
 
     def __init__(self, seed):
         self.state = seed * 2654435761 % 2**32
@@ -28,7 +28,7 @@ class Numbers:
 
 
 def passed_on(make, inputs, seed, steps, spread, grid=1):
-    """Return what a synchronizer passes on, of random messages whose stamps are early or late by up to `spread` ms."""
+    """Return a synchronizer's output for random messages whose stamps are early or late by up to `spread` ms."""
     numbers = Numbers(seed)
     sources = [message_filters.SimpleFilter() for _ in range(inputs)]
     found = []
@@ -73,7 +73,7 @@ for inputs in (1, 2, 3, 4):
             sums = [text.partition(" ")[0] for text in texts]
             show(inputs, queue, grid, *sums, hashlib.md5("".join(texts).encode()).hexdigest())
 
-# Of stamps that are equally close, the one that came first is tried first; a slop is less than, not at most.
+# Of equally close stamps, the first to arrive is tried first; a slop is an exclusive limit.
 for first, second in ((90, 110), (110, 90)):
     sources = [message_filters.SimpleFilter(), message_filters.SimpleFilter()]
     synchronizer = message_filters.ApproximateTimeSynchronizer(sources, 10, 0.02)
@@ -83,7 +83,7 @@ for first, second in ((90, 110), (110, 90)):
     sources[1].signalMessage(Stamped(rospy.Time(0, 100_000_000), "new"))
     sources[1].signalMessage(Stamped(rospy.Time(0, 130_000_000), "at the slop"))
 
-# The calls that programs with their own inputs make: no index, and queues that are dicts.
+# Calls of programs with their own inputs: no index, and queues that are dicts.
 synchronizer = message_filters.ApproximateTimeSynchronizer([message_filters.SimpleFilter()] * 2, 3, 0.1)
 synchronizer.registerCallback(lambda *messages: show("without an index", *[each.name for each in messages]))
 synchronizer.queues = [{}, {}]
@@ -102,7 +102,7 @@ for index, milliseconds in (
     synchronizer.add(message, synchronizer.queues[index])
     show([sorted(stamp.to_nsec() // 1_000_000 for stamp in queue) for queue in synchronizer.queues])
 
-# Names of arguments, what is there, and what callbacks get.
+# Names of arguments, attributes, and callbacks' arguments.
 source = message_filters.SimpleFilter()
 show(
     source.registerCallback(lambda *given: show("given", *given), 1, 2),

@@ -1,4 +1,4 @@
-"""genpy as a library: checks of values, filling, texts, comparisons of times, and copies of messages."""
+"""genpy as a library: checks of values, filling, text forms, comparisons of times, and copies of messages."""
 
 import copy
 import io
@@ -14,14 +14,14 @@ from nav_msgs.msg import Path
 from referee import outcome, show
 from std_msgs.msg import Bool, Float32MultiArray, Header, Int32, String
 
-# Times: a TVal compares with both, a time and a duration not with each other.
+# Times: a TVal compares with both; a time and a duration do not compare with each other.
 values = [genpy.Time(1, 2), genpy.Duration(1, 2), genpy.TVal(1, 2), genpy.TVal(3)]
 for a in values:
     for b in values:
         outcome((a, b), lambda a=a, b=b: (a < b, a <= b, a > b, a >= b))
 show(genpy.Time.__slots__, genpy.Duration.__slots__, rospy.Time.__slots__, rospy.Duration.__slots__)
 
-# check_type: stricter than what can be sent.
+# check_type is stricter than serialization.
 types = [
     "int8",
     "uint8",
@@ -108,7 +108,7 @@ for kind, values in (
     )
 outcome("fill a class", lambda: genpy.message.fill_message_args(String, []))
 
-# Texts.
+# Text forms.
 for value in ([1, "a"], ["a", 1], [1.5, "a b", 2], [True, "x"]):
     for width in (None, 1, 5):
         outcome(

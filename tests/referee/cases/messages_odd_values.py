@@ -1,4 +1,4 @@
-"""The text of messages whose arrays hold what is not usual: other arrays, texts for bytes, tuples."""
+"""The text of messages whose arrays have unusual types: other arrays, strings for bytes, tuples."""
 
 import genpy.dynamic
 import genpy.message

@@ -1,4 +1,4 @@
-"""Names of rosbag.bag that start with an underscore, and that programs use all the same."""
+"""Names of rosbag.bag that start with an underscore and that programs use nevertheless."""
 
 import os
 
@@ -33,7 +33,7 @@ show(kind._type, rosbag.bag._message_types[connection.md5sum] is kind)
 
 
 class Counted(list):
-    """Counts how far an iteration came, as a progress bar does."""
+    """Counts how far an iteration has come, as a progress bar does."""
 
     seen = 0
 

@@ -1,4 +1,4 @@
-"""catkin.find_in_workspaces as programs use it to find the files of packages in a workspace."""
+"""catkin.find_in_workspaces, with which programs find the files of packages in a workspace."""
 
 import os
 import tempfile

@@ -1,4 +1,4 @@
-"""genmsg as programs use it that generate code from definitions, or compare what types mean."""
+"""genmsg in programs that generate code from definitions, or compare types."""
 
 import os
 
@@ -18,7 +18,7 @@ context = genmsg.MsgContext.create_default()
 
 
 def kind(label, call):
-    """Show what a call gives, or the type of what it raises."""
+    """Print a call's result, or the type of its exception."""
     try:
         show(label, "gives", repr(call()))
     except Exception as error:  # noqa: BLE001 - whatever it is

@@ -1,4 +1,4 @@
-"""Modules that programs use without an import of their own: with ROS they come along with the package."""
+"""Modules that programs use without importing them: in ROS the package imports them."""
 
 import genpy
 import rosgraph

@@ -1,4 +1,4 @@
-"""What rosgraph and its kin do where no master answers: an error that programs of users catch, at once."""
+"""rosgraph and similar modules without a master: an immediate error that users' programs catch."""
 
 import contextlib
 import io

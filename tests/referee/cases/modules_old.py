@@ -1,4 +1,4 @@
-"""What scripts of old import: roslib.scriptutil's master, which answers with triples, and messages by name."""
+"""Imports of old scripts: roslib.scriptutil's master, which answers with triples, and messages by name."""
 
 import genpy
 import genpy.message

@@ -1,5 +1,5 @@
 # ruff: noqa: E501, BLE001
-"""Names that start with an underscore, or are the generator's own, and that programs use all the same."""
+"""Private names, and names of the generator, that programs use nevertheless."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""rostopic's publishers and echo in programs that are no nodes before."""
+"""rostopic's publishers and echo in programs that are not nodes yet."""
 
 import rostopic
 from referee import Other, show

@@ -1,4 +1,4 @@
-"""roslib.manifest and roslib.stacks on packages of rosbuild, as programs from before catkin use them."""
+"""roslib.manifest and roslib.stacks with rosbuild packages, as used by programs from before catkin."""
 
 import os
 from pathlib import Path
@@ -30,7 +30,7 @@ for name, text in FILES.items():
 
 
 def below(path):
-    """Return a path of these files, below their folder."""
+    """Return a path of these files, relative to their folder."""
     return str(path).replace(str(ROOT), "ROOT")
 
 

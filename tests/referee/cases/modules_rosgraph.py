@@ -1,4 +1,4 @@
-"""rosgraph where programs reach further into it: odd URIs, addresses, connection headers, the log handler."""
+"""Less common parts of rosgraph: odd URIs, addresses, connection headers, the log handler."""
 
 import logging
 import os
@@ -74,7 +74,7 @@ show("# log")
 
 
 class Handler(RosStreamHandler):
-    """Its own form of a line, as programs have it that want the time in another."""
+    """A handler with another line format, as programs define it for another time format."""
 
     def emit(self, record):
         level, color = _logging_to_rospy_names[record.levelname]

@@ -1,4 +1,4 @@
-"""rosmsg, roslib.msgs and roslib.network as programs use them that look into types."""
+"""rosmsg, roslib.msgs and roslib.network in programs that inspect types."""
 
 import os
 
@@ -13,7 +13,7 @@ rospack = rospkg.RosPack()
 
 
 def kind(label, call):
-    """Show what a call gives, or the type of what it raises."""
+    """Print a call's result, or the type of its exception."""
     try:
         show(label, "gives", repr(call()))
     except Exception as error:  # noqa: BLE001 - whatever it is

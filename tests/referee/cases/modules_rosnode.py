@@ -1,4 +1,4 @@
-"""rosnode's texts and clean-up as programs that watch a robot's nodes use them."""
+"""rosnode's texts and clean-up in programs that watch a robot's nodes."""
 
 import rosgraph
 import rosnode

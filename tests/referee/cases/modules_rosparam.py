@@ -1,4 +1,4 @@
-"""rosparam as programs that read configuration files and load them onto the server use it."""
+"""rosparam in programs that read configuration files and load them onto the server."""
 
 import functools
 import itertools

@@ -1,4 +1,4 @@
-"""rosservice as programs that call services by name use it; the program is not a node before."""
+"""rosservice in programs that call services by name; the program is not a node yet."""
 
 import contextlib
 import io
@@ -42,7 +42,7 @@ def called(*args):
 
 
 def kind(label, call):
-    """Show what a call gives, or the type of what it raises."""
+    """Print a call's result, or the type of its exception."""
     try:
         show(label, "gives", call())
     except Exception as error:  # noqa: BLE001 - whatever it is

@@ -1,4 +1,4 @@
-"""rostopic's texts, publishers and measuring as programs that look after topics use them."""
+"""rostopic's texts, publishers and measurements in programs that monitor topics."""
 
 import contextlib
 import io
@@ -15,7 +15,7 @@ from std_msgs.msg import Bool, Float32, Header, String
 
 
 def printed(label, call):
-    """Mask a measured number, which differs each time."""
+    """Print a call's result with a measured number masked, which differs each time."""
     printed_exactly(label, call, (r"\d+\.\d+(e-\d+)?", "<n>"))
 
 
@@ -97,7 +97,7 @@ for words in ((True, False), (False, True), (True, True), (False, False)):
 
 
 class Changes(rostopic.CallbackEcho):
-    """Prints only what is new, as programs derive it."""
+    """Prints only changes, as programs' subclasses do."""
 
     def __init__(self, topic):
         super().__init__(topic, None)
@@ -130,7 +130,7 @@ bandwidth = rostopic.ROSTopicBandwidth(3)
 
 
 class Raw:
-    """As AnyMsg is."""
+    """A raw message, like AnyMsg."""
 
     _buff = b"x" * 1500
 

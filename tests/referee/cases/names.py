@@ -1,4 +1,4 @@
-"""Names: what resolves to what, and what is remapped."""
+"""Names: resolution and remapping."""
 
 import rospy
 from referee import outcome, show

@@ -1,4 +1,4 @@
-"""Names of topics that a program makes before init_node, with its command line remapped."""
+"""Names of topics that a program creates before init_node, with remappings on its command line."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Names that are refused, or that are warned about."""
+"""Names that are refused, or that cause a warning."""
 
 import warnings
 

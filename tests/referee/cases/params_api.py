@@ -1,4 +1,4 @@
-"""rosparam as Python code calls it."""
+"""rosparam called from Python code."""
 
 import os
 import tempfile

@@ -1,4 +1,4 @@
-"""get_param_cached: it follows what others and this node set."""
+"""get_param_cached: it follows the changes of other nodes and of this one."""
 
 import rospy
 from referee import Other, eventually, outcome, show

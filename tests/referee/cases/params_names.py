@@ -1,4 +1,4 @@
-"""Parameters: names, namespaces, what is raised."""
+"""Parameters: names, namespaces, exceptions."""
 
 import inspect
 

@@ -1,4 +1,4 @@
-"""What a node answers to paramUpdate: of a parameter that it subscribed to, and of others."""
+"""A node's answers to paramUpdate: for a parameter to which it subscribed, and for others."""
 
 import xmlrpc.client
 

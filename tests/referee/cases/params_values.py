@@ -1,4 +1,4 @@
-"""Parameters: values of all types, there and back."""
+"""Parameters: values of all types, set and read."""
 
 import datetime
 import xmlrpc.client

@@ -1,4 +1,4 @@
-"""sensor_msgs.point_cloud2: which points are read, in which order, and what is refused."""
+"""sensor_msgs.point_cloud2: which points are read, in which order, and refused clouds."""
 
 import hashlib
 import struct
@@ -33,7 +33,7 @@ def cloud(fmt, rows, fields, row_padding=0, point_padding=0, big=False):
 
 
 def summary(points):
-    """Return how many points there are, the first ones, and a hash of all."""
+    """Return the number of points, the first ones, and a hash of all."""
     points = list(points)
     return f"{len(points)} {points[:2]} {hashlib.md5(repr(points).encode()).hexdigest()}"
 

@@ -1,4 +1,4 @@
-"""What a handler may return, and what the client gets for it."""
+"""The permitted results of a handler, and the client's responses."""
 
 import rospy
 from referee import outcome

@@ -1,4 +1,4 @@
-"""What Service and ServiceProxy refuse before anything is sent."""
+"""Arguments that Service and ServiceProxy refuse before anything is sent."""
 
 import rospy
 import std_srvs.srv

@@ -1,4 +1,4 @@
-"""Services and proxies that are made before init_node; a service that a program spins."""
+"""Services and proxies that are created before init_node; a service that a program spins."""
 
 import threading
 

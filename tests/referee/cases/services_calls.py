@@ -1,4 +1,4 @@
-"""How a proxy is called: request objects, values, keywords; what does not fit; the proxy's own attributes."""
+"""Calls of a proxy: request objects, values, keywords; wrong arguments; the proxy's own attributes."""
 
 import inspect
 

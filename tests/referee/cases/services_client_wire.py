@@ -1,4 +1,4 @@
-"""What a proxy says on the wire, and what it makes of a server's answers: a server by hand."""
+"""A proxy on the wire, and its handling of a server's responses, with a scripted server."""
 
 import socket
 import struct
@@ -36,7 +36,7 @@ def receive(sock, count):
 
 
 def serve(answers):
-    """Accept a connection for each of ``answers``: (header, list of what to answer to each request)."""
+    """Accept a connection for each of ``answers``: (header, list of the responses to each request)."""
     for greeting, replies in answers:
         sock, _ = listening.accept()
         body = receive(sock, struct.unpack("<I", receive(sock, 4))[0])

@@ -1,4 +1,4 @@
-"""Calls at the same time: each connection has a separate thread; slow handlers do not hold up others."""
+"""Concurrent calls: each connection has a separate thread; slow handlers do not block others."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""Handlers that raise: what the client receives, what the server logs, what error_handler is given."""
+"""Handlers that raise: the client's error, the server's log, and error_handler's arguments."""
 
 import logging
 
@@ -10,7 +10,7 @@ rospy.init_node("case", argv=[])
 
 
 class Lines(logging.Handler):
-    """Shows log lines without the traceback, which each stack writes in its own way."""
+    """Prints log lines without the traceback, which each stack formats differently."""
 
     def emit(self, record):
         show("  log", record.levelname, record.getMessage().splitlines()[0])

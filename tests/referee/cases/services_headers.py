@@ -1,4 +1,4 @@
-"""Requests and responses that start with a header: who sets its seq and a frame_id of None."""
+"""Requests and responses that start with a header: which side sets its seq and a frame_id of None."""
 
 import rospy
 from geometry_msgs.msg import PoseStamped

@@ -1,4 +1,4 @@
-"""Servers that come, go and replace each other, and what proxies see of it."""
+"""Servers that start, stop and replace each other, and the effects on proxies."""
 
 import rosgraph
 import rospy
@@ -55,7 +55,7 @@ show("the first leaves")
 one.close()
 show(eventually(lambda: providers() == [["/two"]]))
 outcome("single", single)
-# Real rospy's persistent proxy ends here for good, with an AttributeError at each call; ours connects again.
+# Real rospy's persistent proxy then fails permanently, with an AttributeError at each call; minirospy's reconnects.
 persistent = rospy.ServiceProxy("/s", Trigger, persistent=True)
 outcome("another persistent", persistent)
 

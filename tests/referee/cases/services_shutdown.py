@@ -1,4 +1,4 @@
-"""Calls that a shutdown ends: of the client's node, of the server's node, of the service alone."""
+"""Calls that a shutdown ends: of the client's node, of the server's node, of the service only."""
 
 import rospy
 from referee import Other, show

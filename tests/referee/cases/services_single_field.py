@@ -1,4 +1,4 @@
-"""Responses of one field: what may stand for the field itself. And arrays and messages as fields."""
+"""Responses of one field: values that are accepted in place of the response. Also arrays and messages as fields."""
 
 import rospy
 from nav_msgs.msg import OccupancyGrid
@@ -12,7 +12,7 @@ rospy.init_node("case", argv=[])
 
 
 def offer(name, service_class, values):
-    """Serve each value in turn."""
+    """Offer a service for each value in turn."""
     current = []
     service = rospy.Service(name, service_class, lambda request: current[0])
     proxy = rospy.ServiceProxy(name, service_class)

@@ -1,4 +1,4 @@
-"""Waiting for a service: the exceptions, and how long it takes."""
+"""Waiting for a service: the exceptions, and the duration."""
 
 import logging
 import threading

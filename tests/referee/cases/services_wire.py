@@ -1,4 +1,4 @@
-"""What a service says on the wire: connection headers, probes, refusals, several calls on one connection."""
+"""A service on the wire: connection headers, probes, refusals, several calls on one connection."""
 
 import socket
 import struct
@@ -57,7 +57,7 @@ def connect(label, **fields):
     sock = socket.create_connection((address[0], int(address[1])), 5)
     sock.sendall(header(**fields))
     try:
-        # roscpp's fields next to rospy's do no harm.
+        # roscpp's fields in addition to rospy's are harmless.
         found = fields_of(sock)
         show(
             label,

@@ -1,4 +1,4 @@
-"""rospy.core and what of it is in rospy."""
+"""rospy.core, and its names in rospy."""
 
 import logging
 import os

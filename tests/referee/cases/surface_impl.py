@@ -1,4 +1,4 @@
-"""Names of rospy's inside that programs import or reach for, mostly since an editor has offered them."""
+"""rospy's internal names that programs import or use, mostly because an editor suggested them."""
 
 import logging
 import threading
@@ -52,18 +52,18 @@ show(
 service.shutdown()
 show(manager.get_service("/x"))
 
-# Whom a publisher has, by name.
+# The connections of a publisher, by name.
 publisher = rospy.Publisher("c", String, queue_size=1)
 subscriber = rospy.Subscriber("c", String)
 show(eventually(lambda: publisher.impl.has_connections() and subscriber.impl.has_connections()))
 show(publisher.impl.has_connection("/case"), publisher.impl.has_connection("/other"))
 show(subscriber.impl.has_connection("/case"), subscriber.impl.has_connection(rospy.get_node_uri()))
 
-# What get_param is given where it is to behave as without a default.
+# The value of get_param's default that means no default.
 for default in (_Unspecified, _unspecified):
     outcome("default", lambda default=default: rospy.get_param("/none", default) is default)
 
-# The handlers for loggers of the program's own.
+# Handlers for the program's own loggers.
 levels = rospy.impl.rosout._rospy_to_logging_levels
 show(levels, rospy.impl.rosout._logging_to_rospy_levels)
 heard = threading.Event()
@@ -105,7 +105,7 @@ show("mine" in caller.get_loggers("case"))
 outcome("loggers", lambda: caller.get_loggers("/nobody"))
 show(issubclass(ROSConsoleException, Exception))
 
-# Parameters that the node keeps, and what the master reports of them.
+# Parameters that the node caches, and the master's reports of them.
 kept = rospy.impl.paramserver.get_param_server_cache()
 show(kept is rospy.impl.paramserver.get_param_server_cache())
 try:
@@ -123,7 +123,7 @@ kept.update = lambda key, value: notified.append(value)
 master.setParam("/other", "/p", 6)
 show(eventually(lambda: 6 in notified))
 
-# A hook that is taken back.
+# A hook that is removed.
 rospy.on_shutdown(lambda: show("hook", rospy.core._in_shutdown, rospy.core._shutdown_flag))
 rospy.on_shutdown(lambda: show("never"))
 del rospy.core._client_shutdown_hooks[-1]

@@ -1,4 +1,4 @@
-"""rospy.get_master(): the Master API as it answers, and parameters like a dictionary."""
+"""rospy.get_master(): the Master API's answers, and parameters like a dictionary."""
 
 import os
 import xmlrpc.client

@@ -1,4 +1,4 @@
-"""rospy.msg: messages with their length in front."""
+"""rospy.msg: messages with a length prefix."""
 
 from io import BytesIO
 

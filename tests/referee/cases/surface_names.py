@@ -1,4 +1,4 @@
-"""rospy.names: the functions beside resolve_name."""
+"""rospy.names: the functions other than resolve_name."""
 
 import rospy
 import rospy.names as names

@@ -1,4 +1,4 @@
-"""Times made of the numbers that programs have: numpy's, fractions, texts."""
+"""Times made from various numbers: numpy's, fractions, strings."""
 
 import decimal
 import fractions

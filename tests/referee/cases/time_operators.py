@@ -1,4 +1,4 @@
-"""Time and Duration: arithmetic, comparison, what is refused."""
+"""Time and Duration: arithmetic, comparison, refused operands."""
 
 import operator
 

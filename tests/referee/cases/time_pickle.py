@@ -1,4 +1,4 @@
-"""Times and durations in pickles: other programs read them."""
+"""Times and durations in pickles, which other programs read."""
 
 import copy
 import pickle

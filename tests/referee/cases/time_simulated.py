@@ -31,7 +31,7 @@ def at(seconds):
 
 
 class Sleeper(threading.Thread):
-    """Sleeps in a thread; ``end()`` shows how that ended."""
+    """Sleeps in a thread; ``end()`` prints how the sleep ended."""
 
     def __init__(self, label, sleep):
         super().__init__(daemon=True)

@@ -1,4 +1,4 @@
-"""Time and Duration: making them, reading them."""
+"""Time and Duration: creation and conversion."""
 
 import copy
 import pickle

@@ -1,4 +1,4 @@
-"""rosnode, rostopic, rosservice as Python code calls them, beside a node of the same program."""
+"""rosnode, rostopic, rosservice called from Python code, with a node in the same program."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""AnyMsg and the type `*`: bytes in, bytes out; what a relay needs."""
+"""AnyMsg and the type `*`: bytes in, bytes out, as a relay needs."""
 
 import threading
 

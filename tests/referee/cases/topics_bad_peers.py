@@ -1,4 +1,4 @@
-"""Bad peers: after each of them the node serves a good one."""
+"""Bad peers: after each of them the node serves a well-behaved one."""
 
 import socket
 import struct
@@ -20,7 +20,7 @@ def field(text):
 
 
 def good():
-    """Return what a good subscriber receives."""
+    """Return the messages that a well-behaved subscriber receives."""
     with socket.create_connection((host, port), 10) as sock:
         body = b"".join(
             field(t) for t in (b"topic=/topic", b"md5sum=" + String._md5sum.encode(), b"callerid=/raw")

@@ -1,4 +1,4 @@
-"""Topics before init_node: what waits for it, what refuses."""
+"""Topics before init_node: calls that wait for it, and calls that fail."""
 
 import rospy
 from referee import eventually, outcome, show

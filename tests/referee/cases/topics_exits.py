@@ -1,4 +1,4 @@
-"""Callbacks that raise what is no Exception: the link goes on, and the messages after it are delivered."""
+"""Callbacks that raise a BaseException: the link stays open, and later messages are delivered."""
 
 import threading
 

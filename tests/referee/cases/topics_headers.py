@@ -1,4 +1,4 @@
-"""Connection headers: what a callback sees of the publisher's, what a peer is sent, what raw subscribers are answered."""
+"""Connection headers: the publisher's in a callback, the header sent to a peer, the responses to raw subscribers."""
 
 import os
 import socket
@@ -32,7 +32,7 @@ def receive(sock, count):
 
 
 def answer(sock):
-    """Return the fields of a header that comes."""
+    """Return the fields of a received header."""
     body = receive(sock, struct.unpack("<I", receive(sock, 4))[0])
     fields = {}
     while body:
@@ -43,7 +43,7 @@ def answer(sock):
     return fields
 
 
-# Of ours: as ROS 1 and no more.
+# For minirospy: use only ROS 1's transport.
 os.environ["MINIROSPY_TRANSPORT"] = "tcp"
 rospy.init_node("case", argv=[])
 got = []
@@ -103,7 +103,7 @@ for label, changes in {
         show(label, "ends with", type(error).__name__, error)
     sock.close()
 
-# What a Subscriber opens with: a server of ours in place of a publisher.
+# The header that a Subscriber sends first, received by a socket in place of a publisher.
 server = socket.create_server(("127.0.0.1", 0))
 slave = SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False, allow_none=True)
 asked = []

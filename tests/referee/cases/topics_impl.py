@@ -1,4 +1,4 @@
-"""What programs do with the `impl` of a Publisher and a Subscriber: rosbridge and Jupyter's widgets among them."""
+"""Programs' uses of the `impl` of a Publisher and a Subscriber, such as rosbridge's and Jupyter widgets'."""
 
 import logging
 import os
@@ -8,7 +8,7 @@ import rospy
 from referee import eventually, outcome, show
 from std_msgs.msg import Int32, String
 
-# Of ours: as ROS 1 and no more.
+# For minirospy: use only ROS 1's transport.
 os.environ["MINIROSPY_TRANSPORT"] = "tcp"
 rospy.init_node("case", argv=[], disable_rosout=True)
 got = []
@@ -19,7 +19,7 @@ def take(message, *args):
 
 
 def taken(*expected):
-    """Whether just these have come; forgets them."""
+    """Return whether exactly these messages have arrived; discard them."""
     came = eventually(lambda: len(got) >= len(expected)) and sorted(got, key=str) == list(expected)
     found, got[:] = list(got), []
     return came or found
@@ -53,7 +53,7 @@ class Listener(rospy.SubscribeListener):
 
 
 def show_heard():
-    """Return what the listener has received, in a separate thread."""
+    """Print the listener's messages, in a separate thread."""
     eventually(lambda: heard)
     show(*heard.pop())
 
@@ -71,7 +71,7 @@ publisher.impl.subscriber_listeners.remove(listener)
 subscriber.unregister()
 show(eventually(lambda: not publisher.impl.has_connections()))
 
-# A topic that latches no more, and does again.
+# A topic that stops latching, and starts again.
 publisher.impl.is_latch = False
 subscriber = rospy.Subscriber("c", Int32, take)
 show(eventually(lambda: publisher.impl.has_connection("/case")))
@@ -88,7 +88,7 @@ show(subscriber.impl.set_queue_size(1), subscriber.impl.set_buff_size(100))
 other = rospy.Publisher("d", Int32, queue_size=5)
 show(other.impl.is_latch, other.impl.enable_latch(), other.impl.is_latch)
 
-# What programs read of a connection.
+# The attributes of a connection that programs read.
 met = rospy.Publisher("/met", Int32, queue_size=1, latch=True)
 seen = []
 meeting = rospy.Subscriber("/met", Int32, seen.append)
@@ -103,7 +103,7 @@ for topic in (met, meeting):
     show(connection.type, connection.md5sum, connection.is_latched, connection.done, connection.stat_num_msg)
     show(sorted(connection.header) if connection.header else None)
 
-# Statistics, as getBusStats and getBusInfo have them. The socket of the subscriber's end may be unknown in the real one.
+# Statistics, as in getBusStats and getBusInfo. The real one may not know the socket of the subscriber's endpoint.
 counted = rospy.Publisher("/counted", String, queue_size=5)
 readers = rospy.Subscriber("/counted", String, seen.append)
 show(eventually(lambda: counted.impl.connections and readers.impl.connections))
@@ -127,7 +127,7 @@ for topic in (counted, readers):
     )
 
 
-# What the handles of a topic have set together, and how many there are.
+# Settings shared by a topic's handles, and the number of handles.
 def show_published(topic):
     show(topic.queue_size, topic.headers, topic.ref_count, topic.closed, topic.is_latch)
 
@@ -168,7 +168,7 @@ for handle in handles[::-1]:
     handle.unregister()
     show(shared.ref_count, shared.closed)
 
-# Names that the master refuses: a line is logged, and the program goes on.
+# Names that the master refuses: a line is logged, and the program continues.
 
 
 class Lines(logging.Handler):

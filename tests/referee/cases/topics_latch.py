@@ -1,4 +1,4 @@
-"""Latched topics: who comes late gets the last message; two Publishers of one topic."""
+"""Latched topics: a late subscriber receives the last message; two Publishers of one topic."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""SubscribeListener: which listeners are notified of subscribers that come and go, and what the two publish functions do."""
+"""SubscribeListener: which listeners are notified of subscribers that join and leave, and the two publish functions."""
 
 import threading
 
@@ -69,7 +69,7 @@ show("nobody", eventually(lambda: publisher.get_num_connections() == 0))
 
 
 class Whole(rospy.SubscribeListener):
-    """Uses the other function, and reports to nobody that peers go."""
+    """Uses the other function, and does not notify peers that leave."""
 
     def peer_subscribe(self, topic_name, topic_publish, peer_publish):
         topic_publish(String("welcome, all"))

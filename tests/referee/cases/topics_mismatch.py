@@ -1,4 +1,4 @@
-"""Types that do not fit: nothing is received, the node goes on, and a Subscriber that fits gets its messages."""
+"""Mismatched types: nothing is received, the node continues, and a matching Subscriber gets its messages."""
 
 import rospy
 from referee import Other, eventually, show

@@ -1,4 +1,4 @@
-"""Classes of a program's own that extend rospy's."""
+"""A program's own subclasses of rospy's classes."""
 
 import threading
 

@@ -1,4 +1,4 @@
-"""Publisher: its arguments and their faults, its attributes, publish() by every form, unregister."""
+"""Publisher: its arguments and their errors, its attributes, all forms of publish(), unregister."""
 
 import inspect
 import warnings
@@ -11,7 +11,7 @@ warnings.simplefilter("always")
 
 
 def warned(label, call):
-    """Show a call's outcome and the warnings that it gives."""
+    """Print a call's outcome and its warnings."""
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
         outcome(label, call)
@@ -20,7 +20,7 @@ def warned(label, call):
 
 
 def made(*args, **kwds):
-    """Return a Publisher, as what of it can be shown."""
+    """Return a Publisher's attributes that can be printed."""
     publisher = rospy.Publisher(*args, **kwds)
     shown = (publisher.name, publisher.resolved_name, publisher.type, publisher.md5sum, publisher.reg_type)
     publisher.unregister()

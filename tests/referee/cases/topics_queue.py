@@ -1,4 +1,4 @@
-"""Queues: what a slow callback gets with each queue_size, and that nothing is lost where nothing is limited."""
+"""Queues: the messages of a slow callback for each queue_size, and no loss without a limit."""
 
 import threading
 
@@ -8,7 +8,7 @@ from std_msgs.msg import Int32, String
 
 
 def slow(topic, count, **arguments):
-    """Publish while the first callback lasts, and show what comes after it."""
+    """Publish during the first callback, and print the messages after it."""
     publisher = rospy.Publisher(topic, Int32, queue_size=1000)
     got, begun, go_on, done = [], threading.Event(), threading.Event(), threading.Event()
 
@@ -48,7 +48,7 @@ for size in (None, 0, 1000):
         publisher.publish(str(number))
     show("publisher", size, eventually(lambda got=got: len(got) == 300), got == [str(n) for n in range(300)])
 
-# A publisher in many threads: each thread's messages in its order.
+# A publisher in many threads: each thread's messages stay in order.
 publisher = rospy.Publisher("/threads", Int32, queue_size=5000)
 got = []
 rospy.Subscriber("/threads", Int32, lambda message: got.append(message.data))

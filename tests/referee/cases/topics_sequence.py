@@ -1,4 +1,4 @@
-"""Messages with a header: who numbers them, and what is left as the program set it."""
+"""Messages with a header: which are numbered, and which values of the program stay."""
 
 import threading
 
@@ -19,7 +19,7 @@ def take(message):
         arrived.notify_all()
 
 
-# Nobody is there: it is not counted.
+# Without a subscriber it is not counted.
 publisher.publish(PointStamped())
 rospy.Subscriber("/stamped", PointStamped, take)
 show(eventually(lambda: publisher.get_num_connections() == 1))

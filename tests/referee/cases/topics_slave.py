@@ -1,4 +1,4 @@
-"""The Slave API of a node with topics: what it reports of its connections to tools, and what bad calls are answered."""
+"""The Slave API of a node with topics: its reports on connections to tools, and its answers to bad calls."""
 
 import os
 import re
@@ -8,7 +8,7 @@ import rospy
 from referee import eventually, outcome, show
 from std_msgs.msg import String
 
-# Of ours: as ROS 1 and no more.
+# For minirospy: use only ROS 1's transport.
 os.environ["MINIROSPY_TRANSPORT"] = "tcp"
 rospy.init_node("case", argv=[])
 node = xmlrpc.client.ServerProxy(rospy.get_node_uri())
@@ -22,7 +22,7 @@ code, text, rows = node.getBusInfo("/me")
 show("getBusInfo", code, text)
 for row in sorted(rows, key=lambda row: row[2]):
     if row[4] == "/topic":
-        # The subscriber's end may not know its socket any more: a race of the real one.
+        # The subscriber's endpoint may not know its socket any more: a race in real rospy.
         what = re.sub(r"\d+|None", "<number>", row[6].split(" to [")[0]) if len(row) > 6 else None
         show("row", row[1:6], what, type(row[0]).__name__, len(row))
 code, text, (publications, subscriptions, services) = node.getBusStats("/me")
@@ -64,7 +64,7 @@ for protocols in PROTOCOLS:
     outcome(f"requestTopic, {protocols!r}", lambda: node.requestTopic("/me", "/topic", protocols)[:2])
 outcome("requestTopic of another topic", lambda: node.requestTopic("/me", "/nobody", [3]))
 
-# Names that no topic has, and calls that there are not.
+# Names of topics that do not exist, and methods that do not exist.
 for name in ("/", "a b", "http://x", "~x", "~", "a//b/"):
     outcome(f"requestTopic {name!r}", lambda: node.requestTopic("/me", name, [["TCPROS"]]))
     outcome(f"publisherUpdate {name!r}", lambda: node.publisherUpdate("/me", name, []))

@@ -20,7 +20,7 @@ rate = rospy.Rate(50)
 
 
 def found_in(report):
-    """Whether the window, the messages in it, and the times between them are as they are to be."""
+    """Return whether the window, its messages, and the times between them are as expected."""
     seconds = (report.window_stop - report.window_start).to_sec()
     return (
         1.9 < seconds < 2.3,
@@ -32,7 +32,7 @@ def found_in(report):
 
 
 def whole():
-    """Return the first report of each topic about a whole window, in which the machine did not stand still."""
+    """Return the first report of each topic about a complete window, in which the machine did not stall."""
     return {report.topic: report for report in reversed(reports) if all(found_in(report))}
 
 

@@ -1,4 +1,4 @@
-"""Subscriber: its arguments and faults, callbacks and what they get, several of a topic, unregister, subscribe again."""
+"""Subscriber: arguments and errors, callbacks and their arguments, several on a topic, unregister, subscribe again."""
 
 import logging
 import threading
@@ -9,7 +9,7 @@ from std_msgs.msg import Bool, ColorRGBA, Int32
 
 
 class Lines(logging.Handler):
-    """Shows a log line's level and its first line."""
+    """Prints a log line's level and its first line."""
 
     def emit(self, record):
         lines = record.getMessage().splitlines()
@@ -56,7 +56,7 @@ args = rospy.Subscriber("/chatter", Int32, lambda message, extra: note("args", m
 none = rospy.Subscriber("/chatter", Int32)
 false = rospy.Subscriber("/chatter", Int32, lambda *values: note("false", len(values)), callback_args=0)
 show(none.callback, plain.callback_args, args.callback_args, plain.impl is args.impl, plain.name, plain.type)
-# Each end sees the connection by itself.
+# Each endpoint reports the connection by itself.
 show(
     "connected",
     eventually(lambda: publisher.get_num_connections() == 1 == plain.get_num_connections()),

@@ -8,7 +8,7 @@ from std_msgs.msg import Bool, String
 
 
 def published(*namespace):
-    """Return what is published, but for what depends on whether a rosout node runs."""
+    """Return the published topics, except for those that depend on whether a rosout node runs."""
     return sorted(pair for pair in rospy.get_published_topics(*namespace) if pair[0] != "/rosout_agg")
 
 

@@ -59,7 +59,7 @@ print(client.get_result().result)
 """)
         assert said == "4\n5\n5\n"
 
-    def test_a_done_callback_that_raises_holds_nobody_up(self) -> None:
+    def test_done_callback_that_raises_does_not_block(self) -> None:
         said = run("""
 import logging
 class Reported(logging.Handler):
@@ -221,7 +221,7 @@ print(client.wait_for_server(second), client.send_goal_and_wait(TestGoal(4), sec
 """)
         assert said.splitlines()[1:] == ["True 3", "True 3"]
 
-    def test_a_server_that_nobody_spins_lives_on_until_ctrl_c(self) -> None:
+    def test_server_without_spin_runs_until_ctrl_c(self) -> None:
         import os
         import signal
 

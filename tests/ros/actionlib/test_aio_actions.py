@@ -234,7 +234,7 @@ def test_a_server_whose_accepts_raises_goes_on(caplog: pytest.LogCaptureFixture)
     assert caplog.text.count("Exception in your accepts callback") == 1
 
 
-def test_a_cancel_where_somebody_only_looks_on() -> None:
+def test_cancel_with_an_observer() -> None:
     async def main() -> None:
         async with (
             Node("onlooker", rosout=False) as one,

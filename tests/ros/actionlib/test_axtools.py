@@ -193,7 +193,7 @@ def test_form_prompts_for_each_field_until_the_answer_fits() -> None:
     assert (message.header.stamp.secs, message.header.frame_id, message.pose.position.x) == (3, "yes", 1.5)
 
 
-def test_progress_where_both_are_one_number() -> None:
+def test_progress_with_equal_numbers() -> None:
     from actionlib.msg import TestFeedback, TestGoal
     from std_msgs.msg import String
 

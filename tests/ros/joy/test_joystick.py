@@ -70,7 +70,7 @@ def test_axes_wait_for_each_other_and_buttons_do_not() -> None:
     assert joystick.deadline is None
 
 
-def test_state_is_repeated_where_nothing_happens() -> None:
+def test_state_is_repeated_while_idle() -> None:
     joystick = Joystick(JoystickOptions(autorepeat_rate=10), 0.0)
     # A second for the first events, then the rate's period.
     assert joystick.deadline == pytest.approx(1.1)

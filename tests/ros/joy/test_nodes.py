@@ -176,7 +176,7 @@ def test_missing_device_is_one_line_and_waited_for(start: Start, tmp_path: Path)
     assert process.returncode == 0
 
 
-def test_programs_publish_what_the_real_ones_publish(master: str) -> None:
+def test_programs_publish_the_same_as_real_ones(master: str) -> None:
     programs = [
         Packages().find_executable(*words)[-1]
         for words in (("joy", "joy_node"), ("teleop_twist_joy", "teleop_node"))

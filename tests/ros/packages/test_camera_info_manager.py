@@ -154,7 +154,7 @@ def test_fisheye_calibration_is_refused_as_ini(tmp_path: Path, caplog: pytest.Lo
     assert "plumb_bob" in caplog.text
 
 
-def test_driver_saves_what_its_service_gets(master: str, tmp_path: Path) -> None:
+def test_driver_saves_calibration_of_its_service(master: str, tmp_path: Path) -> None:
     url = (
         (tmp_path / "new" / "${NAME}.yaml")
         .as_uri()

@@ -27,7 +27,7 @@ class Log:
     error = warn
 
 
-def test_programs_publish_what_the_real_ones_publish(master: str) -> None:
+def test_programs_publish_the_same_as_real_ones(master: str) -> None:
     done = subprocess.run(
         [sys.executable, str(HERE / "drive.py"), str(PROGRAMS), sys.executable],
         capture_output=True,

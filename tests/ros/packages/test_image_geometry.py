@@ -61,7 +61,7 @@ def test_weights_of_all_parts_of_a_pixel_add_up_to_one() -> None:
     assert (rectification._fixed_weights().sum(axis=(2, 3)) == 1 << 15).all()
 
 
-def test_opencv_is_used_where_it_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_opencv_is_used_if_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     class Cv2:
         INTER_CUBIC = 2
 
@@ -119,7 +119,7 @@ def test_wrong_number_of_coefficients_is_named() -> None:
         lambda: StereoCameraModel().projectPixelTo3d((1, 2), 3.0),
     ],
 )
-def test_empty_model_says_what_to_call(call: object) -> None:
+def test_empty_model_error_names_the_missing_call(call: object) -> None:
     with pytest.raises(TypeError, match=r"the camera model is empty: call fromCameraInfo\(\) first"):
         call()  # type: ignore[operator]
 

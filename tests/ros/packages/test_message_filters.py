@@ -46,7 +46,7 @@ def found_by_loops(queues: list[list[int]], stamp: int, slop: int, index: int | 
 
 
 @given(st.lists(STAMPS, min_size=1, max_size=5), st.integers(0, 40), st.integers(0, 15), st.data())
-def test_the_search_finds_what_the_loops_find(
+def test_search_finds_the_same_as_loops(
     queues: list[list[int]], stamp: int, slop: int, data: st.DataObject
 ) -> None:
     index = data.draw(st.sampled_from([None, *range(len(queues))]))

@@ -132,7 +132,7 @@ def test_cloud_of_an_array_is_that_of_its_rows(dtype: type[np.floating]) -> None
     assert cloud == point_cloud2.create_cloud(Header(), fields, points.tolist())
 
 
-def test_array_with_what_does_not_fit_is_refused_as_rows_are() -> None:
+def test_array_with_invalid_elements_is_refused_as_rows_are() -> None:
     with pytest.raises(OverflowError, match="too large"):
         point_cloud2.create_cloud_xyz32(Header(), np.array([[1, 2, 1e300]]))
     with pytest.raises(struct.error, match="expected 3 items"):

@@ -51,11 +51,11 @@ def run_program(name: str) -> None:
     assert done.returncode == 0
 
 
-def test_containers_do_what_the_real_ones_do() -> None:
+def test_containers_behave_as_real_ones() -> None:
     run_program("containers")
 
 
-def test_states_of_smach_ros_do_what_the_real_ones_do(master: str) -> None:
+def test_states_of_smach_ros_behave_as_real_ones(master: str) -> None:
     run_program("ros_states")
 
 

@@ -34,14 +34,14 @@ def mimic(name: str, of: str) -> str:
     return joint(name, f"<mimic joint='{of}'/>")
 
 
-def test_zero_is_in_the_middle_where_it_is_out_of_the_limits() -> None:
+def test_zero_moves_to_the_middle_if_out_of_limits() -> None:
     values = joints_of().values()
     assert values.name == ["shoulder", "elbow", "left", "right"]
     assert values.position == pytest.approx([0, 0, 0.03, 0.16])
     assert (values.velocity, values.effort) == ([], [])
 
 
-def test_parameters_say_what_is_published() -> None:
+def test_parameters_select_the_published_messages() -> None:
     values = joints_of(
         zero={"elbow": 1.0}.get,
         use_mimic_tags=False,
@@ -93,7 +93,7 @@ def test_joint_without_limits_is_warned_of_and_published_as_zero() -> None:
     assert joints.free["b"].upper == math.pi
 
 
-def test_other_nodes_set_what_they_publish() -> None:
+def test_messages_of_other_nodes_set_joint_values() -> None:
     joints = joints_of()
     joints.update(["elbow", "unknown", "shoulder"], [1.5, 2.0], [], [0.1, 0.2, 0.3])
     values = joints.values()

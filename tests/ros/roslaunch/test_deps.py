@@ -58,7 +58,7 @@ def test_what_is_no_launch_file(files: Path, capsys: pytest.CaptureFixture[str])
     assert "cannot locate /no/such.launch" in capsys.readouterr().err
 
 
-def test_where_the_log_files_are(master: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_location_of_log_files(master: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     proxy = MasterProxy(master, "/t")
     proxy.set_param("/run_id", "a-run")
     proxy.close()

@@ -55,7 +55,7 @@ def test_the_guardian_ends_nodes_before_their_master() -> None:
 @pytest.mark.parametrize(
     ("is_guarded", "own_master", "starts"), [(True, True, 0), (True, False, 1), (False, True, 1)]
 )
-def test_a_guardian_is_started_where_something_is_left_to_do(
+def test_guardian_is_started_if_cleanup_is_needed(
     is_guarded: bool, own_master: bool, starts: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """If the system stops the processes, the guardian still unregisters nodes at a master that keeps running."""

@@ -70,7 +70,7 @@ def test_run_id_that_leads_elsewhere_is_replaced(
     proxy.close()
 
 
-def test_where_a_node_prints_and_runs(start: Start, master: str, package: Path) -> None:
+def test_output_and_working_directory_of_a_node(start: Start, master: str, package: Path) -> None:
     home, run_id = Path(os.environ["ROS_HOME"]), MasterProxy(master, "/t")
     launch = start(
         '<env name="E" value="1 2"/><node pkg="pkg" type="stop.py" name="a" args="0" cwd="node"/>'

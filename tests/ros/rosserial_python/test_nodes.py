@@ -40,7 +40,7 @@ def say(text: str) -> bytes:
 
 
 @UNIX
-def test_device_and_node_see_what_they_see_with_the_real_program(master: str) -> None:
+def test_device_and_node_see_the_same_as_with_the_real_program(master: str) -> None:
     program = Packages().find_executable("rosserial_python", "serial_node.py")
     done = subprocess.run(
         [sys.executable, str(HERE / "drive.py"), *program],

@@ -134,7 +134,7 @@ class TestBuffer:
 
         run(main)
 
-    def test_time_that_jumps_back_forgets_what_moves(self, caplog: pytest.LogCaptureFixture) -> None:
+    def test_time_that_jumps_back_clears_moving_frames(self, caplog: pytest.LogCaptureFixture) -> None:
         async def main(node: Node, buffer: Buffer) -> None:
             times = [Time(10)]
             node.now = lambda: times[-1]  # type: ignore[method-assign]

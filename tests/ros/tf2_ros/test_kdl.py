@@ -123,7 +123,7 @@ def test_clouds_of_several_rows_keep_their_other_fields(order: str) -> None:
     assert points["c"].tolist() == [7] * 6
 
 
-def test_what_is_between_the_fields_of_a_cloud_becomes_zeros() -> None:
+def test_padding_between_fields_of_a_cloud_becomes_zeros() -> None:
     fields = [PointField(name, 4 * n, PointField.FLOAT32, 1) for n, name in enumerate("xyz")]
     fields += [PointField("i", 16, PointField.UINT16, 1), PointField("none", 18, PointField.UINT8, 0)]
     source = PointCloud2(height=1, width=1, fields=fields, point_step=24, row_step=24, is_dense=True)

@@ -42,7 +42,7 @@ def run(code: str, *, init: str = INIT) -> str:
 
 @pytest.mark.usefixtures("master")
 class TestListener:
-    def test_what_is_broadcast_is_found(self) -> None:
+    def test_broadcast_transforms_are_found(self) -> None:
         said = run("""
 static = tf2_ros.StaticTransformBroadcaster()
 static.sendTransform(stamped("map", "odom", 0, 1.0))

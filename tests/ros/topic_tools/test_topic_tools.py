@@ -18,7 +18,7 @@ HERE = Path(__file__).parent
 PROGRAMS = HERE.parents[2] / "msgs" / "topic_tools" / "scripts"
 
 
-def test_programs_pass_on_what_the_real_ones_pass_on(master: str) -> None:
+def test_programs_forward_the_same_as_real_ones(master: str) -> None:
     done = subprocess.run(
         [sys.executable, str(HERE / "drive.py"), str(PROGRAMS), sys.executable],
         capture_output=True,

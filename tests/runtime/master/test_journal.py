@@ -187,7 +187,7 @@ def test_rewrite_that_fails_leaves_the_old_file_alone(
     wait_until(lambda: open_files() <= before_failing)
 
 
-def test_rewrite_writes_all_where_the_system_takes_it_in_parts(
+def test_rewrite_is_complete_after_partial_writes(
     journal: Journal, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     real = os.write
@@ -269,7 +269,7 @@ def stepping(path: Path, state: list[list[Any]], clock: Clock, steps: list[Steps
         each.close()
 
 
-def test_rewrite_in_steps_keeps_what_is_appended_meanwhile(
+def test_rewrite_in_steps_keeps_records_appended_meanwhile(
     stepping: Journal, path: Path, state: list[list[Any]], steps: list[Steps[None]]
 ) -> None:
     state += [["set", f"/{number}", number] for number in range(500)]
@@ -705,7 +705,7 @@ def test_read_returns_the_changes_the_age_and_the_boot(
     assert left.age == 0.0
 
 
-def test_read_keeps_a_copy_of_what_is_damaged(journal: Journal, path: Path, disk: Disk) -> None:
+def test_read_keeps_a_copy_of_a_damaged_file(journal: Journal, path: Path, disk: Disk) -> None:
     journal.start()
     damaged = path.read_bytes() + b"torn"
     path.write_bytes(damaged)
@@ -722,7 +722,7 @@ def test_read_keeps_a_copy_of_what_is_damaged(journal: Journal, path: Path, disk
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="makes a link")
-def test_read_sets_aside_what_it_cannot_read(journal: Journal, path: Path, disk: Disk) -> None:
+def test_read_sets_unreadable_files_aside(journal: Journal, path: Path, disk: Disk) -> None:
     path.parent.mkdir(parents=True)
     path.symlink_to("elsewhere")
     disk.fail()

@@ -99,7 +99,7 @@ def test_close_unregisters_all_names_in_one_call() -> None:
     run(scene)
 
 
-def test_close_makes_single_calls_where_the_master_lacks_multicall() -> None:
+def test_close_makes_single_calls_without_multicall() -> None:
     async def scene() -> None:
         async with FakeMaster(multicall=False) as master:
             node = await publishing_node(master.uri)

@@ -425,7 +425,7 @@ def test_a_publisher_with_an_invalid_address_is_reported(caplog: pytest.LogCaptu
 
 
 @pytest.mark.parametrize("latch", [False, True])
-def test_who_has_the_header_misses_nothing_that_is_published_from_then_on(*, latch: bool) -> None:
+def test_subscriber_receives_all_messages_after_its_header(*, latch: bool) -> None:
     rounds = 200
 
     def subscribe_and_publish(publication: Publication, port: int) -> None:
@@ -527,7 +527,7 @@ def test_publisher_list_of_an_earlier_subscription_is_queried_again() -> None:
     run(scene)
 
 
-def test_who_is_named_again_while_it_is_being_connected_is_connected_once(
+def test_publisher_listed_again_while_connecting_is_connected_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async def scene() -> None:

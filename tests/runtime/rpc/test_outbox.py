@@ -30,7 +30,7 @@ def read(peer: socket.socket) -> bytes:
     return data
 
 
-def test_what_the_socket_takes_does_not_wait(pair: tuple[socket.socket, socket.socket]) -> None:
+def test_data_accepted_by_the_socket_does_not_wait(pair: tuple[socket.socket, socket.socket]) -> None:
     out = Outbox(pair[0])
     assert out.write([b"one"]) == 0
     assert not out

@@ -329,7 +329,7 @@ def test_connections_are_accepted_for_some_milliseconds_at_a_time(monkeypatch: p
     assert accepted == 15
 
 
-def test_connections_that_may_take_each_others_places_are_read_from_first(
+def test_connections_that_may_displace_each_other_are_read_first(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = 0.0

@@ -180,7 +180,7 @@ def test_newest(pair: tuple[socket.socket, socket.socket], newest: int, expected
 @pytest.mark.parametrize(
     ("seconds", "is_alone", "looks"), [(60.0, True, 2), (60.0, False, 0), (0.0, True, 0)]
 )
-def test_a_reader_stays_awake_where_messages_come_quickly(
+def test_reader_busy_polls_while_messages_arrive_quickly(
     monkeypatch: pytest.MonkeyPatch, seconds: float, is_alone: bool, looks: int
 ) -> None:
     """``seconds``: the longest wait that counts as short. The reader never busy-polls for the first message.
@@ -351,7 +351,7 @@ def test_pieces_that_are_no_bytes(count: int) -> None:
     assert Pieces([b"", array, b"end"]).frame() is not None
 
 
-def test_what_may_still_change_is_copied() -> None:
+def test_mutable_values_are_copied() -> None:
     array = bytearray(2 * CHUNK)
     frame = Pieces([struct.pack("<I", 2 * CHUNK), array]).frame()
     array[0] = 1

@@ -125,7 +125,7 @@ def test_both_sides_have_to_want_it(
     run(scene)
 
 
-def test_who_cannot_reach_the_socket_takes_tcp(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tcp_is_used_if_the_socket_is_unreachable(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a sandbox that isolates processes."""
 
     def refuse(name: str) -> Any:

@@ -323,7 +323,7 @@ def starting(monkeypatch: pytest.MonkeyPatch) -> Gate:
     return gate
 
 
-def test_recording_is_kept_where_its_page_closes_while_it_starts(
+def test_recording_is_kept_if_its_page_closes_during_its_start(
     serve: Callable[..., Served],
     client: Callable[..., Client],
     folder: Path,
@@ -395,7 +395,7 @@ def test_size_of_a_recording_that_ends_as_it_is_looked_at_is_its_last_one(tmp_pa
     assert (state.size, state.is_ended, state.error) == (5, True, "")
 
 
-def test_bag_is_closed_where_its_page_closes_while_it_opens(
+def test_bag_is_closed_if_its_page_closes_during_opening(
     serve: Callable[..., Served],
     client: Callable[..., Client],
     folder: Path,
@@ -455,7 +455,7 @@ def test_read_only_client_neither_records_nor_opens(
         assert "read-only" in json_error(page)
 
 
-def test_who_has_no_token_neither_records_nor_opens(client: Callable[..., Client], folder: Path) -> None:
+def test_client_without_token_cannot_record_or_open(client: Callable[..., Client], folder: Path) -> None:
     make_bag(folder / "a.bag", 1)
     page = client(token="")
     assert page.next("writes") is False

@@ -70,7 +70,7 @@ def test_another_board_is_named_in_the_address(serve: Callable[..., Served]) -> 
         assert state(socket, lambda each: True)["name"] == name
 
 
-def test_board_is_started_only_by_who_has_the_token(serve: Callable[..., Served]) -> None:
+def test_board_is_started_only_with_the_token(serve: Callable[..., Served]) -> None:
     with opened(serve(), "?board=nobodys") as socket:
         assert (
             "only a client that has the token may start boards"
@@ -97,7 +97,7 @@ def test_board_is_started_only_by_who_has_the_token(serve: Callable[..., Served]
         '{"person": [' + "[" * 900,
     ],
 )
-def test_what_is_not_an_operation_is_refused_with_one_line(serve: Callable[..., Served], text: str) -> None:
+def test_invalid_operation_is_refused_with_one_line(serve: Callable[..., Served], text: str) -> None:
     with opened(serve()) as socket:
         socket.send(text)
         assert "not an operation on the board" in state(socket, lambda each: "error" in each)["error"]

@@ -157,7 +157,7 @@ def move(client: RawClient, until: Callable[..., Any]) -> None:
     until(moves)
 
 
-def test_what_is_held_is_published_and_zero_when_it_is_let_go(robot: Any) -> None:
+def test_held_control_publishes_velocity_and_release_publishes_zero(robot: Any) -> None:
     served, until = robot
     with opened(served) as client:
         assert json.loads(client.recv(timeout=60)) == {"writes": True}
@@ -319,7 +319,7 @@ def test_joystick_is_published_and_at_rest_when_it_is_left(serve: Callable[..., 
         assert (list(rest.axes), list(rest.buttons)) == ([0, 0], [0, 0, 0])
 
 
-def test_what_may_not_be_driven_is_named(serve: Callable[..., Served]) -> None:
+def test_forbidden_topics_are_named(serve: Callable[..., Served]) -> None:
     access = Access(read_token="read-token-00", write_token="write-token-0", requires_token=True)
     served = serve(access=access, filters=Filters(publishable=NameFilter(allow=("/cmd_*",))))
     node = served.node("talker")
@@ -345,7 +345,7 @@ def test_what_may_not_be_driven_is_named(serve: Callable[..., Served]) -> None:
         assert "binary" in json.loads(client.recv(timeout=60))["error"]
 
 
-def test_all_topics_are_stopped_where_one_cannot_be() -> None:
+def test_all_topics_are_stopped_if_one_fails() -> None:
     closed: list[str] = []
 
     class Driven:

@@ -105,7 +105,7 @@ def test_joints_are_those_of_the_description(
     assert "bolt" not in rows
 
 
-def test_description_is_read_beside_the_loop(
+def test_description_is_read_outside_the_loop(
     serve: Callable[..., Served], client: Callable[..., Client], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     threads = []
@@ -147,7 +147,7 @@ def test_description_that_is_read_slowly_is_sent_complete(
     assert page.next("joints")["robot"] == "crane"
 
 
-def test_positions_are_published_only_where_wanted(
+def test_positions_are_published_only_on_request(
     serve: Callable[..., Served], client: Callable[..., Client]
 ) -> None:
     served = serve()
@@ -260,7 +260,7 @@ def test_description_that_comes_later_or_is_broken_is_followed(
         {},
     ],
 )
-def test_what_is_not_an_operation_is_refused_with_one_line(
+def test_invalid_operation_is_refused_with_one_line(
     serve: Callable[..., Served], client: Callable[..., Client], fields: dict[str, object]
 ) -> None:
     served = serve()

@@ -215,7 +215,7 @@ def test_read_only_client_starts_nothing(serve: Callable[..., Served], client: C
             assert "read-only" in page.error()
 
 
-def test_who_has_no_token_starts_nothing(client: Callable[..., Client]) -> None:
+def test_client_without_token_cannot_start_launches(client: Callable[..., Client]) -> None:
     page = client(token="")
     assert page.next(lambda found: "writes" in found)["writes"] is False
     page.send("start", **FILE, args={"needed": "yes"})
@@ -256,7 +256,7 @@ def test_launches_that_have_ended_are_limited() -> None:
     assert asyncio.run(work()) == [3, *range(10, 30)]
 
 
-def test_restart_is_completed_where_its_page_closes(
+def test_restart_is_completed_if_its_page_closes(
     client: Callable[..., Client], serve: Callable[..., Served]
 ) -> None:
     served = serve()

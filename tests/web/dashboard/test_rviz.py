@@ -243,7 +243,7 @@ def test_file_that_two_pages_save_at_the_same_time_is_whole(tmp_path: Path) -> N
     assert parse_rviz(file.read_text(encoding="utf-8")) in configs
 
 
-def test_saving_is_completed_where_the_dashboard_closes(tmp_path: Path) -> None:
+def test_saving_is_completed_if_the_dashboard_closes(tmp_path: Path) -> None:
     file = tmp_path / "my.rviz"
     client = cast("WebClient", SimpleNamespace(send_text=lambda _: None, holds=lambda _: None, is_owner=True))
 
@@ -333,7 +333,7 @@ def test_values_are_written_as_another_reader_reads_them() -> None:
 @pytest.mark.parametrize(
     "operation", [1, {}, {"remove": 1}, {"parse": 1}, {"save": "x", "read": 1}, None, []]
 )
-def test_what_is_not_an_operation_is_refused(
+def test_invalid_operation_is_refused(
     opened: Callable[..., Callable[[object], Any]], operation: object
 ) -> None:
     assert opened(None)(operation)["error"].startswith("not an operation on .rviz files")

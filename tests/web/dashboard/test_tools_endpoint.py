@@ -92,7 +92,7 @@ def test_values_of_a_file_are_read(serve: Callable[..., Served]) -> None:
         '{"id": Infinity, "do": "yaml"}',
     ],
 )
-def test_what_is_not_a_request_is_refused(serve: Callable[..., Served], text: str) -> None:
+def test_invalid_request_is_refused(serve: Callable[..., Served], text: str) -> None:
     with Tools(serve()) as tools:
         tools.socket.send(text)
         assert tools.receive()["error"].startswith("not an operation on the graph")
@@ -113,7 +113,7 @@ def node_in(found: dict[str, Any], name: str) -> dict[str, Any]:
     return next((each for each in found.get("nodes", ()) if each["name"] == name), {})
 
 
-def test_nodes_are_reported_until_nobody_watches(
+def test_nodes_are_reported_while_watched(
     serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # On a busy machine an answer may arrive late.
@@ -157,7 +157,7 @@ def test_node_is_pinged_and_killed(serve: Callable[..., Served]) -> None:
     assert stopped.wait(60)
 
 
-def test_parameter_is_set_to_what_rosparam_reads_of_its_text(serve: Callable[..., Served]) -> None:
+def test_parameter_is_parsed_as_by_rosparam(serve: Callable[..., Served]) -> None:
     served = serve()
     node = served.node("robot")
     cases: dict[str, tuple[str, object]] = {
@@ -278,7 +278,7 @@ def test_survey_that_fails_is_reported_and_repeated(
         report(tools, lambda each: "nodes" in each)
 
 
-def test_surveys_do_not_pile_up_where_watching_is_switched_on_and_off(
+def test_surveys_do_not_pile_up_if_watching_is_toggled(
     serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     running, most = [0], [0]
