@@ -204,7 +204,7 @@ def _flood(port: int, request: bytes, count: int, end: float) -> None:
 
 async def serve() -> None:
     """Role: run the dashboard with rosbridge; print its ports and its node's URI, and run until stdin is closed."""
-    from minirospy.runtime.master.heap import return_large_blocks
+    from minirospy.base.heap import return_large_blocks
 
     from minirospy import Node
     from minirospy.web.access import Access
