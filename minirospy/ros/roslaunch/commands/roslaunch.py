@@ -34,7 +34,7 @@ If <filename> is a single dash ('-'), launch XML is read from standard input."""
 
 
 class LaunchOptions(NamedTuple):
-    """The command line of roslaunch."""
+    """The command-line options of roslaunch."""
 
     what: list[str]
     args: dict[str, str]
@@ -297,7 +297,7 @@ def _seconds(text: str) -> float:
 
 
 def _warn_of_unknown(args: Iterable[str], spec: LaunchSpec) -> None:
-    """Warn of arguments that no file declares: real roslaunch ignores them, but most are typing errors."""
+    """Warn about arguments that no file declares: real roslaunch ignores them, but most are typing errors."""
     for name in args:
         if name not in spec.args:
             warn(_unknown(name, spec))
@@ -323,7 +323,7 @@ def _print_args(args: list[ArgDoc]) -> None:
 
 
 def _check(sources: list[LaunchSource], packages: Packages) -> int:
-    """Print every error and warning of the files, sorted by line."""
+    """Print all errors and warnings about the files, sorted by line."""
     from minirospy.ros.roslaunch.launcher.check import find_problems, problem_line
 
     spec, problems = find_problems(sources, packages)

@@ -16,7 +16,10 @@ __all__ = ["describe_args", "resolved_arg_docs"]
 
 
 def describe_args(file: str) -> list[ArgDoc]:
-    """Return the arguments that a file declares, without loading the files that it includes. Raise LaunchError."""
+    """Return the arguments that a file declares, without loading the files that it includes.
+
+    Raise LaunchError if the file cannot be read or parsed.
+    """
     root = parse_document(read_launch_file(file), file)
     return [
         ArgDoc(attributes["name"], attributes.get("default"), attributes.get("doc"))
@@ -28,8 +31,8 @@ def describe_args(file: str) -> list[ArgDoc]:
 def resolved_arg_docs(file: str, args: Mapping[str, str], packages: Packages) -> list[ArgDoc]:
     """Return describe_args() with the defaults resolved for ``args``.
 
-    Declarations that an ``if`` or ``unless`` excludes are left out.
-    A default that cannot be resolved is returned as written. Raise LaunchError.
+    Declarations that an ``if`` or ``unless`` excludes are left out. A default that cannot be resolved is returned as written.
+    Raise LaunchError if the file cannot be read or parsed.
     """
     substitution = Substitution(packages, os.environ, file, dict(args))
     found: dict[str, ArgDoc] = {}

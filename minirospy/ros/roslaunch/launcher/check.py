@@ -14,7 +14,7 @@ __all__ = ["faults_of", "find_problems", "problem_line"]
 
 
 def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[LaunchSpec, Problems]:
-    """Return the spec of the files, and all problems: errors in the files, missing programs, undeclared machines."""
+    """Return the files' spec, and all problems: errors in the files, missing programs, undeclared machines."""
     problems: Problems = []
     spec = load_sources(sources, packages, problems=problems)
     for node in spec.runnables():
@@ -27,9 +27,9 @@ def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[
 
 
 def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False) -> Problems:
-    """Return the errors of a launch file.
+    """Return a launch file's errors.
 
-    With ``ignore_unset_args``, return none if an arg has no value, because other errors may be its consequences.
+    With ``ignore_unset_args``, return none if an arg has no value, because the missing value may cause the other errors.
     """
     _, problems = find_problems([LaunchSource(file, None, {})], packages)
     is_unset = any(problem.text.startswith("requires the '") for problem in problems)

@@ -30,7 +30,7 @@ def run_child(
 ) -> int:
     """Run as the child ``name`` of the roslaunch at the URI ``parent``; return the exit status.
 
-    The parent or a signal stops it. Raise MinirospyError if the parent does not answer.
+    Run until the parent or a signal stops it. Raise MinirospyError if the parent does not respond.
     """
 
     def listener(level: int, text: str) -> None:
@@ -75,7 +75,7 @@ class _Child(Launcher):
         }
 
     def look_after_parent(self, done: threading.Event) -> None:
-        """Poll the parent; stop the run if it no longer answers."""
+        """Poll the parent; stop the run if the parent no longer responds."""
         missed = 0
         while not done.wait(_HEARTBEAT_SECONDS):
             try:

@@ -18,7 +18,7 @@ __all__ = ["node_command", "node_environment", "node_folder", "node_program", "s
 def node_program(node: NodeSpec, packages: Packages) -> list[str]:
     """Return the command that runs a node's program, without the node's arguments; the program's path is last.
 
-    Raise MinirospyError.
+    Raise MinirospyError if the package or the program is not found, or if the program is not executable.
     """
     try:
         return packages.find_executable(node.package, node.type)
@@ -27,7 +27,10 @@ def node_program(node: NodeSpec, packages: Packages) -> list[str]:
 
 
 def node_command(node: NodeSpec, packages: Packages) -> list[str]:
-    """Return the command that runs a node, with its name and remappings. Raise MinirospyError."""
+    """Return the command that runs a node, with its name and remappings.
+
+    Raise MinirospyError as node_program does, or if ``args`` or ``launch-prefix`` cannot be split.
+    """
     program = node_program(node, packages)
     try:
         prefix, args = shlex.split(node.launch_prefix), shlex.split(node.args)
@@ -40,7 +43,7 @@ def node_command(node: NodeSpec, packages: Packages) -> list[str]:
 def node_environment(
     node: NodeSpec, environment: Environment, environ: Mapping[str, str] | None = None
 ) -> dict[str, str]:
-    """Return the environment variables of a node's process."""
+    """Return the environment variables for a node's process."""
     variables = {**(os.environ if environ is None else environ), **dict(node.env)}
     variables["ROS_MASTER_URI"] = environment.master_uri
     export_local(variables)
@@ -53,14 +56,14 @@ def node_environment(
 
 
 def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
-    """Return the working folder of a node's process. Raise MinirospyError."""
+    """Return the working folder for a node's process. Raise MinirospyError as node_program does."""
     return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
 
 
 def shell_line(node: NodeSpec, packages: Packages) -> str:
     """Return a node's command as `roslaunch --args` prints it, with the environment variables that it sets.
 
-    Raise MinirospyError.
+    Raise MinirospyError as node_command does.
     """
     namespace = node.namespace.rstrip("/")
     variables = [("ROS_NAMESPACE", namespace)] if namespace else []
@@ -71,6 +74,6 @@ def shell_line(node: NodeSpec, packages: Packages) -> str:
 
 
 def _fault(node: NodeSpec, text: str) -> MinirospyError:
-    """Return an error about a node, with file and line if a launch file declares it."""
+    """Return an error about a node, with the file and line if a launch file declares the node."""
     message = f"node [{node.base_name}]: {text}"
     return LaunchError(node.file, node.line, message) if node.file else MinirospyError(message)

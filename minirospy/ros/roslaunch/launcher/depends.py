@@ -29,9 +29,9 @@ class FileNeeds(NamedTuple):
 def file_needs(
     files: Sequence[str], packages: Packages, warn: Callable[[LaunchError], None] = lambda _: None
 ) -> dict[str, FileNeeds]:
-    """Return the dependencies of each launch file, and of each file that it includes. Raise LaunchError.
+    """Return the dependencies of each launch file, and of each file that it includes. Raise LaunchError if a file is invalid.
 
-    An arg without a value or a missing parameter file is not an error: it may be generated later. ``warn``
+    An arg without a value or a missing parameter file is not an error, because it may be supplied later. ``warn``
     is called for each file that cannot be included.
     """
     sources = []
@@ -57,7 +57,7 @@ def file_needs(
 def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False) -> dict[str, list[str]]:
     """Return the packages that launch files need but their package's package.xml does not declare: package -> sorted names.
 
-    With ``tests``, test dependencies also count as declared. Raise ManifestError.
+    With ``tests``, test dependencies also count as declared. Raise ManifestError if a package.xml is invalid.
     """
     found: dict[str, set[str]] = {}
     for file, what in needs.items():

@@ -45,7 +45,7 @@ _CONDITIONS = {**_TRUTH, "1": True, "0": False}
 
 
 def parse_document(text: bytes, file: str) -> Element:
-    """Return the ``<launch>`` of a launch file. Raise LaunchError."""
+    """Return a launch file's ``<launch>`` element. Raise LaunchError if the XML is invalid or has another root element."""
     try:
         root = parse_xml(text)
     except XmlSyntaxError as error:
@@ -59,7 +59,7 @@ def parse_document(text: bytes, file: str) -> Element:
 
 
 class Tag:
-    """An XML element with its substitutions made: returns its attributes as values, and errors with its line number."""
+    """An XML element that resolves substitutions: its methods return attribute values and create errors with its line number."""
 
     def __init__(self, element: Element, file: str, substitution: Substitution) -> None:
         self.element = element
@@ -81,23 +81,26 @@ class Tag:
         return (Tag(child, self.file, self._substitution) for child in self.element.children)
 
     def has(self, key: str) -> bool:
-        """Return whether the attribute exists, even if it is empty."""
+        """Return whether the attribute is present, even if it is empty."""
         return key in self.element.attributes
 
     def resolve(self, text: str) -> str:
-        """Return a string with its substitutions made. Raise LaunchError."""
+        """Return a string with its substitutions resolved. Raise LaunchError if one cannot be resolved."""
         try:
             return self._substitution.apply(text)
         except (SubstitutionError, NotFoundError) as error:
             raise self.error(str(error)) from error
 
     def optional(self, key: str) -> str | None:
-        """Return an attribute with its substitutions made; None if the tag does not have it. Raise LaunchError."""
+        """Return an attribute with its substitutions resolved, or None if the tag does not have the attribute.
+
+        Raise LaunchError if a substitution cannot be resolved.
+        """
         text = self.element.attributes.get(key)
         return None if text is None else self.resolve(text)
 
     def required(self, key: str, *, may_be_empty: bool = False) -> str:
-        """Return a required attribute. Raise LaunchError."""
+        """Return a required attribute. Raise LaunchError if it is missing, or empty without ``may_be_empty``."""
         text = self.optional(key)
         if text is None:
             unknown = self.element.attributes.keys() - ATTRIBUTES[self.name]
@@ -109,7 +112,7 @@ class Tag:
         return text
 
     def flag(self, key: str) -> bool:
-        """Return a boolean attribute; False if the tag does not have it. Raise LaunchError."""
+        """Return a boolean attribute, or False if the tag does not have it. Raise LaunchError if it is not a boolean."""
         text = self.optional(key)
         if text is None:
             return False
@@ -119,7 +122,7 @@ class Tag:
         return value
 
     def number(self, key: str, default: float) -> float:
-        """Return a numeric attribute. Raise LaunchError."""
+        """Return a numeric attribute, or the default if the tag does not have it. Raise LaunchError if it is not a number."""
         text = self.optional(key)
         try:
             return default if text is None else float(text)
@@ -127,7 +130,7 @@ class Tag:
             raise self.error(f"invalid float value for {key}: {text}") from None
 
     def number_or_empty(self, key: str, default: _N, kind: type[_N]) -> _N:
-        """Return a numeric attribute of type ``kind``; the default if it is empty. Raise LaunchError."""
+        """Return a numeric attribute of type ``kind``, or the default if it is empty. Raise LaunchError if it is not a number."""
         text = self.optional(key)
         try:
             return kind(text) if text else default
@@ -135,14 +138,17 @@ class Tag:
             raise self.error(f"'{key}' must be a number: [{text}]") from None
 
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
-        """Return an attribute that is one of ``choices``; the first if the tag does not have it. Raise LaunchError."""
+        """Return an attribute that is one of ``choices``, or the first choice if the tag does not have it.
+
+        Raise LaunchError for any other value.
+        """
         text = self.optional(key)
         if text is not None and text not in choices:
             raise self.error(f"{key} must be one of {', '.join(map(repr, choices))}, not '{text}'")
         return text or choices[0]
 
     def applies(self) -> bool:
-        """Return whether the tag's ``if`` or ``unless`` lets it apply. Raise LaunchError."""
+        """Return whether the tag's ``if`` or ``unless`` lets it apply. Raise LaunchError if it has both, or an invalid value."""
         if self.has("if") and self.has("unless"):
             raise self.error("cannot set both 'if' and 'unless' on the same tag")
         for key in ("if", "unless"):
@@ -157,7 +163,7 @@ class Tag:
         return True
 
     def warn_of_attributes(self, warn: Callable[[LaunchError], None]) -> None:
-        """Warn of each attribute that this tag does not support: most are typing errors."""
+        """Warn about each attribute that this tag does not support: most are typing errors."""
         known = ATTRIBUTES[self.name]
         for key in self.element.attributes:
             if key not in known:

@@ -1,4 +1,4 @@
-"""Find the launch files that a command line or an include names, and suggest similar ones for a missing file."""
+"""Find the launch files that a command line or an ``<include>`` names, and suggest similar names for a missing file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MAX_LAUNCH_FILE = 16 * 1024 * 1024  # bytes; a launch file for a hundred robots
 
 
 class LaunchFileNotFoundError(MinirospyError):
-    """The launch file of a command line does not exist; ``ros_text`` is the message of ROS, ``hint`` a suggestion."""
+    """A launch file on the command line does not exist; ``ros_text`` is ROS's message, ``hint`` a suggestion."""
 
     def __init__(self, ros_text: str, hint: str) -> None:
         super().__init__(ros_text, hint)
@@ -34,7 +34,10 @@ class LaunchFileNotFoundError(MinirospyError):
 
 
 def find_files(what: list[str], packages: Packages) -> list[str]:
-    """Return the launch files that a command line names: PACKAGE FILE, or files. Raise MinirospyError."""
+    """Return the launch files that a command line names: PACKAGE FILE, or files.
+
+    Raise LaunchFileNotFoundError if a file is not found, MinirospyError if a word is an argument written incorrectly.
+    """
     for word in what:
         name, equals, value = word.partition("=")
         if equals and name.isidentifier() and not Path(word).exists():
@@ -60,7 +63,7 @@ def find_files(what: list[str], packages: Packages) -> list[str]:
 
 
 def read_launch_file(file: str) -> bytes:
-    """Return a file's bytes. Raise LaunchError."""
+    """Return a file's bytes. Raise LaunchError if it cannot be read or is too large."""
     try:
         return read_bytes(file)
     except (OSError, ValueError) as error:
@@ -71,7 +74,7 @@ def read_launch_file(file: str) -> bytes:
 def read_bytes(file: str, limit: int = _MAX_LAUNCH_FILE) -> bytes:
     """Return a file's bytes.
 
-    Raise OSError, or ValueError if it has more than ``limit`` bytes, as a device such as /dev/zero has.
+    Raise OSError if it cannot be read, or ValueError if it has more than ``limit`` bytes, as a device such as /dev/zero has.
     """
     with open(file, "rb") as stream:
         data = stream.read(limit + 1)
@@ -81,14 +84,14 @@ def read_bytes(file: str, limit: int = _MAX_LAUNCH_FILE) -> bytes:
 
 
 def near_files(file: str) -> str:
-    """Return the hint for a missing launch file: files with similar names in its folder, else in its package."""
+    """Return the hint for a missing launch file: files with similar names in the same folder, else in the same package."""
     wanted = Path(file)
     with suppress(OSError, ValueError):
         if wanted.exists():
             return ""
         folder, package = wanted.parent, _package_of(wanted)
         for files in (folder.iterdir() if folder.is_dir() else (), package.rglob("*.*") if package else ()):
-            # Compare names without their suffixes, which are the same for all of them.
+            # Compare names without their suffixes, which are the same for all launch files.
             known: dict[str, Path] = {}
             for path in files:
                 if path.suffix in (".launch", ".xml", ".test") and path.name != "package.xml":
@@ -101,7 +104,7 @@ def near_files(file: str) -> str:
 
 
 def hidden_hint(file: str, packages: Packages) -> str:
-    """Return the hint for a file that is missing in a package, if another package of the same name has it."""
+    """Return the hint for a file that is missing in a package, if another package with the same name contains it."""
     with suppress(OSError, ValueError):
         folder = _package_of(Path(file))
         if folder:
@@ -114,7 +117,7 @@ def _package_of(file: Path) -> Path | None:
 
 
 def _launch_files_of(package: str, packages: Packages) -> str:
-    """Return the hint for a file that its package does not have: the launch files of the package."""
+    """Return the hint for a file that is missing in its package: the package's launch files."""
     try:
         files = sorted(path.name for path in packages.find(package).rglob("*.launch"))
     except NotFoundError:
@@ -123,7 +126,7 @@ def _launch_files_of(package: str, packages: Packages) -> str:
 
 
 def _package_with(file: str, packages: Packages) -> str:
-    """Return the hint for a launch file given without its package, or with the wrong one."""
+    """Return the hint for a launch file that was given without its package, or with the wrong one."""
     for package, folder in sorted(packages.folders().items()):
         if Path(file).name == file and any((folder / below / file).is_file() for below in ("launch", "")):
             return f"; did you mean `roslaunch {package} {file}`?"

@@ -1,12 +1,10 @@
-"""A script that outlives roslaunch briefly: if roslaunch is killed, it terminates the nodes that are left.
+"""A script that briefly outlives roslaunch: if roslaunch is killed, it terminates the remaining nodes.
 
-It reads one line per process group from stdin: ``+PID NAME`` when a node has started; ``*PID`` when the master has
-started, which
-is terminated last; ``-PID`` when a process has exited. At EOF, roslaunch has exited, for whatever reason: the remaining
-groups get
-SIGINT, SIGTERM, SIGKILL, and the registrations of their nodes are removed from a master that continues to run. On Windows, the
-system terminates the processes with roslaunch, so only the registrations are left to remove. The script imports only a few
-standard modules, because it starts at the same time as the first nodes.
+It reads one line per process group from stdin: ``+PID NAME`` when a node has started; ``*PID`` when the master, which is
+terminated last, has started; ``-PID`` when a process has exited. At EOF, roslaunch has exited, for whatever reason: the
+script sends SIGINT, SIGTERM and SIGKILL to the remaining groups, and unregisters their nodes from a master that continues
+to run. On Windows, the system terminates the processes together with roslaunch, so the script only unregisters the nodes.
+It imports only a few standard modules, because it starts at the same time as the first nodes.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ from collections.abc import Callable, Iterable
 _UNREGISTER_SECONDS = 60.0
 
 SYSTEM_ENDS_THEM = "system-ends-them"
-"""The last argument if the system terminates the processes of a killed roslaunch, as Windows does."""
+"""The last argument if the system terminates a killed roslaunch's processes, as Windows does."""
 
 
 def watch(
@@ -61,7 +59,7 @@ def end_groups(group: list[int], interrupt_seconds: float, terminate_seconds: fl
             time.sleep(0.02)
             left = [pid for pid in left if is_running(pid)]
     for pid in group:
-        # Also kills the processes that a node left behind in its group.
+        # Also kills processes that a node left running in its group.
         send(pid, "SIGKILL")
 
 
@@ -70,7 +68,7 @@ def send(pid: int, name: str) -> bool:
     if sys.platform == "win32":
         import subprocess
 
-        # A process in another console receives no signals, so kill it with all of its descendants.
+        # A process in another console receives no signals, so kill the process with all its descendants.
         subprocess.run(["taskkill", "/F", "/T", "/PID", str(pid)], capture_output=True, check=False)
         return False
     try:
@@ -81,7 +79,7 @@ def send(pid: int, name: str) -> bool:
 
 
 def is_running(pid: int) -> bool:
-    """Return whether the first process of a group runs; a zombie counts as exited."""
+    """Return whether a group's first process is running; a zombie counts as exited."""
     try:
         os.kill(pid, 0)
         with open(f"/proc/{pid}/stat", encoding="utf-8", errors="replace") as file:
@@ -89,7 +87,7 @@ def is_running(pid: int) -> bool:
     except ProcessLookupError:
         return False
     except OSError:
-        # There is no /proc on macOS, but its first process reaps zombies immediately.
+        # macOS has no /proc, but its first process reaps zombies immediately.
         return True
 
 
@@ -100,6 +98,6 @@ if __name__ == "__main__":
         float(sys.argv[1]),
         float(sys.argv[2]),
         sys.argv[3],
-        # Other processes may already have these process ids.
+        # Other processes may already have reused these process ids.
         (lambda *_: None) if leaves_them else end_groups,
     )

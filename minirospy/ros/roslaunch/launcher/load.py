@@ -39,18 +39,18 @@ __all__ = [
 
 STDIN = "<stdin>"
 _MAX_INCLUDE_DEPTH = 50
-# files per launch; a chain of 26 files that each include the next one twice would load 67,108,863
+# files per launch; a chain of 26 files, each of which includes the next one twice, would load 67,108,863
 _MAX_INCLUDES = 10_000
 
 Problems = list[LaunchError]
 
 
 class _TooManyIncludesError(LaunchError):
-    """A launch that includes too many files."""
+    """A launch includes too many files."""
 
 
 class LaunchSource(NamedTuple):
-    """A launch file, its text (None: read the file), and the values of its args."""
+    """A launch file, its content (None: read the file), and the values of its args."""
 
     file: str
     text: bytes | None
@@ -59,9 +59,10 @@ class LaunchSource(NamedTuple):
 
 @dataclass(frozen=True)
 class _Scope:
-    """The settings that a tag inherits from the tags around it. ``private``: parameters of every node that follows.
+    """The settings that a tag inherits from the enclosing tags. ``private``: parameters that every following node receives.
 
-    ``machine`` is the default machine. It is the only setting that also applies after the group or include that declares it.
+    ``machine`` is the default machine. It is the only setting that still applies after the end of the group or include that
+    declares it.
     """
 
     namespace: str = "/"
@@ -73,7 +74,7 @@ class _Scope:
 
 @dataclass
 class _Args:
-    """The args of a file: ``given`` by name, or ``passed`` by a file that includes it with ``pass_all_args``."""
+    """A file's args: ``given`` by name, or ``passed`` by an including file with ``pass_all_args``."""
 
     given: dict[str, str]
     passed: dict[str, str] = field(default_factory=dict)
@@ -84,14 +85,14 @@ class _Args:
 def load_files(
     files: list[str], args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load launch files one after another, with ``args`` from the command line. Raise LaunchError."""
+    """Load launch files one after another, with ``args`` from the command line. Raise LaunchError if one is invalid."""
     return load_sources([LaunchSource(file, None, args) for file in files], packages, environ)
 
 
 def load_text(
     text: str, args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load one launch file from its text, for example from standard input. Raise LaunchError."""
+    """Load one launch file from a string, for example from standard input. Raise LaunchError if it is invalid."""
     return load_sources([LaunchSource(STDIN, text.encode(), args)], packages, environ)
 
 
@@ -101,7 +102,7 @@ def load_sources(
     environ: Mapping[str, str] | None = None,
     problems: Problems | None = None,
 ) -> LaunchSpec:
-    """Load launch files one after another. Raise LaunchError, or append all errors to ``problems`` if it is given."""
+    """Load launch files one after another. Raise LaunchError on an error, or append all errors to ``problems`` if given."""
     spec = LaunchSpec()
     anonymous: dict[str, str] = {}
     used: set[str] = set()
@@ -125,7 +126,7 @@ def load_sources(
 
 def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
     seen: dict[str, NodeSpec] = {}
-    # A <test> may have the name of a node: they conflict only if the test's program registers under that name.
+    # A <test> may have the same name as a node: they conflict only if the test's program registers under that name.
     for node in spec.nodes:
         other = seen.setdefault(node.name, node)
         if other is not node:
@@ -141,7 +142,7 @@ def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
 
 
 class _File:
-    """Reads one file into the shared spec. ``problems``: list to which errors are appended; None: raise them."""
+    """Reads one file into the shared spec. ``problems``: list to which errors are appended; None: raise errors."""
 
     def __init__(
         self,
@@ -173,7 +174,7 @@ class _File:
         }
 
     def read(self, text: bytes, scope: _Scope) -> _Scope:
-        """Read the file's text; return the scope at its end. Raise LaunchError."""
+        """Read the file's text; return the scope at its end. Raise LaunchError on an error, unless errors are collected."""
         path = str(Path(self._file).resolve()) if self._file != STDIN else self._file
         if path not in self._spec.files:
             self._spec.files.append(path)
@@ -186,13 +187,13 @@ class _File:
         return scope
 
     def report(self, error: LaunchError) -> None:
-        """Raise an error, or append it to the collected ones."""
+        """Raise an error, or append it to the collected errors."""
         if self._problems is None:
             raise error
         self._problems.append(error)
 
     def _read(self, tag: Tag, scope: _Scope, allowed: tuple[str, ...] | None = None) -> _Scope:
-        """Read a tag; return the scope for the tags after it."""
+        """Read a tag; return the scope for the following tags."""
         reader = self._tags.get(tag.name)
         if reader is None or (allowed is not None and tag.name not in allowed):
             near = [] if reader else nearest(tag.name, allowed or self._tags)
@@ -203,11 +204,11 @@ class _File:
         tag.warn_of_attributes(self._spec.warnings.append)
         try:
             if tag.name == "arg" and not self._depth:
-                # The arg is known even if its `if` excludes it.
+                # The arg is known even if its `if` excludes the tag.
                 self._substitution.used.add(tag.element.attributes.get("name", ""))
             return reader(tag, scope) if tag.applies() else scope
         except _TooManyIncludesError:
-            # Abort the load: otherwise every open file would report the error once for each of its includes.
+            # Abort loading: otherwise every open file would report the error once for each of its includes.
             raise
         except LaunchError as error:
             self.report(error)
@@ -241,7 +242,7 @@ class _File:
     def _group(self, tag: Tag, scope: _Scope) -> _Scope:
         inner = self._below(tag, scope)
         self._clear(tag, inner)
-        # An arg that is declared in a group is valid only in it.
+        # An arg that is declared in a group is valid only in that group.
         declared, args = set(self._args.declared), dict(self._substitution.args)
         for child in tag.children():
             inner = self._read(child, inner)
@@ -276,7 +277,7 @@ class _File:
                 if name in given and not hands_on_all:
                     raise child.error(f"arg '{name}' has already been declared")
                 if value is None:
-                    # A value that is passed on takes precedence over a default.
+                    # A passed value takes precedence over a default.
                     value = given.get(name, passed.get(name, default))
                 if value is None:
                     raise child.error(f'<arg name="{name}"> of an <include> needs a value')
@@ -359,7 +360,7 @@ class _File:
         return scope
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
-        """Store a parameter of a node as private to it, even if its name starts with a slash or tilde."""
+        """Store a node's parameter as private to the node, even if its name starts with a slash or tilde."""
         self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", param_value(tag))
 
     def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:
@@ -500,7 +501,7 @@ class _File:
 
 
 def _folder(tag: Tag) -> str:
-    """Return the ``cwd`` of a node; "" if it is not set. Raise LaunchError."""
+    """Return a node's ``cwd``, or "" if it is not set. Raise LaunchError if the value is invalid."""
     text = tag.optional("cwd")
     if text is None:
         return ""
@@ -509,7 +510,7 @@ def _folder(tag: Tag) -> str:
 
 
 def _arg_texts(tag: Tag) -> tuple[str, str | None, str | None]:
-    """Return the name, value and default of an ``<arg>``. Raise LaunchError."""
+    """Return an ``<arg>``'s name, value and default. Raise LaunchError if the name is missing, or if it has value and default."""
     name, value, default = tag.required("name"), tag.optional("value"), tag.optional("default")
     if value is not None and default is not None:
         raise tag.error(f"<arg> tag must have one and only one of value/default: arg [{name}]")

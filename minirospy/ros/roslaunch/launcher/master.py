@@ -26,7 +26,7 @@ _START_SECONDS = 60.0
 
 
 class LaunchMaster:
-    """The master that the nodes of a launch use.
+    """The master that a launch's nodes use.
 
     ``pause(seconds)`` waits, and raises KeyboardInterrupt if the run is stopped in the meantime.
     """
@@ -37,16 +37,16 @@ class LaunchMaster:
         self._pause = pause
         self._proxy = MasterProxy(environment.master_uri, "/roslaunch")
         self.run_id = ""
-        """The name of the run's log folder, and the value of /run_id at the master."""
+        """The name of the run's log folder, and the master's /run_id."""
         self.has_logs = True  # whether log files can be written
 
     @property
     def log_folder(self) -> Path:
-        """The folder of this run's log files."""
+        """The folder for this run's log files."""
         return self._environment.log_dir / self.run_id
 
     def is_online(self) -> bool:
-        """Return whether a master answers."""
+        """Return whether a master responds."""
         return self._proxy.is_online()
 
     def close(self) -> None:
@@ -54,16 +54,19 @@ class LaunchMaster:
         self._proxy.close()
 
     def wait(self) -> None:
-        """Wait until the master answers."""
+        """Wait until the master responds."""
         self._output.print("roscore/master is not yet running, will wait for it to start")
         while not self.is_online():
             self._pause(0.1)
         self._output.print("master has started, initiating launch")
 
     def start(self, arguments: tuple[str, ...]) -> Process:
-        """Start a master on this machine. Raise MasterUnreachableError if its URI is another machine's, MinirospyError."""
+        """Start a master on this machine.
+
+        Raise MasterUnreachableError if the master URI names another machine, MinirospyError if the process cannot be started.
+        """
         if not self._environment.master_is_local:
-            # Called for its error, which gives the reason: an unknown host name, a suspended master.
+            # The call is made for its error, which gives the reason: an unknown host name, a suspended master.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
         self._output.print("auto-starting new master")
@@ -80,7 +83,7 @@ class LaunchMaster:
         return start_process("master", command, environ=os.environ)
 
     def wait_for_start(self, process: Process) -> None:
-        """Wait until the started master answers, then set its /run_id. Raise MinirospyError."""
+        """Wait until the started master responds, then set its /run_id. Raise MinirospyError if it exits or does not respond."""
         end = time.monotonic() + _START_SECONDS
         while not self.is_online():
             if not process.is_running:
@@ -90,9 +93,9 @@ class LaunchMaster:
             self._pause(0.02)
 
         if self.run_id:
-            # The run id is given if a program launches: it names the folder of the log files.
+            # A program that launches may have set the run id, which names the folder for the log files.
             self._proxy.set_param("/run_id", self.run_id)
-        # A master that cannot write its log has already printed a warning.
+        # If the master cannot write its log, it has already printed a warning.
         self.find_run_id(warns=False)
 
     def find_run_id(self, *, warns: bool = True) -> None:
@@ -122,7 +125,10 @@ class LaunchMaster:
                 self._output.warn(f"WARNING: cannot write logs to {self.log_folder}: {why}; set ROS_LOG_DIR")
 
     def set_parameters(self, spec: LaunchSpec) -> None:
-        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters. Raise MinirospyError."""
+        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters.
+
+        Raise MinirospyError if a value cannot be set or a file cannot be written.
+        """
         for namespace in spec.clear:
             with contextlib.suppress(RpcError):
                 self._proxy.delete_param(namespace)

@@ -1,4 +1,4 @@
-"""Starts the process of a node from its NodeSpec: its command, environment, working folder and log files."""
+"""Starts a node's process from its NodeSpec, with its command, environment, working folder and log files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["NodeStarter"]
 
 
 class NodeStarter:
-    """Starts the nodes of one launch."""
+    """Starts a launch's nodes."""
 
     def __init__(
         self, environment: Environment, packages: Packages, options: RunOptions, master: LaunchMaster
@@ -31,14 +31,14 @@ class NodeStarter:
         self._has_warned = False
 
     def start(self, node: NodeSpec, name: str) -> Process:
-        """Start a node as the process ``name``. Raise MinirospyError."""
+        """Start a node as the process ``name``. Raise MinirospyError if the process or its folder cannot be created."""
         command = node_command(node, self._packages)
         folder = node_folder(node, self._packages, self._environment)
         environ = node_environment(node, self._environment)
         screen = self._uses_screen(node)
         if not screen or not sys.stdout.isatty():
-            # Make a node's output appear immediately. On a terminal, Python flushes each line by itself, and writes
-            # whole lines, which the lines of other nodes do not interrupt.
+            # Make a node's output appear immediately. On a terminal, Python already flushes each line, and writes
+            # whole lines, so that lines from other nodes do not interrupt them.
             environ.setdefault("PYTHONUNBUFFERED", "1")
         folder = self._made(folder)
 

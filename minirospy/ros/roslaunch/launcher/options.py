@@ -1,4 +1,4 @@
-"""The settings of a launch: the options of `roslaunch`."""
+"""The settings for a launch: the options of `roslaunch`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The messages of roslaunch: on the terminal in ROS's colours, and in its log file."""
+"""The messages of roslaunch: printed on the terminal in ROS's colours, and written to its log file."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ INFO, ERROR = 2, 8  # levels of rosgraph_msgs/Log
 class Output:
     """Prints lines to stdout and stderr; adds colours and titles on a terminal.
 
-    ``listener`` also receives (level, text) of each line: a child roslaunch sends them to its parent.
-    ``title``: whether the terminal's title may be set. ``has_color`` is decided when a line is printed.
+    ``listener`` also receives (level, text) for each line: a child roslaunch sends them to its parent.
+    ``title``: whether the terminal's title may be set. ``has_color`` is determined when a line is printed.
     """
 
     handlers: ClassVar[list[Callable[[int, str], None]]] = []
-    """Functions of the user's program that receive (level, text) of each line."""
+    """Functions of the user's program that receive (level, text) for each line."""
 
     def __init__(self, *, title: bool = True, listener: Callable[[int, str], None] | None = None) -> None:
         self._may_title = title
@@ -51,7 +51,10 @@ class Output:
             print(f"\033]2;{text}\007", end="", flush=True)
 
     def log_to(self, folder: Path) -> Path:
-        """Write all lines, including earlier ones, to roslaunch-HOST-PID.log in ``folder``; return its path. Raise OSError."""
+        """Write all lines, including earlier ones, to roslaunch-HOST-PID.log in ``folder``; return the file's path.
+
+        Raise OSError if the file cannot be written.
+        """
         path = folder / f"roslaunch-{socket.gethostname()}-{os.getpid()}.log"
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -64,9 +67,9 @@ class Output:
 
     def _write(self, text: str, colour: str, level: int) -> None:
         stream = sys.stderr if level == ERROR else sys.stdout
-        # One write per line, because nodes write to the same terminal.
+        # Write each line in a single call, because nodes write to the same terminal.
         shown = f"{colour}{text}{_PLAIN}" if colour and stream.isatty() else text
-        # The reader (`| head`) may have exited; the nodes are still terminated in order.
+        # The process that reads the output (`| head`) may have exited; still terminate the nodes in order.
         with contextlib.suppress(BrokenPipeError):
             stream.write(shown + "\n")
             stream.flush()
@@ -86,7 +89,7 @@ class Output:
 
 
 def warn_of_large_logs(folder: Path, output: Output) -> None:
-    """Warn if the log folder has more than a gigabyte; its size is measured in the background."""
+    """Warn if the log folder exceeds one gigabyte; its size is measured in the background."""
 
     def look() -> None:
         size = 0

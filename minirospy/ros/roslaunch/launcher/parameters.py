@@ -27,16 +27,16 @@ from minirospy.workspace.packages import Packages, built_in_roots, is_python
 __all__ = ["param_value", "rosparam_values"]
 
 _XACRO = ("xacro", "xacro.py")
-_STYLE = re.compile(r"\x1b\[[0-9;]*m")  # colours of a terminal
+_STYLE = re.compile(r"\x1b\[[0-9;]*m")  # terminal colours
 _ERROR = re.compile(r"\berror: ", re.IGNORECASE)
-_ERRORS_KEPT = 65_536  # bytes at the end of a command's stderr in which the reason is searched
+_ERRORS_KEPT = 65_536  # bytes at the end of a command's stderr that are searched for the reason
 _ERRORS_SECONDS = 1.0
-_MAX_VALUE = 64 * 1024 * 1024  # bytes of a file or a command's output; the master accepts no larger request
+_MAX_VALUE = 64 * 1024 * 1024  # bytes in a file or a command's output; the master accepts no larger request
 _WAYS = ("value", "textfile", "binfile", "command")
 
 
 def param_value(tag: Tag) -> object:
-    """Return the value of a ``<param>``. Raise LaunchError."""
+    """Return a ``<param>``'s value. Raise LaunchError if the tag is invalid, or its file or command fails."""
     ways = [way for way in _WAYS if tag.has(way)]
     if len(ways) != 1:
         raise tag.error(f"<param> tag must have one and only one of {'/'.join(_WAYS)}")
@@ -62,7 +62,7 @@ def param_value(tag: Tag) -> object:
 
 
 def rosparam_values(tag: Tag, namespace: str, param: str) -> Iterator[tuple[str, object]]:
-    """Yield each parameter that a ``<rosparam>`` loads, with its value. Raise LaunchError."""
+    """Yield each parameter that a ``<rosparam>`` loads, with its value. Raise LaunchError if the YAML or the file is invalid."""
     file = tag.optional("file")
     text = tag.element.text if file is None else _decoded(tag, file, _read(tag, file))
     if tag.flag("subst_value"):
@@ -104,7 +104,7 @@ def _decoded(tag: Tag, file: str, data: bytes) -> str:
 
 
 def _output_of(tag: Tag, command: str) -> str:
-    """Run a command without a shell; return its output."""
+    """Run a command without a shell; return its output. Raise LaunchError if the command fails."""
     try:
         status, output, reason = _run(_command_words(shlex.split(command)))
     except ValueError as error:
@@ -120,7 +120,7 @@ def _output_of(tag: Tag, command: str) -> str:
 
 
 def _run(words: list[str]) -> tuple[int, bytes, str]:
-    """Run a command; return its status, its output, and the line of its stderr that gives the reason.
+    """Run a command; return its status, its output, and the line in its stderr that gives the reason.
 
     Its stderr is copied to the terminal as it arrives. A command that writes more than _MAX_VALUE bytes is killed.
     """
@@ -138,12 +138,12 @@ def _run(words: list[str]) -> tuple[int, bytes, str]:
                 process.kill()
             status = process.wait()
         except BaseException:
-            # The command may ignore a Ctrl-C.
+            # Kill the command, because it may ignore Ctrl-C.
             process.kill()
             process.wait()
             raise
         finally:
-            # Processes that the command left running get a broken pipe.
+            # Processes that the command left running then get a broken pipe.
             process.stdout.close()
     finally:
         os.close(writing)
@@ -153,13 +153,13 @@ def _run(words: list[str]) -> tuple[int, bytes, str]:
 
 
 def _reason(errors: str) -> str:
-    """Return the first line with "error" in it, as xacro prints; else the last line, as of a traceback."""
+    """Return the first line that contains "error", as xacro prints; else the last line, which in a traceback is the error."""
     lines = [line.strip() for line in errors.splitlines() if line.strip()]
     return next((line for line in lines if _ERROR.search(line)), lines[-1] if lines else "")
 
 
 def _pass_on(reading: int, end: bytearray) -> None:
-    """Copy the pipe to stderr until it is closed; keep the last bytes in ``end``."""
+    """Copy the pipe to stderr until it is closed; store the last bytes in ``end``."""
     with open(reading, "rb", buffering=0) as pipe:
         while chunk := pipe.read(_ERRORS_KEPT):
             end += chunk
@@ -173,7 +173,7 @@ def _pass_on(reading: int, end: bytearray) -> None:
 def _command_words(words: list[str]) -> list[str]:
     """Return the command to run: this interpreter for a package's Python program, as for nodes; minirospy's xacro for xacro.
 
-    So a launch file finds xacro even if no virtual environment is active, and never the xacro of ROS 2.
+    A launch file thus finds xacro even if no virtual environment is active, and never uses the xacro from ROS 2.
     """
     if not words:
         return words

@@ -1,4 +1,4 @@
-"""The processes that roslaunch starts: in separate process groups, terminated in steps, and never left behind."""
+"""The processes that roslaunch starts: each in its own process group, terminated in steps, and never left running."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Timeouts:
 
 @dataclass(eq=False)
 class Process:
-    """A started process; ``node`` is None for the master. ``starts``: how often it was started."""
+    """A started process; ``node`` is None for the master. ``starts``: the number of times that it was started."""
 
     name: str
     command: Sequence[str]
@@ -45,9 +45,9 @@ class Process:
     stdout_file: Path | None = None
     starts: int = 1
     started: float = field(default_factory=time.monotonic)
-    is_ending: bool = False  # its exit was requested, so it is not reported
+    is_ending: bool = False  # its exit was requested, so the exit is not reported
 
-    is_restarting: bool = False  # it is restarted after its exit, because its file changed
+    is_restarting: bool = False  # restart after its exit, because its file changed
 
     @property
     def pid(self) -> int:
@@ -56,24 +56,24 @@ class Process:
 
     @property
     def exit_code(self) -> int | None:
-        """The exit status, as in subprocess; None while the process runs."""
+        """The exit status, as in subprocess; None while the process is running."""
         return self.popen.poll()
 
     @property
     def is_running(self) -> bool:
-        """Return whether the process runs."""
+        """Return whether the process is running."""
         return self.popen.poll() is None
 
 
 class _Group(TypedDict, total=False):
-    """The options of subprocess.Popen that give a process its own group."""
+    """The subprocess.Popen options that put a process into its own group."""
 
     creationflags: int
     start_new_session: bool
 
 
 class Guardian:
-    """Is notified when processes start and exit; if roslaunch is killed, it terminates the remaining ones.
+    """Receives the start and exit of processes; if roslaunch is killed, it terminates the remaining processes.
 
     On Windows the system terminates them (`minirospy.base.child_lifetime`). There the guardian only unregisters nodes from a
     master that this launch did not start; otherwise its process is not started.
@@ -109,7 +109,7 @@ class Guardian:
         self._children.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        # A process that is killed while it starts a process outside its job leaves that one behind, suspended.
+        # A parent that is killed while it starts a process outside its job leaves that process behind, suspended.
         return start_outside_of_job(
             [sys.executable, "-I", "-S", *self._words],
             stdin=subprocess.PIPE,
@@ -139,9 +139,9 @@ def start_process(
     stdin: int | None = subprocess.DEVNULL,
     stdout: int | None = None,
 ) -> Process:
-    """Start a process. Its stdout (and its stderr, with ``log_errors``) goes to ``stdout_file``, or is inherited.
+    """Start a process. Its stdout (and its stderr, with ``log_errors``) is written to ``stdout_file``, or is inherited.
 
-    Raise MinirospyError.
+    Raise MinirospyError if the process cannot be started or the file cannot be written.
     """
     try:
         with _opened(stdout_file) as output:
@@ -162,7 +162,7 @@ def start_process(
 def end_processes(
     processes: Sequence[Process], timeouts: Timeouts, warn: Callable[[str], None]
 ) -> list[Process]:
-    """Send SIGINT, then SIGTERM, then SIGKILL, until all have exited; return the processes that needed SIGKILL."""
+    """Send SIGINT, then SIGTERM, then SIGKILL, until all processes have exited; return those that needed SIGKILL."""
     steps = (
         (_interrupt, timeouts.interrupt, ""),
         (_terminate, timeouts.terminate, "escalating to SIGTERM"),
@@ -179,7 +179,8 @@ def end_processes(
             process.is_ending = True
             if words:
                 warn(f"[{process.name}] {words}")
-            # Fails if the process has exited, or on Windows without a console: then there is nothing to wait for.
+            # Fails if the process has exited, or on Windows without a console. In both cases there is nothing to wait
+            # for.
             with contextlib.suppress(OSError):
                 step(process.popen)
                 notified.append(process)
@@ -190,7 +191,7 @@ def end_processes(
 
     if not _WINDOWS:
         for process in processes:
-            # Kills the processes that a node left behind in its group.
+            # Kills processes that a node left running in its group.
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, signal.SIGKILL)
     return killed

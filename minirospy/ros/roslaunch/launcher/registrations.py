@@ -1,6 +1,6 @@
 """Removes the registrations that exited nodes leave at the master.
 
-Also a program, for the guardian of a killed roslaunch:
+Also a program that the guardian of a killed roslaunch runs:
 ``python -m minirospy.ros.roslaunch.launcher.registrations MASTER_URI NODE ...``.
 """
 
@@ -20,13 +20,14 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["DeadNodes", "main", "unregister_dead"]
 
-_ANSWER_SECONDS = 5.0  # seconds; an exited process on this machine refuses immediately, so only a hanging one takes this long
+# seconds; a host refuses connections to an exited process immediately, so only a hanging process takes this long
+_ANSWER_SECONDS = 5.0
 
 _MAX_CONCURRENT = 16
 
 
 class DeadNodes:
-    """Unregisters nodes whose processes have exited, in a thread; one pass handles all that exited since the last."""
+    """Unregisters nodes whose processes have exited, in a thread; one pass handles all exits since the previous pass."""
 
     def __init__(self, master_uri: str) -> None:
         self._master_uri = master_uri
@@ -41,7 +42,7 @@ class DeadNodes:
         self._exited.put(node)
 
     def close(self) -> None:
-        """Wait until the added nodes are unregistered, or the master does not answer. Idempotent."""
+        """Wait until the added nodes are unregistered, or the master does not respond. Idempotent."""
         if self._thread:
             self._exited.put(None)
             self._thread.join()
@@ -61,8 +62,8 @@ class DeadNodes:
 def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
     """Unregister those of ``nodes`` (global names) that have exited; return their names.
 
-    A new node with one of these names, and a node that runs or hangs, keep their registrations. If the master does not
-    answer, nothing is changed.
+    A new node with one of these names, and a node that runs or hangs, remain registered. If the master does not respond,
+    nothing is changed.
     """
     if not nodes:
         return []
@@ -78,7 +79,7 @@ def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
 
 
 def main(argv: Sequence[str]) -> int:
-    """Unregister nodes; ``argv`` has the master's URI and the nodes' names."""
+    """Unregister nodes; ``argv`` contains the master's URI and the nodes' names."""
     unregister_dead(argv[0], argv[1:])
     return 0
 

@@ -1,6 +1,6 @@
-"""Nodes on other machines: ssh starts a roslaunch on each machine, which runs its nodes and reports events.
+"""Nodes on other machines: ssh starts a roslaunch on each machine, which runs the nodes there and reports events.
 
-The calls between the two are those of ROS 1, so either of them may be a real roslaunch: the child calls
+The calls between the two are those of ROS 1, so either side may be a real roslaunch: the child calls
 ``register``, ``log`` and ``process_died`` of the parent; the parent calls ``launch`` and ``shutdown`` of the child.
 Source: http://wiki.ros.org/roslaunch/Architecture, http://wiki.ros.org/roslaunch/XML/machine.
 """
@@ -36,7 +36,7 @@ _SHUTDOWN_SECONDS = 5.0
 
 
 class Monitor(Protocol):
-    """The part of the launcher that the remote machines use."""
+    """The part of the launcher that RemoteMachines uses."""
 
     def guard(self, process: Process) -> None:
         """Terminate a process if roslaunch is killed."""
@@ -83,7 +83,7 @@ class Api:
 
 
 def call(uri: str, method: str, *args: object, timeout: float = _CALL_SECONDS) -> object:
-    """Call a method of another roslaunch. Raise RpcError."""
+    """Call a method on another roslaunch process. Raise RpcError if the call fails."""
     client = RpcClient(uri, timeout)
     try:
         return unwrap(method, client.call(method, *args))
@@ -93,7 +93,7 @@ def call(uri: str, method: str, *args: object, timeout: float = _CALL_SECONDS) -
 
 @dataclass(eq=False)
 class _Child:
-    """The roslaunch on one machine."""
+    """The roslaunch process on one machine."""
 
     name: str
     machine: MachineSpec
@@ -107,7 +107,7 @@ class _Child:
 
 
 class RemoteMachines:
-    """The roslaunches on other machines."""
+    """The roslaunch processes on other machines."""
 
     def __init__(
         self, environment: Environment, run_id: str, output: Output, timeouts: Timeouts, monitor: Monitor
@@ -122,7 +122,7 @@ class RemoteMachines:
 
     @property
     def is_running(self) -> bool:
-        """Return whether a node runs on another machine."""
+        """Return whether a node is running on another machine."""
         return any(child.running and child.ssh.is_running for child in self._children.values())
 
     def start(self, nodes: Sequence[tuple[NodeSpec, MachineSpec]]) -> None:
@@ -161,7 +161,7 @@ class RemoteMachines:
             self._launch(child)
 
     def close(self) -> None:
-        """Terminate the nodes and the roslaunches on the other machines. Idempotent."""
+        """Terminate the nodes and the roslaunch processes on the other machines. Idempotent."""
         for child in self._children.values():
             self._output.print(f"[{child.name}] killing on exit")
         threads = [
@@ -236,7 +236,7 @@ class RemoteMachines:
         except (RpcError, ValueError) as error:
             text = f"remote roslaunch child [{child.name}] cannot launch its nodes: {error}"
             raise LaunchError(machine.file, machine.line, text) from None
-        # A real roslaunch answers "Process<name-1>".
+        # A real roslaunch returns "Process<name-1>".
         child.running |= {name.removeprefix("Process<").removesuffix(">") for name in succeeded}
         child.running -= child.ended
         for name in failed:
@@ -277,5 +277,5 @@ class RemoteMachines:
 
 
 def launch_text(nodes: Sequence[NodeSpec]) -> str:
-    """Return a launch file with these nodes, for the roslaunch that runs them."""
+    """Return a launch file with these nodes, for the roslaunch process that runs them."""
     return "\n".join(["<launch>", *(node.to_xml() for node in nodes), "</launch>", ""])

@@ -1,6 +1,6 @@
 """Runs a LaunchSpec: starts, watches and terminates its nodes.
 
-The parts are in separate files: the master (``master.py``), the process of a node (``node_start.py``), the run
+The parts are in separate files: the master (``master.py``), a node's process (``node_start.py``), the run
 (``supervisor.py``), other machines (``remote.py``), termination (``process.py``, ``registrations.py``).
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools, http://wiki.ros.org/roslaunch/Architecture.
 """
@@ -38,10 +38,10 @@ __all__ = ["Launcher", "RunOptions"]
 
 
 class Launcher:
-    """Runs the nodes of a spec until all have exited or a caller stops them."""
+    """Runs a spec's nodes until all have exited or a caller stops them."""
 
     _numbers: ClassVar[Iterator[int]] = itertools.count(1)
-    """Numbers the processes of all launches of this program, so that their names and log files are unique."""
+    """Numbers the processes of all launches in this program, so that process names and log files are unique."""
 
     def __init__(
         self,
@@ -79,12 +79,12 @@ class Launcher:
 
     @property
     def processes(self) -> list[Process]:
-        """The started nodes that are watched, including those that wait for a restart."""
+        """The watched nodes that were started, including those pending a restart."""
         return self.supervisor.processes
 
     @property
     def run_id(self) -> str:
-        """The name of the run's log folder, and the value of /run_id at the master."""
+        """The name of the run's log folder, and the master's /run_id."""
         return self._master.run_id
 
     @run_id.setter
@@ -94,7 +94,8 @@ class Launcher:
     def run(self, *, wait: bool = False) -> int:
         """Run until the launch is over; return the exit status: 0, or 1 if a required node failed.
 
-        ``wait``: wait for a master instead of starting one. Raise LaunchError, MasterUnreachableError.
+        ``wait``: wait for a master instead of starting one. Raise MasterUnreachableError if the master cannot be started here,
+        LaunchError if a node cannot be run.
         """
         with self.signals():
             try:
@@ -110,7 +111,8 @@ class Launcher:
     def start(self, *, wait: bool = False) -> None:
         """Show the summary, find or start a master, set the parameters, start the nodes.
 
-        Raise LaunchError, MasterUnreachableError, MinirospyError; KeyboardInterrupt if it is stopped in the meantime.
+        Raise LaunchError if a node cannot be run, MasterUnreachableError if the master cannot be started here, MinirospyError
+        for other failures, KeyboardInterrupt if the run is stopped in the meantime.
         """
         here, elsewhere = self._nodes()
         self._check(here, elsewhere)
@@ -131,7 +133,7 @@ class Launcher:
         if not had_master:
             self._output.print(f"setting /run_id to {self.run_id}", bold=True)
             self._output.print("started core service [/rosout]")
-            # In ROS, the first process of a master that roslaunch started is /rosout.
+            # In ROS, the first process started by a roslaunch that runs the master is /rosout.
             next(self._numbers)
 
         self.set_parameters()
@@ -141,7 +143,10 @@ class Launcher:
             self.start_node(node)
 
     def set_parameters(self) -> None:
-        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters. Raise MinirospyError."""
+        """Run the <rosparam> commands, delete the namespaces of clear_params, then set the parameters.
+
+        Raise MinirospyError if a value cannot be set or a file cannot be written.
+        """
         self._master.set_parameters(self._spec)
 
     def process_name(self, node: NodeSpec) -> str:
@@ -149,7 +154,7 @@ class Launcher:
         return f"{node.name.lstrip('/')}-{next(self._numbers)}"
 
     def start_node(self, node: NodeSpec, name: str = "") -> Process | None:
-        """Start a node as the process ``name`` (empty: a new name); warn and return None if that fails."""
+        """Start a node as the process ``name`` (empty: a new name); warn and return None if it cannot be started."""
         self._has_run = True
         try:
             process = self._start_process(node, name or self.process_name(node))
@@ -163,7 +168,7 @@ class Launcher:
         return process
 
     def _nodes(self) -> tuple[list[NodeSpec], list[NodeSpec]]:
-        """Return the nodes of this machine and those of other machines. Raise LaunchError on an unknown machine."""
+        """Return the nodes on this machine and those on other machines. Raise LaunchError if a machine is unknown."""
         here: list[NodeSpec] = []
         elsewhere: list[NodeSpec] = []
         for node in self._spec.nodes:
@@ -205,7 +210,7 @@ class Launcher:
                 self._output.warn(f"WARNING: {why}")
 
     def _programs(self, nodes: list[NodeSpec]) -> Iterator[Path]:
-        """Yield the programs of nodes, except missing ones, which are reported when the node is started."""
+        """Yield the nodes' programs, except missing ones, which are reported when the node is started."""
         for node in nodes:
             with contextlib.suppress(MinirospyError):
                 yield Path(node_program(node, self._packages)[-1])
@@ -242,7 +247,7 @@ class Launcher:
         self._ready_guardian().add(process)
 
     def _ready_guardian(self) -> Guardian:
-        """Return the guardian. Called before a process starts, so that the guardian covers it from the beginning."""
+        """Return the guardian. Called before a process starts, so that the guardian covers the process from the beginning."""
         if self._guardian is None:
             self._guardian = Guardian(self._options.timeouts, self._environment.master_uri)
         return self._guardian
@@ -251,11 +256,11 @@ class Launcher:
 
     @property
     def stopped_by(self) -> str:
-        """The signal or caller of stop() that stopped the run; empty if the nodes exited by themselves."""
+        """The signal or stop() caller that stopped the run; empty if the nodes exited by themselves."""
         return self.supervisor.stopped_by
 
     def watch(self, *, forever: bool = False) -> int:
-        """Watch the nodes until all, or a required one, have exited, or stop() was called; return the exit status.
+        """Watch the nodes until all nodes or a required one have exited, or stop() was called; return the exit status.
 
         ``forever``: continue even if no node is left.
         """
@@ -269,11 +274,11 @@ class Launcher:
         return 0
 
     def stop(self, why: str) -> None:
-        """Stop the run; may be called from any thread."""
+        """Stop the run. Thread-safe."""
         self.supervisor.stop(why)
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
-        """Report that a process on another machine has exited; may be called from any thread."""
+        """Report that a process on another machine has exited. Thread-safe."""
         self.supervisor.remote_ended(node, name, code)
 
     def _process_exited(self, process: Process) -> None:
@@ -329,7 +334,7 @@ class Launcher:
         return end_processes(processes, self._options.timeouts, self._output.warn)
 
     def _unregister(self, nodes: list[str]) -> None:
-        """Remove the registrations that nodes left, unless the master exits with them."""
+        """Remove the registrations that nodes left, unless the master exits together with the nodes."""
         if not self.supervisor.master:
             for node in nodes:
                 self._dead.add(node)
@@ -352,7 +357,7 @@ class Launcher:
 
 
 def _is_here(machine: MachineSpec) -> bool:
-    """Return whether a machine is this one, and its user the current one."""
+    """Return whether a machine is this one, with the current user."""
     if machine.user:
         import getpass
 

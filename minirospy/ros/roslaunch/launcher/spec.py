@@ -1,4 +1,4 @@
-"""The contents of launch files, with all substitutions made."""
+"""The contents of launch files, with all substitutions resolved."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class NodeSpec:
     """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` include those of the enclosing groups.
 
     ``name`` ends with a slash if a ``<test>`` has no name: its parameters are set in that namespace, and ``named()``
-    names it when
-    it runs. ``output`` and ``cwd`` are empty if the file does not set them, which means ``log`` and ``ROS_HOME``.
+    generates its name before it runs. ``output`` and ``cwd`` are empty if the file does not set them, which means ``log`` and
+    ``ROS_HOME``.
     """
 
     name: str
@@ -47,15 +47,15 @@ class NodeSpec:
         return self.name.rpartition("/")[0] + "/"
 
     def named(self) -> NodeSpec:
-        """Return the node with a name: a generated unique one if it has none."""
+        """Return the node with a name: if it has none, a generated unique one."""
         if self.base_name:
             return self
         base = "".join(c if c.isalnum() else "_" for c in self.type)
         return replace(self, name=f"{self.namespace}{anonymous_name(base)}")
 
     def to_xml(self) -> str:
-        """Return the equivalent ``<node>`` of a launch file, without its machine."""
-        # Imported here because it takes longer to import than all other modules of roslaunch together.
+        """Return the equivalent launch-file ``<node>``, without its machine."""
+        # Imported here because it takes longer to import than all other roslaunch modules together.
         from xml.sax.saxutils import quoteattr
 
         attributes = {
@@ -141,16 +141,16 @@ class LaunchSpec:
     warnings: list[LaunchError] = field(default_factory=list)
 
     def runnables(self) -> Iterator[NodeSpec]:
-        """Yield the nodes, then the nodes of tests."""
+        """Yield the nodes, then the tests' nodes."""
         yield from self.nodes
         yield from (test.node for test in self.tests)
 
     def named_runnables(self) -> Iterator[NodeSpec]:
-        """Yield the runnables that have a name before they run."""
+        """Yield the runnables that already have a name."""
         return (node for node in self.runnables() if node.base_name)
 
     def machine_of(self, node: NodeSpec) -> MachineSpec | None:
-        """Return the machine on which the node runs; None means this one. Raise LaunchError."""
+        """Return the machine on which the node runs; None means this one. Raise LaunchError if the machine is unknown."""
         name = node.machine
         if name in ("", "localhost"):
             return None

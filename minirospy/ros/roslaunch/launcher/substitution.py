@@ -26,18 +26,18 @@ _ONE = {
     "arg": "$(arg name) takes one arg",
     "anon": "$(anon name) takes one name",
 }
-_MAX_SUBSTITUTED = 64 * 1024 * 1024  # characters per load; args that repeat other args double the size
-_MAX_SHOWN = 200  # characters of a string that an error shows
+_MAX_SUBSTITUTED = 64 * 1024 * 1024  # characters per load; an arg that repeats other args doubles the size
+_MAX_SHOWN = 200  # characters shown of a string in an error message
 _VERBS = (*_ONE, "optenv", "dirname", "eval")
 
 
 class SubstitutionError(ValueError):
-    """A substitution that cannot be made; the message gives the reason."""
+    """A substitution cannot be resolved; the message gives the reason."""
 
 
 @dataclass
 class Substitution:
-    """The values for the substitutions of one file.
+    """The values for one file's substitutions.
 
     ``used``: every arg that was used, in any file. ``unset``: args that are declared without a value, with the error
     message for their use.
@@ -54,7 +54,10 @@ class Substitution:
     """The number of characters that substitutions have produced, in all files of a load."""
 
     def apply(self, text: str) -> str:
-        """Return ``text`` with every substitution made. Raise SubstitutionError, NotFoundError."""
+        """Return ``text`` with every substitution resolved.
+
+        Raise SubstitutionError if a substitution is invalid or has no value, NotFoundError if a package is not found.
+        """
         if "$(" not in text:
             return text
         whole = _EVAL.match(text)
@@ -115,7 +118,7 @@ class Substitution:
         return self.environ.get(name, " ".join(default))
 
     def _optenv_value(self, name: str, default: object = "") -> object:
-        """Return the value of ``optenv()`` in an expression: the variable, else the default, which may be a number."""
+        """Return the value of ``optenv()`` in an expression: the variable's value, else the default, which may be a number."""
         return self.environ.get(name, default)
 
     def _anon(self, name: str) -> str:
@@ -125,9 +128,9 @@ class Substitution:
         return str(Path(self.file).resolve().parent)
 
     def _eval(self, expression: str) -> str:
-        """Return the value of a Python expression as a string.
+        """Return a Python expression's value as a string. Raise SubstitutionError if it cannot be evaluated.
 
-        It runs any Python code, as ``<param command=...>`` runs any program.
+        The expression can run any Python code, as ``<param command=...>`` can run any program.
         """
         if "__" in expression:
             raise SubstitutionError("$(eval ...) may not contain double underscore expressions")
@@ -154,13 +157,13 @@ class Substitution:
 
 
 def _shown(text: str) -> str:
-    """Return a text for an error message: on one line, cut to ``_MAX_SHOWN`` characters."""
+    """Return a string for an error message: on one line, cut to ``_MAX_SHOWN`` characters."""
     text = " ".join(text[: _MAX_SHOWN + 1].split()) if "\n" in text else text
     return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}..."
 
 
 class _Names(dict[str, object]):
-    """The names in an expression: Python's and those of ``math``, then the args' values."""
+    """The names in an expression: Python's names and those from ``math``, then the args' values."""
 
     def __init__(self, substitution: Substitution, known: dict[str, object]) -> None:
         super().__init__(known)
@@ -173,7 +176,10 @@ class _Names(dict[str, object]):
 
 
 def convert(text: str, type_: str) -> object:
-    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml, or auto. Raise ValueError."""
+    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml, or auto.
+
+    Raise ValueError if the type is unknown or the text does not match it.
+    """
     kind = type_.lower()
     if kind in ("", "auto"):
         return _guess(text)

@@ -1,4 +1,4 @@
-"""Watches the processes of a launch, and restarts those with respawn, until the run is over."""
+"""Watches a launch's processes, and restarts those with respawn, until the run is over."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from minirospy.ros.roslaunch.launcher.watch import FileWatch
 
 __all__ = ["Supervisor"]
 
-_RESPAWN_SECONDS = 0.1  # shortest interval between two starts of a node that exits immediately
+_RESPAWN_SECONDS = 0.1  # minimum interval between two starts of a node that exits immediately
 
 _SLICE = 0.5
-"""Seconds. The main thread, where signals arrive, waits in slices: a signal just before the wait, and any signal on Windows,
-is noticed only after a slice. Changed files and processes on other machines are checked between slices.
+"""Seconds. The main thread, which receives signals, waits in slices: a signal just before a wait, and any signal on Windows,
+takes effect only after the slice. Changed files and processes on other machines are checked between slices.
 """
 
 _BAR = "=" * 80
@@ -41,29 +41,29 @@ class _RemoteExited(NamedTuple):
 
 
 class _Ended(NamedTuple):
-    """A process was ended by :meth:`Supervisor.end_process`."""
+    """A process was terminated by :meth:`Supervisor.end_process`."""
 
     process: Process
 
 
 class _Stop(NamedTuple):
-    """A signal, or a caller, stops the run."""
+    """A signal or a caller stops the run."""
 
     why: str
 
 
 class _NoMoreNodes(NamedTuple):
-    """No more nodes will be started: the run ends when the current ones have exited."""
+    """No more nodes will be started: the run is over when the current ones have exited."""
 
 
 _Event = _Exited | _Ended | _RemoteExited | _Stop | _NoMoreNodes
 
 
 class Supervisor:
-    """Watches processes. ``start(node, name)`` restarts one; ``on_exit(process)`` is called when one has exited.
+    """Watches processes. ``start(node, name)`` restarts a node; ``on_exit(process)`` is called when a process has exited.
 
     ``files`` detects nodes whose programs have changed, to restart them. ``is_remote_running()`` returns whether a process
-    on another machine runs. ``clock`` returns seconds.
+    on another machine is running. ``clock`` returns seconds.
     """
 
     def __init__(
@@ -89,17 +89,17 @@ class Supervisor:
         self._restarts: list[tuple[float, Process]] = []
 
         self.on_change: Callable[[], object] = lambda: None
-        """Called from any thread after a process has started, has exited, or is requested to exit."""
+        """Called in any thread after a process has started or exited, or after its exit was requested."""
         self.processes: list[Process] = []
-        """The started nodes that are watched, including those that wait for a restart."""
+        """The watched nodes that were started, including those pending a restart."""
         self.master: Process | None = None
         """The master, if this launch has started one."""
         self.stopped_by = ""
-        """The signal or caller of stop() that stopped the run; empty if the nodes exited by themselves."""
+        """The signal or stop() caller that stopped the run; empty if the nodes exited by themselves."""
 
     @property
     def is_anything_left(self) -> bool:
-        """Return whether a process runs or waits for a restart."""
+        """Return whether a process is running or pending a restart."""
         return bool(self.processes) or self.master is not None or self._is_remote_running()
 
     def add(self, process: Process) -> None:
@@ -126,7 +126,7 @@ class Supervisor:
         self._events.put(_Stop(why))
 
     def end_with_nodes(self) -> None:
-        """Make watch(forever=True) return after the last node."""
+        """Make watch(forever=True) return after the last node has exited."""
         self._events.put(_NoMoreNodes())
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
@@ -136,9 +136,9 @@ class Supervisor:
     # --- in the thread that runs the launch
 
     def watch(self, *, forever: bool = False) -> int | None:
-        """Watch until all processes, or a required one, have exited, or stop() was called.
+        """Watch until all processes or a required one have exited, or stop() was called.
 
-        Return the exit status; None if no process is left. ``forever``: continue even if no process is left.
+        Return the exit status, or None if no process is left. ``forever``: continue even if no process is left.
         """
         while forever or self.is_anything_left:
             event = self._next_event()
@@ -173,7 +173,7 @@ class Supervisor:
             raise KeyboardInterrupt
 
     def end_process(self, process: Process) -> None:
-        """Terminate one process and wait for its exit; it is restarted only if its file has changed."""
+        """Terminate one process and wait for its exit; restart it only if its file has changed."""
         process.is_ending = True
         self.on_change()
         end_processes([process], self._timeouts, self._output.warn)
@@ -191,7 +191,7 @@ class Supervisor:
         threading.Thread(target=wait, name=f"wait-{process.name}", daemon=True).start()
 
     def _next_event(self) -> _Event | None:
-        """Return the next event; None after a slice without events, when due restarts and changed files have been handled."""
+        """Return the next event, or None after a slice without events, when due restarts and changed files have been handled."""
         pauses = [_SLICE, *(max(0.0, when - self._clock()) for when, _ in self._restarts)]
         try:
             return self._events.get(timeout=min(pauses))
@@ -208,7 +208,7 @@ class Supervisor:
         return None
 
     def _exited(self, process: Process) -> int | None:
-        """React to the exit of a process; return an exit status if the run is over."""
+        """Handle a process's exit; return an exit status if the run is over."""
         self._on_exit(process)
         if process is self.master:
             self.master = None
@@ -252,14 +252,14 @@ class Supervisor:
         return 0 if event.code == 0 else 1
 
     def _forget_restart(self, process: Process) -> None:
-        """Stop watching a process that was terminated while it waited for a restart."""
+        """Stop watching a process that was terminated while it was pending a restart."""
         others = [each for each in self._restarts if each[1] is not process]
         if len(others) < len(self._restarts) and not process.is_restarting:
             self._restarts = others
             self.processes.remove(process)
 
     def _restart(self, process: Process) -> None:
-        """Restart an exited node, at its place in the list of processes."""
+        """Restart an exited node at the same position in the list of processes."""
         node = process.node
         assert node
         if process.is_ending and not process.is_restarting:

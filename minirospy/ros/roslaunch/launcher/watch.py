@@ -1,4 +1,4 @@
-"""Detect changed files of nodes, for `roslaunch --watch`."""
+"""Detect changes in nodes' files, for `roslaunch --watch`."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ __all__ = ["FileWatch"]
 
 
 class FileWatch:
-    """Checks a node's program, and the Python modules in ``src`` of its package."""
+    """Checks a node's program, and the Python modules in its package's ``src`` folder."""
 
     def __init__(self, packages: Packages) -> None:
         self._packages = packages
         self._seen: dict[str, dict[Path, int]] = {}
 
     def add(self, node: NodeSpec) -> None:
-        """Watch the files of a node from now on."""
+        """Watch a node's files from now on."""
         self._seen[node.name] = self._times(node)
 
     def changed(self, node: NodeSpec) -> Path | None:

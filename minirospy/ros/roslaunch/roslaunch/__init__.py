@@ -58,7 +58,7 @@ NAME = "roslaunch"
 
 
 def configure_logging(uuid: str) -> None:
-    """Accept ROS's call and do nothing: roslaunch always logs to roslaunch-HOST-PID.log in the folder of the run."""
+    """Accept ROS's call and do nothing: roslaunch always logs to roslaunch-HOST-PID.log in the run's folder."""
 
 
 def write_pid_file(options_pid_fn: str | None, options_core: bool, port: int | None) -> None:

@@ -1,4 +1,4 @@
-"""The classes of roslaunch.core and roslaunch.config, which give programs the content of launch files from a LaunchSpec.
+"""The classes of roslaunch.core and roslaunch.config, through which programs read launch files' content from a LaunchSpec.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """
@@ -84,7 +84,7 @@ class ROSLaunchConfig:
         self.master = m
 
     def assign_machines(self) -> None:
-        """Set each node's ``machine`` from its ``machine_name``. Raise RLException."""
+        """Set each node's ``machine`` from its ``machine_name``. Raise RLException if a machine is unknown."""
         spec = self.spec
         for node in (*self.nodes, *self.tests):
             try:
@@ -94,7 +94,7 @@ class ROSLaunchConfig:
             node.machine = self.machines[found.name if found else ""]
 
     def has_remote_nodes(self) -> bool:
-        """Return whether a node runs on another machine, as found by assign_machines()."""
+        """Return whether assign_machines() has assigned a node to another machine."""
         nodes = (*self.nodes, *self.tests)
         return any(node.machine is not None and not is_machine_local(node.machine) for node in nodes)
 
@@ -116,7 +116,7 @@ class ROSLaunchConfig:
         self.clear_params.append(param)
 
     def add_machine(self, m: Machine, verbose: bool = True) -> bool:
-        """Add a machine; return False if it was already added. Raise RLException if another has its name."""
+        """Add a machine; return False if it was already added. Raise RLException if a different machine has the same name."""
         if m.name not in self.machines:
             self.machines[m.name] = m
             return True
@@ -168,7 +168,7 @@ def load_config_default(
     assign_machines: bool = True,
     ignore_unset_args: bool = False,
 ) -> ROSLaunchConfig:
-    """Return the combined configuration of launch files and strings. Raise RLException."""
+    """Return the combined configuration from launch files and strings. Raise RLException if one is invalid."""
     config, loader = ROSLaunchConfig(), loader or XmlLoader()
     if port:
         environment = Environment.read()
@@ -189,12 +189,12 @@ def load_config_default(
 
 
 def get_roscore_filename() -> str | None:
-    """Return the launch file of the master's own nodes: always None, as there are none."""
+    """Return the launch file for the master's own nodes: always None, because there are no such nodes."""
     return None
 
 
 def _as_read(value: object) -> object:
-    """Return a parameter's value as programs see it: a file's content becomes an xmlrpc.client.Binary."""
+    """Return a parameter's value as programs receive it: a file's content becomes an xmlrpc.client.Binary."""
     if not isinstance(value, bytes):
         return value
     from xmlrpc.client import Binary

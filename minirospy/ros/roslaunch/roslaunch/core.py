@@ -52,7 +52,7 @@ TEST_TIME_LIMIT_DEFAULT = 60  # seconds, for a <test> without a time limit
 
 
 class RLException(Exception):
-    """roslaunch failed."""
+    """A launch failed."""
 
 
 class Master:
@@ -71,11 +71,11 @@ class Master:
         return Environment.read()._replace(master_uri=self.uri)
 
     def get_host(self) -> str:
-        """Return the host of the URI. Raise ValueError if it is not a URL."""
+        """Return the URI's host. Raise ValueError if the URI is not a URL."""
         return _host_and_port(self.uri)[0]
 
     def get_port(self) -> int:
-        """Return the port of the URI; 80 if it has none. Raise ValueError if it is not a URL."""
+        """Return the URI's port, or 80 if it has none. Raise ValueError if the URI is not a URL."""
         return _host_and_port(self.uri)[1]
 
     def get(self) -> ServerProxy:
@@ -91,7 +91,7 @@ class Master:
         return MultiCall(self.get())
 
     def is_running(self) -> bool:
-        """Return whether the master answers."""
+        """Return whether the master responds."""
         with contextlib.closing(MasterProxy(self.uri, "/roslaunch")) as proxy:
             return proxy.is_online()
 
@@ -120,7 +120,7 @@ class Param:
 
 
 class Machine:
-    """A machine that nodes run on."""
+    """A machine that runs nodes."""
 
     def __init__(
         self,
@@ -160,7 +160,7 @@ class Machine:
         )
 
     def config_equals(self, m2: object) -> bool:
-        """Return whether another machine has the same address and setup, whatever its name."""
+        """Return whether another machine has the same address and setup, regardless of its name."""
         return isinstance(m2, Machine) and self.config_key() == m2.config_key()
 
     def __eq__(self, other: object) -> bool:
@@ -269,7 +269,7 @@ class Node:
         return "node"
 
     def xmlattrs(self) -> list[tuple[str, object]]:
-        """Return (name, value) of the tag's attributes; None for unset ones."""
+        """Return (name, value) for each of the tag's attributes; the value is None for unset ones."""
         return [
             *self._placed(),
             ("respawn", self.respawn),
@@ -363,7 +363,7 @@ class Test(Node):
         return "test"
 
     def xmlattrs(self) -> list[tuple[str, object]]:
-        """Return (name, value) of the tag's attributes, with retry and time-limit if they are not the default."""
+        """Return (name, value) for each of the tag's attributes, with retry and time-limit if they differ from the default."""
         attributes = [*self._placed(), *self._named(), ("test-name", self.test_name)]
         if self.retry:
             attributes.append(("retry", str(self.retry)))
@@ -415,12 +415,12 @@ def add_printerrlog_handler(h: Callable[[str], object]) -> None:
 
 
 def clear_printlog_handlers() -> None:
-    """Remove the functions of add_printlog_handler()."""
+    """Remove the functions that add_printlog_handler() added."""
     _clear(errors=False)
 
 
 def clear_printerrlog_handlers() -> None:
-    """Remove the functions of add_printerrlog_handler()."""
+    """Remove the functions that add_printerrlog_handler() added."""
     _clear(errors=True)
 
 
@@ -437,7 +437,7 @@ def get_master_uri_env() -> str:
 def setup_env(
     node: Node | None, machine: Machine, master_uri: str, env: Mapping[str, str] | None = None
 ) -> dict[str, str]:
-    """Return the environment of a node's process, based on ``env`` (default: this process's)."""
+    """Return the environment for a node's process, based on ``env`` (default: this process's environment)."""
     environment = Environment.read()._replace(master_uri=master_uri)
     return node_environment((node or Node("p", "t", "n")).spec, environment, env)
 

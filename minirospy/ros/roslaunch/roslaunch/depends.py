@@ -52,7 +52,7 @@ def roslaunch_deps(
 ) -> tuple[str | None, dict[str, RoslaunchDeps], dict[str, set[str]]]:
     """Return the first file's package, each file's dependencies, and, by package, those that its package.xml does not declare.
 
-    Raise RoslaunchDepsException.
+    Raise RoslaunchDepsException if a file or package.xml is invalid.
     """
     try:
         needs = file_needs(files, chosen_packages())

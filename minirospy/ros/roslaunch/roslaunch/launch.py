@@ -50,7 +50,7 @@ class RLTestTimeoutException(RLException):
 
 
 class ROSLaunchRunner:
-    """Runs a configuration in the background. Errors are RLException."""
+    """Runs a configuration in the background. Its methods raise RLException on an error."""
 
     def __init__(
         self,
@@ -97,7 +97,7 @@ class ROSLaunchRunner:
     def launch(self) -> tuple[list[str], list[str]]:
         """Start everything; return the names of the started processes and of the nodes that failed to start.
 
-        Raise RLException.
+        Raise RLException if the master or the parameters fail.
         """
         monitor = self._monitor()
         replacement_of("roslaunch.pmon", "_init_signal_handlers", init_signal_handlers)()
@@ -115,7 +115,10 @@ class ROSLaunchRunner:
         return [str(process) for process in monitor.procs], [node.base_name for node in self._launcher.failed]
 
     def launch_node(self, node: Node, core: bool = False) -> tuple[Process | str, bool]:
-        """Start another node: return (its process, True), or (its name, False) if that fails. Raise RLException."""
+        """Start another node: return (its process, True), or (its name, False) if it fails to start.
+
+        Raise RLException after a shutdown.
+        """
         if self._monitor().done:
             raise RLException(f"cannot add process [{node.name}] after process monitor has been shut down")
         node.give_name()
@@ -123,10 +126,10 @@ class ROSLaunchRunner:
         return (self._launcher.known[process.name], True) if process else (node.name or "", False)
 
     def run_test(self, test: Test) -> bool:
-        """Start a test and wait until it exits; return whether its status is 0.
+        """Start a test and wait until it exits; return whether its exit status is 0.
 
-        Raise RLTestTimeoutException if it exceeds its time limit, after it was terminated; RLException if
-        it cannot be started.
+        Raise RLTestTimeoutException after terminating a test that exceeds its time limit, RLException if the test cannot
+        be started.
         """
         process, has_started = self.launch_node(test)
         if not has_started or isinstance(process, str):
@@ -141,7 +144,7 @@ class ROSLaunchRunner:
         return process.exit_code == 0
 
     def is_node_running(self, node: Node) -> bool:
-        """Return whether a node was started by this runner and still runs."""
+        """Return whether this runner has started a node that is still running."""
         name = node.spec.name
         return any(
             each.node and each.node.name == name and each.is_running for each in self._launcher.processes
@@ -152,7 +155,7 @@ class ROSLaunchRunner:
         self._launcher.listeners.append(l)
 
     def spin(self) -> None:
-        """Wait until all nodes have exited or a signal arrives; then terminate the rest. Return immediately without nodes."""
+        """Wait until all nodes have exited or a signal arrives; then terminate the rest. Without nodes, return immediately."""
         monitor = self._monitor()
         try:
             if self._launcher.supervisor.is_anything_left:
@@ -166,7 +169,7 @@ class ROSLaunchRunner:
             self.stop()
 
     def spin_once(self) -> bool:
-        """Return whether the run continues; handles signals that have arrived."""
+        """Return whether the run continues; handles pending signals."""
         return self.pm is not None and self.pm.mainthread_spin_once()
 
     def stop(self) -> None:
@@ -192,7 +195,7 @@ class ROSLaunchRunner:
         return self.pm
 
     def _load_parameters(self) -> None:
-        """Set only the parameters. Raise RLException."""
+        """Set only the parameters. Raise RLException if one cannot be set."""
         try:
             self._launcher.set_parameters()
         except (MinirospyError, RpcError) as error:
@@ -209,7 +212,7 @@ def master_options(timeout: float | None, logger_level: str | bool) -> tuple[str
 def replacement_of(module: str, name: str, ours: Function) -> Function:
     """Return the program's replacement for a function in roslaunch's modules, else the original.
 
-    Programs disable roslaunch's signal handlers in this way (``roslaunch.pmon._init_signal_handlers = ...``).
+    For example, programs disable roslaunch's signal handlers with ``roslaunch.pmon._init_signal_handlers = ...``.
     """
     function: Function = getattr(sys.modules.get(module), name, ours)
     return function

@@ -17,5 +17,8 @@ __all__ = ["LoadException", "Param", "RLException", "XmlParseException", "conver
 
 
 def convert_value(value: str, type_: str) -> object:
-    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml, or auto. Raise ValueError."""
+    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml, or auto.
+
+    Raise ValueError if the type is unknown or the text does not match it.
+    """
     return substitution.convert(value, type_)

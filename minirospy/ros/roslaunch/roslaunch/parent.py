@@ -22,7 +22,7 @@ __all__ = ["RLException", "ROSLaunchParent", "load_config_default"]
 
 
 class ROSLaunchParent:
-    """Runs launch files (paths, or paths with arguments) in the background. Errors are RLException."""
+    """Runs launch files (paths, or paths with arguments) in the background. Its methods raise RLException on an error."""
 
     def __init__(
         self,
@@ -71,7 +71,7 @@ class ROSLaunchParent:
         self._timeouts = Timeouts(sigint_timeout, sigterm_timeout)
 
     def start(self, auto_terminate: bool = True) -> None:
-        """Start everything; return when all nodes were started. Raise RLException.
+        """Start everything; return when all nodes have been started. Raise RLException if that fails.
 
         Without ``auto_terminate``, the run continues after the last node has exited.
         """
@@ -101,7 +101,7 @@ class ROSLaunchParent:
             self.runner.spin()
 
     def spin_once(self) -> bool:
-        """Return whether the run continues; handles signals that have arrived."""
+        """Return whether the run continues; handles pending signals."""
         return self.runner is not None and self.runner.spin_once()
 
     def shutdown(self) -> None:

@@ -1,4 +1,4 @@
-"""Processes that a program launches: the classes of roslaunch.pmon and roslaunch.nodeprocess, over a Launcher.
+"""Processes that a program launches: the classes of roslaunch.pmon and roslaunch.nodeprocess, based on a Launcher.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """
@@ -49,7 +49,7 @@ class ProcessListener:
 
 
 class ApiLauncher(Launcher):
-    """A launcher that notifies listeners and keeps a Process for each node that it started."""
+    """A launcher that notifies listeners and stores a Process for each node that it started."""
 
     def __init__(
         self, spec: LaunchSpec, environment: Environment, options: RunOptions | None = None, run_id: str = ""
@@ -60,16 +60,16 @@ class ApiLauncher(Launcher):
         self.known: dict[str, Process] = {}
 
     def command(self, node: NodeSpec) -> list[str]:
-        """Return the command of a node. Raise LaunchError."""
+        """Return a node's command. Raise LaunchError if it cannot be built."""
         return node_command(node, self._packages)
 
     def variables(self, node: NodeSpec) -> dict[str, str]:
-        """Return the environment variables of a node's process."""
+        """Return the environment variables for a node's process."""
         return node_environment(node, self._environment)
 
     @property
     def log_folder(self) -> str:
-        """The folder of the nodes' log files."""
+        """The folder for the nodes' log files."""
         return str(self._master.log_folder)
 
     def _start_process(self, node: NodeSpec, name: str) -> processes.Process:
@@ -86,7 +86,7 @@ class ApiLauncher(Launcher):
 
 
 class Process:
-    """A node's process: running, or created by create_node_process() and waiting for start()."""
+    """A node's process: running, or created by create_node_process() and not started yet."""
 
     def __init__(self, launcher: ApiLauncher, node: NodeSpec, name: str) -> None:
         self.name = name
@@ -100,19 +100,19 @@ class Process:
         self.log_dir = launcher.log_folder
         self._launcher = launcher
         self._node = node
-        self.process: processes.Process | None = None  # the process of the last start
+        self.process: processes.Process | None = None  # the most recently started process
 
     def __str__(self) -> str:
         return f"Process<{self.name}>"
 
     @property
     def started(self) -> bool:
-        """Return whether it was ever started."""
+        """Return whether the process was ever started."""
         return self.process is not None
 
     @property
     def stopped(self) -> bool:
-        """Return whether its termination was requested."""
+        """Return whether the process's termination was requested."""
         return self.process is not None and self.process.is_ending
 
     @property
@@ -137,20 +137,20 @@ class Process:
 
     @property
     def spawn_count(self) -> int:
-        """Return how often the process was started."""
+        """Return how many times the process was started."""
         return self.process.starts if self.process else 0
 
     @property
     def exit_code(self) -> int | None:
-        """The exit status; None while the process runs."""
+        """The exit status; None while the process is running."""
         return self.process.exit_code if self.process else None
 
     def is_alive(self) -> bool:
-        """Return whether the process runs. As in ROS, a process that was not started yet counts as alive."""
+        """Return whether the process is running. As in ROS, a process that was not started yet counts as alive."""
         return self.process is None or self.process.is_running
 
     def start(self) -> bool:
-        """Start the process, or restart it after its exit; return whether it runs."""
+        """Start the process, or restart it after its exit; return whether it is running."""
         before = self.process
         if before and before.is_running:
             return True
@@ -162,12 +162,12 @@ class Process:
         return True
 
     def stop(self, errors: list[str] | None = None) -> None:
-        """Terminate the process and wait for its exit; it is not restarted."""
+        """Terminate the process and wait for its exit; do not restart it."""
         if self.process:
             self._launcher.supervisor.end_process(self.process)
 
     def get_info(self) -> dict[str, object]:
-        """Return the process id, exit status and other facts."""
+        """Return the process's id, exit status and other details."""
         keys = [
             "package",
             "name",
@@ -204,7 +204,7 @@ class ProcessMonitor:
     """The processes of a launch."""
 
     _living: ClassVar[weakref.WeakSet[ProcessMonitor]] = weakref.WeakSet()
-    """The monitors whose processes a signal terminates."""
+    """The monitors whose processes are terminated by a signal."""
 
     def __init__(self, launcher: ApiLauncher) -> None:
         self._launcher = launcher
@@ -239,7 +239,7 @@ class ProcessMonitor:
         return [process.name for process in self.procs]
 
     def get_process_names_with_spawn_count(self) -> list[list[tuple[str, int]]]:
-        """Return the names of the watched and of the exited processes, each with its number of starts."""
+        """Return the names of the watched and of the exited processes, each with the number of times that it was started."""
         return [[(each.name, each.spawn_count) for each in some] for some in (self.procs, self.dead_list)]
 
     def has_process(self, name: str) -> bool:
@@ -260,13 +260,13 @@ class ProcessMonitor:
         return process is not None
 
     def register(self, p: Process) -> None:
-        """Watch a process of create_node_process(); call this before its start()."""
+        """Watch a process from create_node_process(); call this before the process's start()."""
         if self.done:
             raise RLException(f"cannot add process [{p.name}] after process monitor has been shut down")
         p.register(self._launcher)
 
     def registrations_complete(self) -> None:
-        """Let the monitor stop after the last process, as no more will be registered."""
+        """Let the monitor stop after the last process, because no more processes will be registered."""
         self._launcher.supervisor.end_with_nodes()
 
     def add_process_listener(self, l: ProcessListener) -> None:
@@ -285,7 +285,7 @@ class ProcessMonitor:
             finally:
                 self.close()
 
-        # If the program is killed, so is this thread; then the guardian terminates the nodes.
+        # If the program is killed, this thread stops too; then the guardian terminates the nodes.
         self._thread = threading.Thread(target=watch, name="roslaunch", daemon=True)
         self.is_watching = True
         self._thread.start()
@@ -300,7 +300,7 @@ class ProcessMonitor:
         return self.is_watching and not self.done
 
     def join(self, timeout: float | None = None) -> None:
-        """Wait up to ``timeout`` seconds until all processes have exited. Returns immediately in a listener's thread."""
+        """Wait up to ``timeout`` seconds until all processes have exited. Return immediately if called in a listener's thread."""
         if threading.current_thread() is self._thread:
             return
         end = math.inf if timeout is None else time.monotonic() + timeout
@@ -313,7 +313,7 @@ class ProcessMonitor:
         self.join()
 
     def mainthread_spin_once(self) -> bool:
-        """Return whether the monitor is still watching; handles signals that have arrived."""
+        """Return whether the monitor is still watching; handles pending signals."""
         return not self._ended.wait(0.01)
 
     def shutdown(self) -> None:
@@ -327,14 +327,14 @@ class ProcessMonitor:
 
 
 def start_process_monitor() -> ProcessMonitor:
-    """Return a monitor for processes of create_node_process()."""
+    """Return a monitor for processes from create_node_process()."""
     monitor = ProcessMonitor(ApiLauncher(LaunchSpec(), Environment.read()))
     monitor.watch()
     return monitor
 
 
 def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
-    """Terminate all processes of a monitor and wait for their exit; return whether there was a monitor."""
+    """Terminate all of a monitor's processes and wait for their exit; return whether there was a monitor."""
     if process_monitor is None:
         return False
     process_monitor.shutdown()
@@ -367,7 +367,7 @@ def pmon_shutdown() -> None:
 
 
 class _Handler:
-    """A signal handler that stops all that this program launched, and then calls the previous handler."""
+    """A signal handler that stops everything that this program launched, and then calls the previous handler."""
 
     def __init__(self, number: signal.Signals) -> None:
         self._before = signal.getsignal(number)
@@ -381,7 +381,7 @@ class _Handler:
 
 
 def init_signal_handlers() -> None:
-    """Make SIGINT, SIGTERM and SIGHUP also terminate all launched processes; only in the main thread."""
+    """Make SIGINT, SIGTERM and SIGHUP also terminate all launched processes; works only in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         return
     numbers: Sequence[signal.Signals | None] = [
@@ -396,5 +396,5 @@ _init_signal_handlers = init_signal_handlers
 
 
 def rl_signal(sig: int, stackframe: FrameType | None) -> None:
-    """Handle a signal: stop all that this program launched."""
+    """Handle a signal: stop everything that this program launched."""
     pmon_shutdown()

@@ -1,4 +1,4 @@
-"""roslaunch.remote: programs import it, though ROSLaunchParent alone starts other machines' nodes."""
+"""roslaunch.remote: importable for compatibility; only ROSLaunchParent starts nodes on other machines."""
 
 from minirospy.ros.roslaunch.roslaunch.core import RLException, is_machine_local
 

@@ -30,17 +30,17 @@ __all__ = [
 
 
 def check_log_disk_usage() -> None:
-    """Warn if the log folder has more than a gigabyte."""
+    """Warn if the log folder exceeds one gigabyte."""
     warn_of_large_logs(Environment.read().log_dir, Output())
 
 
 def check_roslaunch(f: str, use_test_depends: bool = False, ignore_unset_args: bool = False) -> str | None:
-    """Return the errors of a launch file, including missing programs, one per line; None if there are none."""
+    """Return a launch file's errors, including missing programs, one per line; None if there are none."""
     return "\n".join(map(str, faults_of(f, chosen_packages(), ignore_unset_args=ignore_unset_args))) or None
 
 
 def print_file_list(roslaunch_files: Sequence[LaunchFile]) -> None:
-    """Print the files that launch files read."""
+    """Print the files that are read when launch files are loaded."""
     print("\n".join(load_config_default(roslaunch_files, None).roslaunch_files))
 
 
@@ -55,7 +55,7 @@ def update_terminal_name(ros_master_uri: str) -> None:
 
 
 def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: bool) -> str:
-    """Return the run id: the given one, the master's, or a new one if no master answers."""
+    """Return the run id: the given one, the master's, or a new one if no master responds."""
     if options_runid:
         return options_runid
     master = MasterProxy(Environment.read().master_uri, "/roslaunch")
@@ -68,7 +68,10 @@ def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: boo
 
 
 def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
-    """Return the paths of the launch files that a command line (package and file, or files) names. Raise RLException."""
+    """Return the paths of the launch files that a command line (package and file, or files) names.
+
+    Raise RLException if a file is not found.
+    """
     try:
         return find_files([word for word in args if ":=" not in word], chosen_packages())
     except MinirospyError as error:
@@ -76,7 +79,7 @@ def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
 
 
 def _wait_for_master() -> None:
-    """Wait until the master of the environment answers."""
+    """Wait until the environment's master responds."""
     master = LaunchMaster(Environment.read(), Output(), time.sleep)
     try:
         if not master.is_online():

@@ -13,7 +13,7 @@ __all__ = ["Master", "Node", "RLException", "ROSLaunch"]
 
 
 class ROSLaunch:
-    """Starts nodes one by one: ``start()``, ``launch(Node(...))``, ``stop()``. Errors are RLException."""
+    """Starts nodes one by one: ``start()``, ``launch(Node(...))``, ``stop()``. Its methods raise RLException on an error."""
 
     def __init__(self) -> None:
         self.parent = ROSLaunchParent(get_or_generate_uuid(None, True), [])

@@ -1,7 +1,7 @@
 """roslaunch.substitution_args: `$(find ...)` and the other substitution arguments, one by one.
 
-Programs that parse launch files themselves also use the single steps: they collect the arguments of a string, resolve
-some kinds of them, or set ``_rospack`` so that ``$(find ...)`` searches other folders. Source:
+Programs that parse launch files themselves also call the single steps: they collect a string's arguments, resolve
+some kinds of arguments, or set ``_rospack`` so that ``$(find ...)`` searches other folders. Source:
 http://wiki.ros.org/roslaunch/XML#substitution_args.
 """
 
@@ -58,13 +58,13 @@ Context: TypeAlias = dict[str, dict[str, str]]
 """The values of args and anonymous names, under the keys ``arg`` and ``anon``; ``filename`` is the launch file."""
 
 Command: TypeAlias = Callable[[str, str, list[str], Context], str]
-"""Resolves one kind of argument: (text, the argument in it, its words, context) -> text."""
+"""Resolves one kind of argument: (text, the argument in the text, the argument's words, context) -> text."""
 
 _VALID = ["find", "env", "optenv", "dirname", "anon", "arg"]
 _MODULE = "roslaunch.substitution_args"
 
 _rospack: RosPack | None = None
-"""Finds the packages of ``$(find ...)``. Programs set it in ``_MODULE``, the module that they import."""
+"""Finds the packages for ``$(find ...)``. Programs set it in ``_MODULE``, the module that they import."""
 
 
 class SubstitutionException(Exception):
@@ -72,7 +72,7 @@ class SubstitutionException(Exception):
 
 
 class ArgException(SubstitutionException):
-    """An arg that is not set."""
+    """An arg is not set."""
 
 
 def resolve_args(
@@ -81,10 +81,10 @@ def resolve_args(
     resolve_anon: bool = True,
     filename: str | None = None,
 ) -> str:
-    """Return a string with its substitution arguments resolved; ``context`` may have the args as ``{"arg": {name: value}}``.
+    """Return a string with its substitution arguments resolved; ``context`` may contain args as ``{"arg": {name: value}}``.
 
-    Raise SubstitutionException, ArgException if an arg is not set, rospkg.ResourceNotFound if a package is not found,
-    and any exception that the expression of an ``$(eval ...)`` raises.
+    Raise SubstitutionException if an argument is invalid, ArgException if an arg is not set, rospkg.ResourceNotFound if a
+    package is not found, and any exception that the expression in an ``$(eval ...)`` raises.
     """
     context = {} if context is None else context
     if filename:
@@ -107,13 +107,16 @@ def resolve_args(
 
 
 def chosen_packages() -> Packages:
-    """Return the packages that ``$(find ...)`` searches: those of ``_rospack`` if a program has set it, else all."""
+    """Return the packages that ``$(find ...)`` searches: those of ``_rospack`` if a program has set it, else all packages."""
     rospack = getattr(sys.modules.get(_MODULE), "_rospack", None)
     return Packages() if rospack is None else Packages.below(*map(Path, rospack.get_ros_paths()))
 
 
 def _resolve_args(arg_str: str, context: Context, resolve_anon: bool, commands: Mapping[str, Command]) -> str:
-    """Resolve the substitution arguments of the kinds in ``commands``; return the string. Raise SubstitutionException."""
+    """Resolve the substitution arguments of the kinds in ``commands``; return the string.
+
+    Raise SubstitutionException if an argument is invalid.
+    """
     resolved = arg_str
     for each in _collect_args(arg_str):
         verb, *words = [word for word in each.split(" ") if word] or [""]
@@ -125,7 +128,10 @@ def _resolve_args(arg_str: str, context: Context, resolve_anon: bool, commands: 
 
 
 def _collect_args(arg_str: str) -> list[str]:
-    """Return the substitution arguments of a string, without ``$(`` and ``)``. Raise SubstitutionException."""
+    """Return a string's substitution arguments, without ``$(`` and ``)``.
+
+    Raise SubstitutionException if the syntax is invalid.
+    """
     found = []
     for match in re.finditer(r"\$\(([^)]*)(\)?)", arg_str):
         inside, is_closed = match.groups()
@@ -216,7 +222,7 @@ def _eval_find(pkg: str) -> str:
 
 
 def _find(resolved: str, a: str, args: list[str], context: Context) -> str:
-    """Resolve ``$(find PKG)``; a path after it becomes the package's program or file of that name, if there is one."""
+    """Resolve ``$(find PKG)``; replace a path after it with the package's program or file of that name, if there is one."""
     if len(args) != 1:
         raise SubstitutionException(f"$(find pkg) command only accepts one argument [{a}]")
     before, after = _split_command(resolved, a)
@@ -292,7 +298,7 @@ _eval_dict: dict[str, object] = {
     "optenv": _eval_optenv,
     "find": _eval_find,
 }
-"""The names in an ``$(eval ...)``, besides its args."""
+"""The names available in an ``$(eval ...)``, in addition to its args."""
 
 
 class _DictWrapper:
@@ -307,7 +313,10 @@ class _DictWrapper:
 
 
 def _eval(s: str, context: Context) -> str:
-    """Return the value of a Python expression as a string. Raise SubstitutionException, or any exception of the expression."""
+    """Return a Python expression's value as a string.
+
+    Raise SubstitutionException if the expression contains a double underscore, or any exception that the expression raises.
+    """
     anons, args = context.setdefault("anon", {}), context.setdefault("arg", {})
     functions: dict[str, object] = {
         "anon": lambda id: _eval_anon(id, anons),

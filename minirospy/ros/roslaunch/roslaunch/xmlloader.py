@@ -30,7 +30,7 @@ __all__ = [
 
 
 class XmlParseException(RLException):
-    """A launch file does not load."""
+    """A launch file cannot be loaded."""
 
 
 class Configuration(Protocol):
@@ -56,13 +56,13 @@ class XmlLoader:
         argv: Sequence[str] | None = None,
         verbose: bool = True,
     ) -> None:
-        """Load a file, its args given as ``["name:=value", ...]``. Raise XmlParseException."""
+        """Load a file, with its args as ``["name:=value", ...]``. Raise XmlParseException if it is invalid."""
         self._load(LaunchSource(filename, None, names.parse_launch_arguments(argv or ())), ros_config)
 
     def load_string(
         self, xml_text: str, ros_config: Configuration, core: bool = False, verbose: bool = True
     ) -> None:
-        """Load a launch file given as a string. Raise XmlParseException."""
+        """Load a launch file given as a string. Raise XmlParseException if it is invalid."""
         self._load(LaunchSource(STDIN, xml_text.encode(), {}), ros_config)
 
     def _load(self, source: LaunchSource, config: Configuration) -> None:

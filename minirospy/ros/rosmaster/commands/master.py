@@ -41,7 +41,7 @@ __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 _LOG_BYTES = 10 * 1024 * 1024
 
 _ANSWER_SECONDS = 4.0
-"""Seconds within which a master answers on a busy machine. One that recovers for longer holds its journal's lock."""
+"""Seconds for a master to respond on a busy machine. A master that needs longer to recover holds its journal's lock."""
 
 
 class _Options(NamedTuple):
@@ -75,7 +75,7 @@ class _MasterParser(Parser):
     """Ignores the remapping arguments that a launch file may add."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raise CommandLineError."""
+        """Return the arguments by name. Raise CommandLineError if they are invalid."""
         return super().parse(split_assignments(words)[0])
 
 
@@ -189,7 +189,7 @@ def _master(
     if not timeout > 0:
         raise Misuse("the timeout is more than 0 seconds")
     if not all(each.strip(" ,") for each in allow):
-        # An empty value may come from an unset variable; it must not open the master to every address.
+        # An empty value may come from an unset variable; it must not give every address access to the master.
         raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
 
     if environment.local:
@@ -205,7 +205,7 @@ def _master(
 
 
 def _environment(*, local: bool) -> Environment:
-    """Return the environment of a master; only the port of a remote ROS_MASTER_URI is used."""
+    """Return a master's environment; only the port of a remote ROS_MASTER_URI is used."""
     environ = dict(os.environ)
     local = is_local(environ) or local
     environ.pop("MINIROSPY_LOCAL", None)
@@ -214,7 +214,7 @@ def _environment(*, local: bool) -> Environment:
 
 
 def _warn_of_contradictions(environment: Environment, allow: Sequence[str], *, local: bool) -> None:
-    """Warn, in one line, of options and variables for other machines, which have no effect on a local master."""
+    """Warn, in one line, about options and variables for other machines, which have no effect on a local master."""
     asked = ["--allow"] if allow else []
     asked += [f"{name}={os.environ[name]}" for name in ("MINIROSPY_ALLOW",) if os.environ.get(name)]
     for name in ("ROS_HOSTNAME", "ROS_IP"):
@@ -263,7 +263,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         _announce(master, where, log_file, quiet=options.quiet)
         _warn_of_host(environment)
         if not options.quiet and name != "rosmaster":
-            # In a thread, so that an unreachable name server does not delay the start.
+            # Check in a thread, so that an unreachable name server does not delay the start.
             threading.Thread(target=_warn_of_uri, args=(environment, master), daemon=True).start()
 
         rosout = None
@@ -275,7 +275,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         await _run(master, stop, rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
-        # Remove the file while this master still has the port: afterwards it may belong to the next master.
+        # Remove the file while this master still owns the port: afterwards the file may belong to the next master.
         with contextlib.suppress(OSError):
             pid_file.unlink(missing_ok=True)
         await master.close(keep_journal=keep)
@@ -286,7 +286,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
 
 
 def _announce(master: Master, where: Sequence[str], log_file: Path | None, *, quiet: bool) -> None:
-    """Print and log the master's URI, the state that it recovered, and the path of its log."""
+    """Print and log the master's URI, the recovered state, and the path of its log."""
     listening, *warnings = where
     if not quiet:
         logs = f"log file {log_file}" if log_file else "no log file"
@@ -327,7 +327,7 @@ async def _run(
 
 
 def _status(environment: Environment, port: int) -> int:
-    """Print one line about the running master; for ROS's rosmaster, from the answers of its API."""
+    """Print one line about the running master; for ROS's rosmaster, from its API's responses."""
     host = environment.master_address[0]
     uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     master = MasterProxy(uri, "/master_status")
@@ -361,7 +361,7 @@ def _span(seconds: float) -> str:
 
 
 def _warn_of_host(environment: Environment) -> None:
-    """Warn if no node can reach ROS_IP: usually it is an address in another network."""
+    """Warn if no node can reach ROS_IP: it is usually an address in another network."""
     why = wrong_address(environment)
     if why:
         warn(f"{why} (`minirospy doctor` shows more)")
@@ -380,7 +380,7 @@ def _warn_of_uri(environment: Environment, master: Master) -> None:
 
 
 def _most_clients() -> int:
-    """Raise the limit of open files; return the number of clients that it allows, with a reserve for other files."""
+    """Raise the open-file limit; return the number of clients that it allows, with a reserve for other files."""
     if sys.platform == "win32":
         return 400
     import resource
@@ -405,7 +405,7 @@ def _stop_event() -> asyncio.Event:
         try:
             loop.add_signal_handler(number, stop.set)
         except NotImplementedError:
-            # On Windows the handler runs in the main thread, which is also the loop's, when the loop next wakes up.
+            # On Windows the handler runs in the main thread, which also runs the loop, when the loop next wakes up.
             signal.signal(number, lambda *_: loop.call_soon_threadsafe(stop.set))
     if sys.platform == "win32":
         _keep_waking(loop)
@@ -413,7 +413,7 @@ def _stop_event() -> asyncio.Event:
 
 
 def _keep_waking(loop: asyncio.AbstractEventLoop) -> None:
-    """Wake the loop twice a second: on Windows Ctrl-C does not interrupt a select."""
+    """Wake the loop twice a second, because on Windows Ctrl-C does not interrupt a select."""
     loop.call_later(0.5, _keep_waking, loop)
 
 
@@ -440,7 +440,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
                 f"port {port} is taken by another program{late if isinstance(failure, RpcTimeout) else ''}: "
                 f"choose one with `{name} -p PORT`"
             )
-        # The master is running, as it still holds its journal's lock.
+        # The master is running, because its journal is still locked.
         silence = (
             f"; it{f' (pid {pid})' if pid else ''} does not answer: it is suspended, or reads a large journal"
         )
@@ -451,7 +451,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
 
 
 def _holder(path: Path) -> int | None:
-    """Return the pid of the master that has locked a journal: 0 if the pid is unknown, None if no master has."""
+    """Return the pid of the master that has locked a journal: 0 if the pid is unknown, None if the journal is not locked."""
     from minirospy.runtime.master.journal import Journal, JournalBusyError
 
     if not path.with_name(path.name + ".lock").exists():
@@ -482,16 +482,16 @@ class _Shown(logging.Handler):
 def _show(line: str) -> None:
     """Print a line; a closed stdout (`roscore -v | head`) must not stop the master."""
     with contextlib.suppress(OSError):
-        # A single write, because the warning about ROS_MASTER_URI comes from a thread.
+        # Use a single write, because a thread prints the warning about ROS_MASTER_URI.
         print(f"{line}\n", end="", flush=True)
 
 
 def _log_to_file(
     folder: Path, *, verbose: bool, level: str | None
 ) -> tuple[Path | None, Callable[[str], object]]:
-    """Log to ``folder``/master.log; ``latest`` next to the folder links to it where links are supported.
+    """Log to ``folder``/master.log; ``latest`` next to the folder links to it if links are supported.
 
-    Return the file, and the function that logs registrations. If the file cannot be written, the master runs without it.
+    Return the file, and the function that logs registrations. If the file cannot be written, the master runs without a log.
     """
     path = folder / "master.log"
     logger = logging.getLogger("minirospy")

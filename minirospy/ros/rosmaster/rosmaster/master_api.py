@@ -1,6 +1,6 @@
 """rosmaster.master_api: the Master API as an object with one method per call, for programs to serve or call.
 
-The answers are those of ``core/graph/master_api.py``. Nodes are notified from a thread of this object.
+The responses are those of ``core/graph/master_api.py``. A thread of this object notifies nodes.
 Source: http://wiki.ros.org/ROS/Master_API.
 """
 
@@ -29,7 +29,7 @@ _CALLER_ID = "/master"
 
 
 class _Api(MasterApi):
-    """The tables and their answers; notifications for nodes are put into ``notices``."""
+    """The tables and their responses; notifications for nodes are put into ``notices``."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -55,7 +55,7 @@ class _Api(MasterApi):
         self.notices.put(None)
 
     def get_status(self, caller_id: str) -> Answer:
-        """Refuse the call, which only minirospy's own master answers."""
+        """Refuse the call, which only minirospy's own master supports."""
         return [ERROR, "not a call of the Master API", 0]
 
 
@@ -118,5 +118,5 @@ class ROSMasterHandler:
 
 
 def _value(tree: ParameterTree, key: str) -> object:
-    """Return the value that a node is notified of: {} if the parameter is not set."""
+    """Return the value in a node's notification: {} if the parameter is not set."""
     return tree.get(key) if tree.has(key) else {}

@@ -1,4 +1,4 @@
-"""rosmaster.paramserver: the tree of parameters.
+"""rosmaster.paramserver: the parameter tree.
 
 Keys are global names. A notify task is called with a list of ([(node, API)], key, value), one for each change.
 """
@@ -17,7 +17,7 @@ Notify = Callable[[list[tuple[list[tuple[str, str]], str, object]]], object]
 
 
 class ParamDictionary:
-    """Parameters and their subscribers. ``reg_manager``, rosmaster's table of nodes, has no effect here."""
+    """Parameters and their subscribers. ``reg_manager``, rosmaster's node table, has no effect here."""
 
     def __init__(self, reg_manager: object = None) -> None:
         self._tree = ParameterTree()
@@ -34,7 +34,7 @@ class ParamDictionary:
         return self._tree.search(ns, key)
 
     def get_param(self, key: str) -> object:
-        """Return a parameter's value, or a namespace as a dictionary. Raise KeyError."""
+        """Return a parameter's value, or a namespace as a dictionary. Raise KeyError if neither is set."""
         return self._tree.get(key)
 
     def has_param(self, key: str) -> bool:
@@ -50,7 +50,7 @@ class ParamDictionary:
         self._notify(self._tree.set(key, value, caller_id or ""), notify_task)
 
     def delete_param(self, key: str, notify_task: Notify | None = None) -> None:
-        """Delete a parameter or a namespace. Raise KeyError."""
+        """Delete a parameter or a namespace. Raise KeyError if neither is set."""
         if key == "/":
             raise KeyError("cannot delete root of parameter tree")
         self._notify(self._tree.delete(key), notify_task)
@@ -62,7 +62,7 @@ class ParamDictionary:
         return self._tree.subscribe(key, caller_id, uri)
 
     def unsubscribe_param(self, key: str, unregistration_args: tuple[str, str]) -> tuple[int, str, int]:
-        """Unsubscribe (node, API); return the answer of the Master API."""
+        """Unsubscribe (node, API); return the Master API's response."""
         caller_id, uri = unregistration_args
         shown = key if key.endswith("/") else f"{key}/"
         if self._tree.unsubscribe(key, caller_id, uri):

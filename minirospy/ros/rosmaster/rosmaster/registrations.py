@@ -1,7 +1,7 @@
-"""rosmaster.registrations: tables of what nodes have registered, for programs that implement a master.
+"""rosmaster.registrations: tables of nodes' registrations, for programs that implement a master.
 
 A table maps a topic, service or parameter to the (name, API) of its nodes. Not thread-safe.
-Source: http://wiki.ros.org/ROS/Master_API for the answers of ``unregister``.
+Source: http://wiki.ros.org/ROS/Master_API for the responses of ``unregister``.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class Pool(Protocol):
     """The part of a MarkedThreadPool that a manager uses."""
 
     def queue_task(self, marker: object, task: Callable[..., object], args: tuple[object, ...]) -> object:
-        """Call ``task(*args)`` in a thread; tasks with the same marker run one after the other."""
+        """Call ``task(*args)`` in a thread; tasks with the same marker run one after another."""
 
 
 class Registrations:
-    """One table: the subscribers or publishers of topics, the services, or the subscribers of parameters."""
+    """One table: topic subscribers, topic publishers, services, or parameter subscribers."""
 
     TOPIC_SUBSCRIPTIONS, TOPIC_PUBLICATIONS, SERVICE, PARAM_SUBSCRIPTIONS = 1, 2, 3, 4
 
@@ -52,15 +52,15 @@ class Registrations:
         return key in self.map
 
     def iterkeys(self) -> KeysView[str]:
-        """Return the names."""
+        """Return the registered names."""
         return self.map.keys()
 
     def get_apis(self, key: str) -> list[str | None]:
-        """Return the APIs of a name's nodes."""
+        """Return the APIs of the nodes registered for a name."""
         return [api for _, api in self[key]]
 
     def get_service_api(self, service: str) -> str | None:
-        """Return the address of a service; None if it is not registered."""
+        """Return a service's address, or None if it is not registered."""
         return (self.service_api_map or {}).get(service, ("", None))[1]
 
     def get_state(self) -> list[list[object]]:
@@ -70,7 +70,7 @@ class Registrations:
     def register(
         self, key: str, caller_id: str, caller_api: str | None, service_api: str | None = None
     ) -> None:
-        """Add a node. A new service provider replaces the old one. Raise InternalException for a service without an address."""
+        """Add a node. A new service provider replaces the old one. Raise InternalException if a service has no address."""
         node = (caller_id, caller_api)
         nodes = self.map.get(key)
         if nodes is None or service_api:
@@ -95,7 +95,7 @@ class Registrations:
     def unregister(
         self, key: str, caller_id: str, caller_api: str | None, service_api: str | None = None
     ) -> Answer:
-        """Remove a node from a name; return the answer of the Master API, whose value is the number of removed nodes."""
+        """Remove a node from a name; return the Master API's response, whose value is the number of removed nodes."""
         done = f"Unregistered [{caller_id}] as provider of [{key}]"
         if service_api:
             if self.service_api_map is None:
@@ -156,7 +156,7 @@ class NodeRef:
 
 
 def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
-    """Request a node to shut down; ignore a node that does not answer, as it has exited."""
+    """Request that a node shut down; ignore a node that does not respond, because it has exited."""
     with contextlib.suppress(OSError, Error):
         if node := xmlrpcapi(api):
             node.shutdown("/master", f"[{caller_id}] Reason: {reason}")
@@ -164,7 +164,7 @@ def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
 
 
 class RegistrationManager:
-    """A master's tables and nodes. If a node registers with a new API, the old node of that name is shut down."""
+    """A master's tables and nodes. If a node registers with a new API, the old node with that name is shut down."""
 
     def __init__(self, thread_pool: Pool) -> None:
         self.nodes: dict[str, NodeRef] = {}
@@ -175,11 +175,11 @@ class RegistrationManager:
         self.param_subscribers = Registrations(Registrations.PARAM_SUBSCRIPTIONS)
 
     def get_node(self, caller_id: str) -> NodeRef | None:
-        """Return a node; None if it has no registrations."""
+        """Return a node, or None if it has no registrations."""
         return self.nodes.get(caller_id)
 
     def reverse_lookup(self, caller_api: str) -> list[NodeRef] | None:
-        """Return the nodes with this API; None if there are none."""
+        """Return the nodes with this API, or None if there are none."""
         return [node for node in self.nodes.values() if node.api == caller_api] or None
 
     def register_service(self, service: str, caller_id: str, caller_api: str, service_api: str) -> None:
@@ -195,7 +195,7 @@ class RegistrationManager:
         self._register(self.subscribers, topic, caller_id, caller_api)
 
     def register_param_subscriber(self, param: str, caller_id: str, caller_api: str) -> None:
-        """Register a subscriber of a parameter."""
+        """Register a parameter subscriber."""
         self._register(self.param_subscribers, param, caller_id, caller_api)
 
     def unregister_service(self, service: str, caller_id: str, service_api: str) -> Answer:
@@ -211,7 +211,7 @@ class RegistrationManager:
         return self._unregister(self.subscribers, topic, caller_id, caller_api)
 
     def unregister_param_subscriber(self, param: str, caller_id: str, caller_api: str) -> Answer:
-        """Remove a subscriber of a parameter."""
+        """Remove a parameter subscriber."""
         return self._unregister(self.param_subscribers, param, caller_id, caller_api)
 
     def _register(

@@ -18,7 +18,7 @@ class _Task(NamedTuple):
 
 
 class MarkedThreadPool:
-    """Runs tasks in daemon threads, in order; the marker is a node, so a slow node occupies only one thread."""
+    """Runs tasks in daemon threads, in order; the marker is a node, so that a slow node occupies only one thread."""
 
     def __init__(self, numThreads: int) -> None:
         self._changed = threading.Condition()
@@ -57,7 +57,7 @@ class MarkedThreadPool:
             return True
 
     def join_all(self, wait_for_tasks: bool = True, wait_for_threads: bool = True) -> None:
-        """Stop the threads, after the queued tasks if requested; the pool can be used again afterwards."""
+        """Stop the threads, after the queued tasks if requested; the pool can be reused afterwards."""
         with self._changed:
             self._is_joining = True
             while wait_for_tasks and self._tasks and self._threads:
@@ -88,11 +88,11 @@ class MarkedThreadPool:
                 if task.on_result:
                     task.on_result(result)
             except Exception:
-                # The caller's task may raise anything.
+                # The caller's task may raise any exception.
                 logging.getLogger("rosmaster.threadpool").exception("a task failed")
 
     def _next(self) -> _Task | None:
-        """Return the first task whose marker is not in use; None if this thread has to exit."""
+        """Return the first task whose marker is not in use, or None if this thread has to exit."""
         with self._changed:
             while threading.current_thread() in self._threads:
                 for task in self._tasks:

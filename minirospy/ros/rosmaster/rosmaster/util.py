@@ -1,4 +1,4 @@
-"""rosmaster.util: proxies of XML-RPC servers, one per thread and URI."""
+"""rosmaster.util: XML-RPC server proxies, one per thread and URI."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PROXIES = _Proxies()
 
 
 def xmlrpcapi(uri: str | None) -> ServerProxy | None:
-    """Return the proxy for a URI; None if it has no host. Raise OSError if it is not an http URI."""
+    """Return the proxy for a URI, or None if the URI has no host. Raise OSError if it is not an http URI."""
     if uri is None or not urlparse(uri).netloc:
         return None
     if uri not in _PROXIES.by_uri:
@@ -27,5 +27,5 @@ def xmlrpcapi(uri: str | None) -> ServerProxy | None:
 
 
 def remove_server_proxy(uri: str) -> None:
-    """Remove the proxy for a URI whose server has exited."""
+    """Remove the proxy for a URI; call this when its server has exited."""
     _PROXIES.by_uri.pop(uri, None)

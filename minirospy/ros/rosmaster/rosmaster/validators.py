@@ -1,4 +1,4 @@
-"""rosmaster.validators: checks of the arguments of master calls.
+"""rosmaster.validators: checks for the arguments of master calls.
 
 Each function returns a check ``(value, caller_id) -> value``, which raises ParameterInvalid with rosmaster's messages.
 """
@@ -94,12 +94,12 @@ def global_name(param_name: str) -> Check:
 
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return the resolved name. Raise ParameterInvalid if it is not a valid name."""
+    """Return the resolved name. Raise ParameterInvalid if the value is not a valid name."""
     return resolve_name(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return the name unchanged. Raise ParameterInvalid if it is not a valid name."""
+    """Return the name unchanged. Raise ParameterInvalid if the value is not a valid name."""
     name = _text(param_name, param_value)
     if ":" in name or " " in name:
         raise ParameterInvalid(f"ERROR: parameter [{param_name}] contains illegal chars")
@@ -127,7 +127,7 @@ def is_service(param_name: str) -> Check:
 
 
 def is_api(paramName: str) -> Check:
-    """Require the URI of a node's or a service's API."""
+    """Require the URI of a node or service API."""
 
     def check(value: object, caller_id: str) -> object:
         if not value or not isinstance(value, str):

@@ -1,4 +1,4 @@
-"""The part of `import rospy` besides `minirospy.client`: rospy's submodules, which programs reach into."""
+"""The part of `import rospy` in addition to `minirospy.client`: rospy's submodules, which programs access directly."""
 
 from typing import TYPE_CHECKING
 

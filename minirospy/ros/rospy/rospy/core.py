@@ -1,4 +1,4 @@
-"""rospy.core: the life cycle of a node, in addition to the names of `minirospy.client`.
+"""rospy.core: the node life cycle, in addition to the names of `minirospy.client`.
 
 Source: the behaviour of rospy.core; its internal log functions write to the log file only.
 """
@@ -133,7 +133,7 @@ def _base_logger(
 ) -> None:
     """Log with the position of the caller's caller, as rospy's log functions do; programs wrap it in the same way.
 
-    ``level`` is a method of logging.Logger (``warning``), ``kwargs`` may have ``logger_name``.
+    ``level`` is a logging.Logger method name (``warning``), ``kwargs`` may contain ``logger_name``.
     """
     logger = logger_of(kwargs.pop("logger_name", None))  # type: ignore[typeddict-item]
     number = _LEVELS[level]
@@ -161,13 +161,16 @@ def is_shutdown_requested() -> bool:
 
 
 def add_preshutdown_hook(h: Callable[[object], object]) -> None:
-    """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false. Raise TypeError."""
+    """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false.
+
+    Raise TypeError if ``h`` is not callable.
+    """
     lifecycle = current_session().lifecycle
     lifecycle.add_hook(_given_reason(h), lifecycle.late_hooks)
 
 
 def add_shutdown_hook(h: Callable[[object], object]) -> None:
-    """Call ``h(reason)`` after is_shutdown() has become true. Raise TypeError."""
+    """Call ``h(reason)`` after is_shutdown() has become true. Raise TypeError if ``h`` is not callable."""
     lifecycle = current_session().lifecycle
     lifecycle.add_hook(_given_reason(h), lifecycle.interrupts)
 
@@ -178,7 +181,7 @@ def add_client_shutdown_hook(h: Callable[[], object]) -> None:
 
 
 def register_signals() -> None:
-    """Make SIGINT and SIGTERM shut the node down, as init_node does; in the main thread only."""
+    """Make SIGINT and SIGTERM shut the node down, as init_node does; works only in the main thread."""
     current_session().signals.install()
 
 
@@ -191,7 +194,7 @@ def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -
 
 
 def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
-    """Return (host, port) of a service's ``rosrpc://host:port``. Raise ParameterInvalid."""
+    """Return the (host, port) in a service's ``rosrpc://host:port``. Raise ParameterInvalid if the URI is invalid."""
     if not uri.startswith(ROSRPC):
         raise ParameterInvalid(f"Invalid protocol for ROS service URL: {uri}")
     try:
@@ -202,12 +205,12 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 
 
 def is_topic(param_name: str) -> Validator:
-    """Return a check that the argument ``param_name`` is a topic name. The check raises ParameterInvalid."""
+    """Return a check that the argument ``param_name`` is a topic name. The check raises ParameterInvalid if it is not."""
     return valid_name(param_name)
 
 
 def _given_reason(h: Callable[[object], object]) -> Callable[[], object]:
-    """Wrap ``h`` as a hook without an argument, for the lifecycle. Raise TypeError."""
+    """Wrap ``h`` as a hook without an argument, for the lifecycle. Raise TypeError if ``h`` is not callable."""
     if not callable(h):
         raise TypeError(f"shutdown hook [{h}] must be a function or callable object: {type(h)}")
     lifecycle = current_session().lifecycle

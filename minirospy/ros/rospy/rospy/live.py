@@ -32,7 +32,7 @@ _Put = Callable[[Any], object]
 def _install(module: ModuleType, **names: tuple[_Get, _Put]) -> None:
     """Add attributes to ``module``; each has a function that returns the value, and one that sets it.
 
-    Deleting an attribute restores the previous value, which is how unittest.mock ends a patch.
+    Deleting an attribute restores its previous value, because unittest.mock ends a patch in this way.
     """
 
     def attribute(get: _Get, put: _Put) -> property:

@@ -1,4 +1,4 @@
-"""rospy.logger_level_service_caller: gets and sets the levels of other nodes' loggers.
+"""rospy.logger_level_service_caller: reads and sets the levels of other nodes' loggers.
 
 Source: the behaviour of rospy's class, which rqt_logger_level and programs that silence noisy nodes use.
 """
@@ -19,7 +19,7 @@ class ROSConsoleException(Exception):
 
 
 class LoggerLevelServiceCaller:
-    """Gets and sets the levels of other nodes' loggers."""
+    """Reads and sets the levels of other nodes' loggers."""
 
     def __init__(self) -> None:
         self._current_loggers: list[str] = []
@@ -30,12 +30,15 @@ class LoggerLevelServiceCaller:
         return ["debug", "info", "warn", "error", "fatal"]
 
     def get_node_names(self) -> list[str]:
-        """Return the nodes that have a service for levels."""
+        """Return the nodes that offer the logger-level services."""
         names = rosservice.get_service_list()
         return sorted(name.removesuffix(_SET) for name in names if name.endswith(_SET))
 
     def get_loggers(self, node: str) -> list[str]:
-        """Return the names of a node's loggers, and cache their levels. Raise ROSConsoleException."""
+        """Return the names of a node's loggers, and cache their levels.
+
+        Raise ROSConsoleException if the node does not respond.
+        """
         try:
             _, response = rosservice.call_service(_service(node, _GET), [])
         except rosservice.ROSServiceException as error:
@@ -49,7 +52,7 @@ class LoggerLevelServiceCaller:
     def send_logger_change_message(self, node: str, logger: str, level: str) -> bool:
         """Set a level; return False if it was already set according to get_loggers().
 
-        Raise rosservice.ROSServiceException.
+        Raise rosservice.ROSServiceException if the call fails.
         """
         if self._current_levels.get(logger) == level:
             return False

@@ -19,7 +19,7 @@ _LENGTH = struct.Struct("<I")
 
 
 def serialize_message(b: BytesIO, seq: int, msg: Message) -> None:
-    """Write ``msg`` with its length to ``b``. A header gets ``seq``, and an empty frame_id if it was "0"."""
+    """Write ``msg`` with its length to ``b``. Set the header's ``seq``, and clear its frame_id if that was "0"."""
     number_header(msg, seq)
     start = b.tell()
     b.write(b"\0\0\0\0")
@@ -38,10 +38,10 @@ def deserialize_messages(
     max_msgs: int | None = None,
     start: int = 0,
 ) -> None:
-    """Move the complete messages of ``b``, from ``start`` to its position, to ``msg_queue``.
+    """Move the complete messages in ``b``, from ``start`` to its position, to ``msg_queue``.
 
-    Move at most ``max_msgs``; keep only the newest ``queue_size``. An incomplete message moves to the
-    front of ``b``. Raise DeserializationError.
+    Move at most ``max_msgs``; keep only the newest ``queue_size``. An incomplete message is moved to the
+    front of ``b``. Raise DeserializationError if a message is invalid.
     """
     data, position, count = b.getvalue()[: b.tell()], start, 0
     while (max_msgs is None or count < max_msgs) and len(data) - position >= 4:

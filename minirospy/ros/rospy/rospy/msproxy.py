@@ -42,8 +42,8 @@ _NAMES_FIRST = frozenset(
 class ServerProxy:
     """An XML-RPC server: each attribute is one of its methods.
 
-    As in xmlrpc.client, an unreachable server raises OSError (ConnectionRefusedError, TimeoutError),
-    and its faults raise xmlrpc.client.Fault. Thread-safe.
+    As in xmlrpc.client, calls raise OSError (ConnectionRefusedError, TimeoutError) if the server is unreachable, and
+    xmlrpc.client.Fault if the server returns a fault. Thread-safe.
     """
 
     def __init__(self, uri: str) -> None:
@@ -72,9 +72,9 @@ class ServerProxy:
 
 
 class MasterProxy:
-    """The master at ``uri``: passes this node's name as first argument, resolves names, and returns unchanged results.
+    """The master at ``uri``: passes this node's name as the first argument, resolves names, and returns unchanged results.
 
-    These are ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``.
+    Results are ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``.
     ``proxy[key]``, ``proxy[key] = value``, ``del proxy[key]`` (KeyError), ``key in proxy`` and iteration
     access the parameters. Errors: see :class:`ServerProxy`.
     """
@@ -116,30 +116,30 @@ class MasterProxy:
         return iter(value if code == 1 else [])
 
     def search_param(self, key: str) -> str | None:
-        """Return the closest parameter of this name, searched upwards from this node's namespace; None if there is none."""
+        """Return the closest parameter with this name, searched upwards from this node's namespace, or None if there is none."""
         check_sendable(key)
         code, _, value = self.target.searchParam(current_session().name, key)
         return value if code == 1 else None
 
     def get_param_cached(self, key: str) -> Any:
-        """Return a parameter's value from this node's cache. Raise KeyError."""
+        """Return a parameter's value from this node's cache. Raise KeyError if it is not set."""
         return get_param_cached(key)
 
 
 def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
-    """Return the master of this node, or of the ROS_MASTER_URI in ``env`` if that is not os.environ."""
+    """Return this node's master, or the one at the ROS_MASTER_URI in ``env`` if that is not os.environ."""
     uri = env.get("ROS_MASTER_URI") if isinstance(env, dict) else None
     return _master(uri or current_session().identity.environment.master_uri, os.getpid())
 
 
 def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:
-    """Return the XML-RPC server at ``uri``, always the same object for a URI; None if ``uri`` is invalid."""
+    """Return the XML-RPC server at ``uri``, always the same object for a URI, or None if ``uri`` is invalid."""
     if not uri or not uri.startswith(("http://", "rosrpc://")):
         return None
     return _server(uri, os.getpid()) if cache else ServerProxy(uri)
 
 
-# Cached per process: a forked child must not use its parent's connections.
+# Cache it per process: a forked child must not use its parent's connections.
 @functools.cache
 def _master(uri: str, pid: int) -> MasterProxy:
     return MasterProxy(uri)

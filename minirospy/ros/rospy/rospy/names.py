@@ -87,7 +87,7 @@ class ParameterInvalid(Exception):
 
 
 def get_mappings() -> dict[str, str]:
-    """Return the remappings of this node's command line as written, including ``__name`` and other special keys."""
+    """Return the remappings on this node's command line as written, including ``__name`` and other special keys."""
     arguments = current_session().identity.arguments
     return {**arguments.remappings, **arguments.special}
 
@@ -105,7 +105,7 @@ def reload_mappings(argv: Sequence[str]) -> None:
 
 
 def initialize_mappings(node_name: str) -> None:
-    """Resolve the remappings again, for the node name ``node_name``."""
+    """Resolve the remappings again, with the node name ``node_name``."""
     identity = current_session().identity
     identity.remappings = identity.arguments.resolved_remappings(node_name)
 
@@ -125,7 +125,7 @@ def scoped_name(caller_id: str, name: str) -> str:
 
 
 def global_name(param_name: str) -> Validator:
-    """Return a check that the argument ``param_name`` is a global name. The check raises ParameterInvalid."""
+    """Return a check that the argument ``param_name`` is a global name. The check raises ParameterInvalid if it is not."""
 
     def validator(param_value: object, caller_id: str) -> str:
         text = _text(param_name, param_value)
@@ -137,18 +137,21 @@ def global_name(param_name: str) -> Validator:
 
 
 def valid_name(param_name: str, resolve: bool = True) -> Validator:
-    """Return a check that the argument ``param_name`` is a valid name, and resolves it. The check raises ParameterInvalid."""
+    """Return a check that the argument ``param_name`` is a valid name, and resolves it.
+
+    The check raises ParameterInvalid if the name is invalid.
+    """
     check = valid_name_validator_resolved if resolve else valid_name_validator_unresolved
     return lambda param_value, caller_id: check(param_name, param_value, caller_id)
 
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return the global name of an argument, not remapped. Raise ParameterInvalid."""
+    """Return an argument's global name, not remapped. Raise ParameterInvalid if it is not a valid name."""
     return resolve_name_for(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return an argument unchanged if it is a valid name. Raise ParameterInvalid."""
+    """Return an argument unchanged. Raise ParameterInvalid if it is not a valid name."""
     text = _text(param_name, param_value)
     if ":" in text or " " in text:
         raise ParameterInvalid(f"ERROR: parameter [{param_name}] contains illegal chars")

@@ -1,6 +1,6 @@
 """Names that rospy's modules re-export by accident, because ROS's modules import each other with a star.
 
-Programs that use `rospy.core.resolve_name` find it; an editor lists only the names that a module defines.
+A program that uses `rospy.core.resolve_name` finds that name; an editor lists only the names that a module defines.
 """
 
 from __future__ import annotations

@@ -26,7 +26,10 @@ __all__ = [
 
 
 def wallsleep(duration: float) -> None:
-    """Sleep for ``duration`` seconds of wall-clock time, even if the node's time is simulated. Raise ValueError if negative."""
+    """Sleep for ``duration`` seconds of wall-clock time, even if the node's time is simulated.
+
+    Raise ValueError if ``duration`` is negative.
+    """
     time.sleep(duration)
 
 
@@ -64,6 +67,6 @@ def switch_to_wallclock() -> None:
     session = current_session()
     before, session.clock = session.clock, WallClock()
     if isinstance(before, SimulatedClock):
-        # Wake the threads that sleep on the previous clock.
+        # Wake the threads that are sleeping on the previous clock.
         before.set(session.clock.now())
     session.has_time = True

@@ -1,9 +1,8 @@
 """SerialClient: represents a device on a serial port or connection as part of this node.
 
-The device describes its topics and services; afterwards messages pass in both directions. It can request the time and
-parameters,
-and its log messages appear as the node's. Source: http://wiki.ros.org/rosserial/Overview/Protocol,
-http://wiki.ros.org/rosserial_python.
+The device describes its topics and services; afterwards messages pass in both directions. The device can request the time
+and parameters, and its log messages appear as the node's log messages. Source:
+http://wiki.ros.org/rosserial/Overview/Protocol, http://wiki.ros.org/rosserial_python.
 """
 
 from __future__ import annotations
@@ -61,11 +60,11 @@ _VERSIONS = {
 }
 _OPEN_SECONDS = 3.0
 _READY_SECONDS = 0.1
-_BOOT_SECONDS = 2.0  # seconds to boot: an Arduino restarts when its port is opened
+_BOOT_SECONDS = 2.0  # seconds for a device to boot: an Arduino restarts when its port is opened
 
 
 class SerialClient:
-    """A device. ``port``: a port's name, or an object with ``read``, ``write`` and ``inWaiting``."""
+    """A device. ``port``: a port name, or an object with ``read``, ``write`` and ``inWaiting``."""
 
     header = b"\xff"
     protocol_ver1 = b"\xff"
@@ -136,7 +135,7 @@ class SerialClient:
     # --- the line
 
     def run(self) -> None:
-        """Forward messages until the node is shut down. Raise PortError if the connection breaks."""
+        """Forward messages until the node is shut down. Raise PortError if the connection is lost."""
         if self.port is None:
             return
         self._writer = threading.Thread(target=self._write_all, args=(self.port,), daemon=True)
@@ -186,7 +185,7 @@ class SerialClient:
         self._to_write.put(encode(TopicInfo.ID_PUBLISHER, b""))
 
     def txStopRequest(self) -> None:
-        """Request the device to stop sending."""
+        """Request that the device stop sending."""
         self._to_write.put(encode(TopicInfo.ID_TX_STOP, b""))
         rospy.loginfo("Sending tx stop request")
 
@@ -289,7 +288,7 @@ class SerialClient:
             info = _info(data)
             known = self.subscribers.get(info.topic_name)
             if known is None:
-                # Set before the first message arrives.
+                # Set the size before the first message arrives.
                 self.setSubscribeSize(info.buffer_size)
                 self.subscribers[info.topic_name] = Subscriber(info, self.send)
                 rospy.loginfo("Setup subscriber on %s [%s]", info.topic_name, info.message_type)
@@ -313,19 +312,19 @@ class SerialClient:
         self._set_up_half(data, ServiceServer, "server", from_device=True)
 
     def setupServiceServerSubscriber(self, data: bytes) -> None:
-        """Register the topic on which requests go to the device's service."""
+        """Register the topic on which the device receives its service's requests."""
         self._set_up_half(data, ServiceServer, "server", from_device=False)
 
     def setupServiceClientPublisher(self, data: bytes) -> None:
-        """Register the topic on which the device sends requests of its service calls."""
+        """Register the topic on which the device sends the requests of its service calls."""
         self._set_up_half(data, ServiceClient, "client", from_device=True)
 
     def setupServiceClientSubscriber(self, data: bytes) -> None:
-        """Register the topic on which responses to the device's service calls go to it."""
+        """Register the topic on which the device receives the responses to its service calls."""
         self._set_up_half(data, ServiceClient, "client", from_device=False)
 
     def _set_up_half(self, data: bytes, kind: type[_Service], name: str, *, from_device: bool) -> None:
-        """Register one direction of a service's calls: from the device, or to it."""
+        """Register one direction of a service's calls: from the device, or to the device."""
         with _Creation(f"service {name}"):
             info = _info(data)
             (self.setPublishSize if from_device else self.setSubscribeSize)(info.buffer_size)
@@ -349,7 +348,7 @@ class SerialClient:
         return known
 
     def handleTimeRequest(self, data: bytes) -> None:
-        """Send the time to the device, whose request also serves as a heartbeat."""
+        """Send the time to the device; the device's request also serves as a heartbeat."""
         self.send(TopicInfo.ID_TIME, to_bytes(Time(rospy.Time.now())))
         self.lastsync = rospy.Time.now()
         self._synced_at = time.monotonic()
@@ -414,7 +413,7 @@ def _info(data: bytes) -> TopicInfo:
 
 
 class _Creation:
-    """Logs why a topic or service that a device describes cannot be created, and suppresses the error."""
+    """A context manager that logs why a topic or service cannot be created, and suppresses the error."""
 
     def __init__(self, what: str) -> None:
         self._what = what

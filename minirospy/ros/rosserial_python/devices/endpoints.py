@@ -1,4 +1,4 @@
-"""The topics and services that a device describes: each becomes a publisher, subscriber, service or proxy of the node."""
+"""The topics and services that a device describes: each becomes a publisher, subscriber, service or proxy in the node."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _compare(ours: str, theirs: str) -> None:
 
 
 class Publisher:
-    """Forwards messages from the device to ROS. Raise EndpointError."""
+    """Forwards messages from the device to ROS. Raise EndpointError if the type is not installed or differs."""
 
     def __init__(self, info: TopicInfo) -> None:
         self.topic = info.topic_name
@@ -68,7 +68,7 @@ class Publisher:
 
 
 class Subscriber:
-    """Forwards messages from ROS to the device. Raise EndpointError."""
+    """Forwards messages from ROS to the device. Raise EndpointError if the type is not installed or differs."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self.topic = info.topic_name
@@ -89,7 +89,10 @@ class Subscriber:
 
 
 class _Service:
-    """A service's classes, and the id of the topic on which the device receives its part of a call. Raise EndpointError."""
+    """A service's classes, and the id of the topic on which the device receives its part of a call.
+
+    Raise EndpointError if the service type is not installed.
+    """
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self.topic = info.topic_name
@@ -152,7 +155,7 @@ class ServiceServer(_Service):
 
 
 class ServiceClient(_Service):
-    """Service calls from the device, made in a thread, so that its other topics are not blocked."""
+    """Service calls from the device, made in a thread, so that the device's other topics are not blocked."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         super().__init__(info, send)
@@ -175,7 +178,7 @@ class ServiceClient(_Service):
             except rospy.ROSInterruptException:
                 return
             except rospy.ROSException as error:
-                # The device waits until its own timeout.
+                # Send nothing: the device waits until its own timeout.
                 rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)
             except rospy.ServiceException as error:
                 rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)

@@ -1,7 +1,7 @@
 """Encode and decode the packets on a serial line. Pure. Source: http://wiki.ros.org/rosserial/Overview/Protocol.
 
-A packet: ff fe, length (2 bytes, little endian), checksum of the length, topic id (2 bytes), data, checksum of id and data. A
-checksum makes the sum of what it covers 255 modulo 256.
+A packet: ff fe, length (2 bytes, little endian), checksum of the length, topic id (2 bytes), data, checksum of id and data.
+Each checksum is chosen so that its sum with the bytes that it covers is 255 modulo 256.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ class Packet(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """A rejected packet: the error, in the words of the real rosserial_python."""
+    """A rejected packet: the error, in the wording of the real rosserial_python."""
 
     text: str
 
 
 class WrongVersion(NamedTuple):
-    """The second byte belongs to another version of the protocol, or the data is not a packet."""
+    """The second byte belongs to another protocol version, or the data is not a packet."""
 
     byte: int
 
@@ -65,17 +65,17 @@ class Decoder:
 
     @property
     def missing(self) -> int:
-        """The number of bytes that the current packet lacks; 0 between packets."""
+        """The number of bytes that are missing from the current packet; 0 between packets."""
         return self._needed() - len(self._bytes) if self._bytes else 0
 
     @property
     def received(self) -> int:
-        """The number of bytes of the current packet that have arrived."""
+        """The number of received bytes in the current packet."""
         return len(self._bytes)
 
     @property
     def step(self) -> str:
-        """The part of a packet that is read next, in the words of the real rosserial_python."""
+        """The part of a packet that is read next, in the wording of the real rosserial_python."""
         count = len(self._bytes)
         for end, name in ((1, "syncflag"), (2, "protocol"), (5, "message length"), (7, "topic id")):
             if count < end:
@@ -101,7 +101,7 @@ class Decoder:
                 yield found
 
     def _needed(self) -> int:
-        """Return the number of bytes that are needed for the next decision."""
+        """Return the number of bytes that the decoder needs for its next step."""
         if len(self._bytes) < 2 or self._bytes[1] != _VERSION:
             return 2
         if len(self._bytes) < 5 or not self._has_right_length():

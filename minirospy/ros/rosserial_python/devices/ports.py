@@ -1,4 +1,4 @@
-"""The connections to a device: serial ports (through pyserial), sockets, and file-like objects of the user's program."""
+"""The connections to a device: serial ports (through pyserial), sockets, and file-like objects from the user's program."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ _CHUNK = 4096
 
 
 class PortError(MinirospyError):
-    """A connection cannot be opened, or has broken; one line with the reason."""
+    """A connection cannot be opened, or was lost; the message is one line with the reason."""
 
 
 class Port(Protocol):
     """A connection to a device."""
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the connection has broken."""
+        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the connection is lost."""
 
     def write(self, data: bytes) -> None:
-        """Write all bytes. Raise PortError."""
+        """Write all bytes. Raise PortError if the connection is lost."""
 
     def flush_input(self) -> None:
-        """Discard the bytes that have arrived and are not read."""
+        """Discard the received bytes that have not been read."""
 
     def close(self) -> None:
         """Close the connection."""
@@ -39,7 +39,7 @@ class Port(Protocol):
 
 @runtime_checkable
 class File(Protocol):
-    """A file-like object of the program: ``read`` blocks until it has ``count`` bytes. ``flushInput`` is optional."""
+    """The program's file-like object: ``read`` blocks until it has ``count`` bytes. ``flushInput`` is optional."""
 
     def read(self, count: int, /) -> bytes:
         """Return bytes from the device."""
@@ -76,7 +76,7 @@ class SerialPort:
             raise PortError(str(error)) from error
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the connection has broken."""
+        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the connection is lost."""
         try:
             first = bytes(self._serial.read(1))
             waiting = self._serial.in_waiting if first else 0
@@ -85,14 +85,14 @@ class SerialPort:
             raise PortError(f"Serial Port read failure: {error}") from error
 
     def write(self, data: bytes) -> None:
-        """Write all bytes. Raise PortError."""
+        """Write all bytes. Raise PortError if the connection is lost."""
         try:
             self._serial.write(data)
         except self._errors as error:
             raise PortError(f"Serial Port write failure: {error}") from error
 
     def flush_input(self) -> None:
-        """Discard the bytes that have arrived and are not read."""
+        """Discard the received bytes that have not been read."""
         try:
             self._serial.reset_input_buffer()
         except Exception as error:
@@ -124,7 +124,7 @@ class SocketPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Write all bytes. Raise PortError."""
+        """Write all bytes. Raise PortError if the connection is closed."""
         try:
             self._socket.sendall(data)
         except OSError as error:
@@ -139,13 +139,13 @@ class SocketPort:
 
 
 class FilePort:
-    """An object of the program with ``read(count)``, ``write`` and ``inWaiting``, as SerialClient accepts it."""
+    """The program's object with ``read(count)``, ``write`` and ``inWaiting``, as SerialClient accepts it."""
 
     def __init__(self, file: File) -> None:
         self._file = file
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived; empty after a short wait. Raise PortError for the object's exceptions."""
+        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the object raises an exception."""
         try:
             waiting = int(self._file.inWaiting())
             if waiting < 1:
@@ -156,14 +156,14 @@ class FilePort:
             raise PortError(str(error)) from error
 
     def write(self, data: bytes) -> None:
-        """Write all bytes. Raise PortError."""
+        """Write all bytes. Raise PortError if the object raises an exception."""
         try:
             self._file.write(data)
         except (OSError, RuntimeError) as error:
             raise PortError(str(error)) from error
 
     def flush_input(self) -> None:
-        """Discard the bytes that have arrived and are not read."""
+        """Discard the received bytes that have not been read."""
         flush = getattr(self._file, "flushInput", None)
         if flush is not None:
             flush()

@@ -50,7 +50,7 @@ def _run(words: list[str]) -> int:
 
 
 def _param(name: str, default: object) -> object:
-    """Return a private parameter, else the one of rosserial_embeddedlinux, which older launch files set."""
+    """Return a private parameter, else rosserial_embeddedlinux's parameter, which older launch files set."""
     return rospy.get_param(f"~{name}", rospy.get_param(f"{_OTHER}/{name}", default))
 
 

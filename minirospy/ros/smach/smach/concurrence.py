@@ -1,4 +1,4 @@
-"""The container that executes its states at the same time, each in its own thread."""
+"""The container that executes its states concurrently, each in its own thread."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
 
 
 class Concurrence(Container):
-    """Executes all of its states in parallel, and ends when all of them have ended.
+    """Executes all of its states in parallel, and finishes when all of them have finished.
 
     Its outcome is the return value of ``outcome_cb``, else the outcome of ``outcome_map`` that most states match, else
-    ``default_outcome``; "preempted" if the states ended because the container was preempted.
+    ``default_outcome``; "preempted" if the states finished because the container was preempted.
     """
 
     def __init__(
@@ -39,9 +39,10 @@ class Concurrence(Container):
         outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None,
         child_termination_cb: Callable[[dict[str, str | None]], object] | None = None,
     ) -> None:
-        """Create the container. ``outcome_map``: outcome -> (label -> outcome of that state).
+        """Create the container. ``outcome_map``: outcome -> (label -> that state's outcome).
 
-        ``child_termination_cb`` is called each time a state ends, with the outcomes so far (None for running states); if it
+        ``child_termination_cb`` is called each time a state finishes, with the outcomes so far (None for running states);
+        if it
         returns a true value, the other states are preempted.
         """
         known = list(outcomes)
@@ -57,7 +58,7 @@ class Concurrence(Container):
         self._is_running = False
         self._threads: dict[str, threading.Thread] = {}
         self._child_outcomes: dict[str, str | None] = {}
-        # Guards the attributes below; notified when the states that still execute have to end.
+        # Guards the attributes below; notified when the states that are still executing have to finish.
         self._done_cond = threading.Condition()
         self._is_ending = False
         self._user_code_exception = False
@@ -85,7 +86,7 @@ class Concurrence(Container):
 
     @staticmethod
     def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
-        """Add a state to the open container and return it; ``remapping``: the state's key -> the container's."""
+        """Add a state to the open container and return the state; ``remapping``: the state's key -> the container's key."""
         concurrence = Concurrence._currently_opened_container()
         concurrence._states[label] = state
         concurrence._remappings[label] = remapping or {}
@@ -109,7 +110,7 @@ class Concurrence(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute all states; return the outcome. Raise InvalidStateError if one of them fails."""
+        """Execute all states; return the outcome. Raise InvalidStateError if a state fails."""
         if not self._states:
             raise InvalidStateError("No states was added to concurrence")
         self._copy_input_keys(parent_ud, self.userdata)
@@ -129,7 +130,7 @@ class Concurrence(Container):
         return outcome
 
     def _run_states(self) -> None:
-        """Start a thread for each state, wait until they have to end, and wait for their end."""
+        """Start a thread for each state, wait until the states have to finish, and join the threads."""
         self._is_ending = self._user_code_exception = False
         self._child_outcomes = dict.fromkeys(self._states)
         self._threads = {
@@ -187,7 +188,7 @@ class Concurrence(Container):
         return outcome
 
     def _is_last_needed(self) -> bool:
-        """Return whether the other states can end, now that one has ended."""
+        """Return whether the other states can finish, after one has finished."""
         others_end = False
         if self._child_termination_cb:
             try:
@@ -244,7 +245,7 @@ class Concurrence(Container):
         return outcome
 
     def is_running(self) -> bool:
-        """Return whether the container executes."""
+        """Return whether the container is executing."""
         return self._is_running
 
     def request_preempt(self) -> None:
@@ -264,7 +265,7 @@ class Concurrence(Container):
         return self._states[key]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Add ``userdata`` to the container's; ``initial_states`` has no effect, since all states start."""
+        """Add ``userdata`` to the container's userdata; ``initial_states`` has no effect, because all states start."""
         if 0 < len(initial_states) < len(self._states):
             logwarn(
                 "Attempting to set initial states in Concurrence container, but Concurrence children are always all "
@@ -277,11 +278,11 @@ class Concurrence(Container):
         return list(self._states)
 
     def get_active_states(self) -> list[str]:
-        """Return the labels of the states that execute."""
+        """Return the labels of the executing states."""
         return [label for label, outcome in self._child_outcomes.items() if outcome is None]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the outcome map as edges: outcome, label, outcome of the container."""
+        """Return the outcome map as edges: (outcome, label, container outcome)."""
         return [
             (outcome, label, target)
             for target, outcomes in self._outcome_map.items()

@@ -1,4 +1,4 @@
-"""The base class of all containers: construction in a ``with`` block, copying of userdata in and out, callbacks."""
+"""The base class for all containers: construction in a ``with`` block, copying userdata in and out, callbacks."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ Callback = Callable[..., object]
 class Container(State):
     """A state that contains states; subclasses execute them.
 
-    Callbacks are called when it starts (userdata, initial states), at each transition (userdata, active states), and when
-    it ends (userdata, the last states, the outcome).
+    Callbacks are called when the container starts (userdata, initial states), at each transition (userdata, active states),
+    and when it finishes (userdata, the last states, the outcome).
     """
 
     _construction_stack: ClassVar[list[Container]] = []
-    _construction_lock = threading.RLock()  # held by the thread that has a container open
+    _construction_lock = threading.RLock()  # held by the thread in which a container is open
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class Container(State):
         raise NotImplementedError
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Set the initial states, and add ``userdata`` to the container's."""
+        """Set the initial states, and add ``userdata`` to the container's userdata."""
         raise NotImplementedError
 
     def get_initial_states(self) -> list[str]:
@@ -66,11 +66,11 @@ class Container(State):
         raise NotImplementedError
 
     def get_active_states(self) -> list[str]:
-        """Return the labels of the states that are executing."""
+        """Return the labels of the executing states."""
         raise NotImplementedError
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the transitions: outcome, the state's label, the label or container outcome that it leads to."""
+        """Return the transitions: (outcome, the state's label, the label or container outcome to which the outcome leads)."""
         raise NotImplementedError
 
     def check_consistency(self) -> None:
@@ -98,7 +98,7 @@ class Container(State):
         self._transition_cbs.append((transition_cb, cb_args))
 
     def register_termination_cb(self, termination_cb: Callback, cb_args: Sequence[object] = ()) -> None:
-        """Call a function with userdata, last states, outcome and ``cb_args`` when the container ends."""
+        """Call a function with userdata, last states, outcome and ``cb_args`` when the container finishes."""
         self._termination_cbs.append((termination_cb, cb_args))
 
     def call_start_cbs(self) -> None:
@@ -155,7 +155,7 @@ class Container(State):
             self.close()
 
     def open(self) -> None:
-        """Open the container: ``add`` adds to it until ``close``."""
+        """Open the container: until ``close``, ``add`` adds states to it."""
         Container._construction_lock.acquire()
         Container._construction_stack.append(self)
 
@@ -174,7 +174,7 @@ class Container(State):
         Container._construction_lock.release()
 
     def is_opened(self) -> bool:
-        """Return whether the container is open, so that ``add`` adds to it."""
+        """Return whether the container is open for ``add``."""
         stack = Container._construction_stack
         return bool(stack) and stack[-1] is self
 

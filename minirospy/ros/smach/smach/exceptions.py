@@ -26,12 +26,12 @@ class InvalidTransitionError(SmachError):
 
 
 class InvalidStateError(SmachError):
-    """A state cannot be added, or a container is not constructed correctly."""
+    """A state cannot be added, or a container was not constructed correctly."""
 
 
 class InvalidUserCodeError(SmachError):
-    """The code of a state or callback raised an exception."""
+    """A state or callback raised an exception."""
 
 
 class InvalidConstructionError(SmachError):
-    """A container is used before it was opened."""
+    """A container is used before it is opened."""

@@ -20,7 +20,7 @@ Items = Iterable[object] | Callable[[], Iterable[object]]
 
 
 class Iterator(Container):
-    """Executes its state with each item in the userdata, until an outcome breaks the loop or the items are exhausted."""
+    """Executes its state with each item in the userdata, until an outcome breaks the loop or no items are left."""
 
     def __init__(
         self,
@@ -48,7 +48,7 @@ class Iterator(Container):
 
     @staticmethod
     def set_iteritems(it: Items, it_label: str = "it_data") -> None:
-        """Set the items of the open iterator, or a function that returns them, and their userdata key."""
+        """Set the open iterator's items, or a function that returns them, and their userdata key."""
         iterator = Iterator._currently_opened_container()
         iterator._items = it
         iterator._items_label = it_label
@@ -61,10 +61,10 @@ class Iterator(Container):
         break_outcomes: Sequence[str] = (),
         final_outcome_map: Mapping[str, str] | None = None,
     ) -> None:
-        """Set the state of the open iterator.
+        """Set the open iterator's state.
 
         An outcome in ``break_outcomes`` ends the loop; if that is empty, any outcome that is not in ``loop_outcomes`` does.
-        ``final_outcome_map``: the state's last outcome -> the iterator's.
+        ``final_outcome_map``: the state's last outcome -> the iterator's outcome.
         """
         iterator = Iterator._currently_opened_container()
         if loop_outcomes and break_outcomes:
@@ -138,11 +138,11 @@ class Iterator(Container):
         return outcome
 
     def is_running(self) -> bool:
-        """Return whether the iterator executes."""
+        """Return whether the iterator is executing."""
         return self._is_running
 
     def request_preempt(self) -> None:
-        """Preempt the loop and the state that it executes."""
+        """Preempt the loop and the executing state."""
         self._preempt_requested = True
         if self._is_running:
             self._state.request_preempt()
@@ -165,7 +165,7 @@ class Iterator(Container):
         return state
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Add ``userdata`` to the container's; log and raise KeyError for any other state than the contained one."""
+        """Add ``userdata`` to the iterator's userdata; log and raise KeyError for any state except the contained one."""
         if len(initial_states) > 1:
             logwarn(
                 "Attempting to set initial state to include more than one state, but Iterator container can only have one "

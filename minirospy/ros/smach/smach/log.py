@@ -1,4 +1,4 @@
-"""The log functions of smach: print to stdout until ``set_loggers`` replaces them."""
+"""smach's log functions: print to stdout until ``set_loggers`` replaces them."""
 
 from __future__ import annotations
 

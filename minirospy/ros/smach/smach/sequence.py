@@ -34,7 +34,7 @@ class Sequence(StateMachine):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Add a state. The previous state's connector outcome leads to it, unless it has another target."""
+        """Add a state. The previous state's connector outcome leads to it, unless that outcome already has a target."""
         sequence = Sequence._currently_opened_container()
         last = sequence._last_added_seq_label
         if last is not None:

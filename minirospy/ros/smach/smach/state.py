@@ -11,7 +11,7 @@ __all__ = ["CBState", "State"]
 
 
 class State:
-    """A state: ``execute`` is called with the userdata that it declared, and returns one of its outcomes."""
+    """A state: ``execute`` is called with the declared userdata, and returns one of the declared outcomes."""
 
     def __init__(
         self,
@@ -27,7 +27,7 @@ class State:
         self._preempt_requested = False
 
     def execute(self, ud: Values) -> str | None:
-        """Do the state's work and return an outcome; subclasses override it."""
+        """Perform the state's work and return an outcome; subclasses override this method."""
         raise NotImplementedError
 
     def register_outcomes(self, new_outcomes: Iterable[str]) -> None:
@@ -39,13 +39,13 @@ class State:
         return tuple(self._outcomes)
 
     def register_io_keys(self, keys: Iterable[str]) -> None:
-        """Add keys of the userdata that the state may read and write."""
+        """Add userdata keys that the state may read and write."""
         names = set(keys)
         self.register_input_keys(names)
         self.register_output_keys(names)
 
     def register_input_keys(self, keys: Iterable[str]) -> None:
-        """Add keys of the userdata that the state may read."""
+        """Add userdata keys that the state may read."""
         self._input_keys = self._input_keys.union(keys)
 
     def get_registered_input_keys(self) -> tuple[str, ...]:
@@ -53,7 +53,7 @@ class State:
         return tuple(self._input_keys)
 
     def register_output_keys(self, keys: Iterable[str]) -> None:
-        """Add keys of the userdata that the state may write."""
+        """Add userdata keys that the state may write."""
         self._output_keys = self._output_keys.union(keys)
 
     def get_registered_output_keys(self) -> tuple[str, ...]:
@@ -61,7 +61,7 @@ class State:
         return tuple(self._output_keys)
 
     def request_preempt(self) -> None:
-        """Preempt the state: its ``execute`` checks ``preempt_requested`` and should end soon."""
+        """Preempt the state: its ``execute`` should check ``preempt_requested`` and return soon."""
         self._preempt_requested = True
 
     def service_preempt(self) -> None:
@@ -102,7 +102,7 @@ class CBState(State):
 
 
 def adopt_interface(state: State, cb: object) -> None:
-    """Add to a state the keys and outcomes that its callback declares with ``cb_interface``."""
+    """Add to a state the keys and outcomes that the state's callback declares with ``cb_interface``."""
     if has_smach_interface(cb):
         state.register_input_keys(cb.get_registered_input_keys())
         state.register_output_keys(cb.get_registered_output_keys())

@@ -1,4 +1,4 @@
-"""The container that executes one state after the other, chosen by their outcomes."""
+"""The container that executes one state after another; each outcome selects the next state."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ class StateMachine(Container):
         self._constants: dict[str, Mapping[str, object]] = {}
         self._initial_state_label: str | None = None
 
-        # For `add_auto`: the last added state, and its outcomes that lead to the next one.
+        # For `add_auto`: the last added state, and those of its outcomes that lead to the next state.
         self._last_added_label: str | None = None
         self._connector_outcomes: Sequence[str] = ()
 
         self._is_running = False
         self._current_label: str | None = None
-        # The state that was preempted, and may not have noticed.
+        # The state that was preempted but may not have noticed.
         self._preempted_label: str | None = None
         self._preempted_state: State | None = None
-        # Released only while a state executes, so that a preemption never arrives between two states.
+        # Released only while a state executes, so that a preemption never occurs between two states.
         self._state_transitioning_lock = threading.RLock()
 
     def __getstate__(self) -> dict[str, object]:
@@ -67,9 +67,9 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Add a state to the open machine, and return it.
+        """Add a state to the open machine, and return the state.
 
-        ``transitions``: outcome -> label, or an outcome of the machine; ``remapping``: the state's key -> the machine's;
+        ``transitions``: outcome -> label, or an outcome of the machine; ``remapping``: the state's key -> the machine's key;
         ``constants``: values that are set in the userdata before the state executes. Raise InvalidStateError if the
         label is already used, InvalidTransitionError for an outcome that the state does not have.
         """
@@ -86,7 +86,7 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Add a state whose ``connector_outcomes`` lead to the next added state; otherwise like ``add``."""
+        """Add a state whose ``connector_outcomes`` lead to the next added state; otherwise the same as ``add``."""
         machine = StateMachine._currently_opened_container()
         machine._add(label, state, transitions, remapping, constants)
         registered = state.get_registered_outcomes()
@@ -142,7 +142,7 @@ class StateMachine(Container):
                 )
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError if there is no initial state, or if the target of a transition does not exist."""
+        """Raise InvalidTransitionError if there is no initial state, or if a transition's target does not exist."""
         outcomes = self.get_registered_outcomes()
         available = [*self._states, *(each for each in outcomes if each not in self._states)]
         errors = []
@@ -170,7 +170,7 @@ class StateMachine(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute states until one leads to an outcome of the machine, and return this outcome; None at a shutdown."""
+        """Execute states until one leads to an outcome of the machine, and return that outcome; None at a shutdown."""
         with self._state_transitioning_lock:
             try:
                 self.check_consistency()
@@ -199,7 +199,7 @@ class StateMachine(Container):
         return outcome
 
     def _step(self) -> str | None:
-        """Execute the current state; return the machine's outcome if it leads to one."""
+        """Execute the current state; return the machine's outcome if the state's outcome leads to one."""
         label = self._current_label
         if label is None or label not in self._states:
             raise InvalidStateError(
@@ -230,7 +230,7 @@ class StateMachine(Container):
         return self._terminate(label, state, outcome, target)
 
     def _pass_on_preempt(self, label: str, state: State) -> None:
-        """Preempt a state before it executes, if the machine is preempted and the last state did not notice."""
+        """Preempt a state before it executes, if the machine is preempted and the previous state did not notice."""
         if not self.preempt_requested():
             return
         loginfo("Preempt requested on state machine before executing the next state.")
@@ -287,13 +287,13 @@ class StateMachine(Container):
         return target
 
     def is_running(self) -> bool:
-        """Return whether the machine executes."""
+        """Return whether the machine is executing."""
         return self._is_running
 
     # Preemption.
 
     def request_preempt(self) -> None:
-        """Preempt the machine and the state that it executes."""
+        """Preempt the machine and the executing state."""
         with self._state_transitioning_lock:
             self._preempt_requested = True
             if self._current_label is not None:
@@ -327,7 +327,7 @@ class StateMachine(Container):
         return self._states[key]
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData | None = None) -> None:
-        """Set the state in which the next execution starts, and add ``userdata`` to the machine's."""
+        """Set the state in which the next execution starts, and add ``userdata`` to the machine's userdata."""
         logdebug(f"Setting initial states to {initial_states}")
         if len(initial_states) > 1:
             logwarn(

@@ -13,7 +13,7 @@ __all__ = ["Const", "Remapper", "UserData", "get_const"]
 
 
 class UserData:
-    """Values by key, as attributes or items. A missing key is logged, and raises KeyError."""
+    """Values by key, as attributes or items. Accessing a missing key logs an error and raises KeyError."""
 
     def __init__(self) -> None:
         self._data: dict[str, object] = {}
@@ -23,7 +23,7 @@ class UserData:
         self._data.update(other_userdata._data)
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
-        """Return copies of some values under new names; ``remapping``: new name -> key here."""
+        """Return copies of some values under new names; ``remapping``: new name -> key in this object."""
         names = {outer: inner for inner, outer in remapping.items()}
         if len(names) != len(remapping):
             logerr(f"SMACH userdata remapping is not one-to-one: {remapping}")
@@ -33,7 +33,7 @@ class UserData:
         return extracted
 
     def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
-        """Copy some values from another UserData; ``remapping``: key there -> key here."""
+        """Copy some values from another UserData; ``remapping``: key in the other object -> key in this object."""
         for key in keys:
             self[remapping.get(key, key)] = copy.copy(ud[key])
 
@@ -66,7 +66,7 @@ class UserData:
 
 
 def get_const(obj: object) -> object:
-    """Return an object that has attributes as read-only; return any other object unchanged."""
+    """Return a read-only view of an object that has attributes; return any other object unchanged."""
     if not hasattr(obj, "__dict__"):
         return obj
     logdebug(f"Making const '{obj}'")
@@ -74,7 +74,7 @@ def get_const(obj: object) -> object:
 
 
 class Const:
-    """A read-only view of an object's attributes; setting one changes only the view, and logs an error."""
+    """A read-only view of an object's attributes; setting an attribute changes only the view, and logs an error."""
 
     def __init__(self, obj: object) -> None:
         object.__setattr__(self, "_obj", obj)
@@ -98,10 +98,11 @@ class Const:
 
 
 class Remapper:
-    """A state's view of a container's userdata: its declared keys, under the state's names.
+    """A state's view of a container's userdata: the declared keys, under the state's names for them.
 
-    A value of an input key that is not an output key is read-only (``get_const``). Writing a key that is not an output key is
-    logged and has no effect; reading one that is not an input key raises InvalidUserCodeError.
+    A value whose key is an input key but not an output key is read-only (``get_const``). Writing a key that is not an
+    output key
+    is logged and has no effect; reading a key that is not an input key raises InvalidUserCodeError.
     """
 
     def __init__(
@@ -162,4 +163,4 @@ class Remapper:
 
 
 Values = UserData | Remapper
-"""Userdata as a state receives it: the container's, or a view of the declared keys."""
+"""Userdata as a state receives it: the container's own object, or a view of the declared keys."""

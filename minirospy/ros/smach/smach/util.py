@@ -1,4 +1,4 @@
-"""The interface that a state's callbacks may declare, and the check for a shutdown."""
+"""The interface that a state's callbacks may declare, and the shutdown check."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""tf, the older API: transformers, listeners and broadcasters, on the buffer of tf2.
+"""tf, the older API: transformers, listeners and broadcasters, based on tf2's buffer.
 
-A leading slash in a frame's name is removed, because tf2 rejects it. Source: http://wiki.ros.org/tf.
+A leading slash in a frame name is removed, because tf2 rejects it. Source: http://wiki.ros.org/tf.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Composite transformation matrices: decompose, compose, fit to points; and a virtual trackball.
 
-numpy is imported when a function is called.
+Each function imports numpy when it is called.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def concatenate_matrices(*matrices: ArrayLike) -> Floats:
 
 
 def inverse_matrix(matrix: ArrayLike) -> Floats:
-    """Return the inverse matrix. Raise LinAlgError."""
+    """Return the inverse matrix. Raise LinAlgError if the matrix is singular."""
     import numpy
 
     inverse: Floats = numpy.linalg.inv(numpy.asarray(matrix))
@@ -124,7 +124,7 @@ def compose_matrix(
     translate: ArrayLike | None = None,
     perspective: ArrayLike | None = None,
 ) -> Floats:
-    """Return the matrix from the values that :func:`decompose_matrix` returns."""
+    """Return the matrix composed from the values that :func:`decompose_matrix` returns."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -191,7 +191,7 @@ def superimposition_matrix(
         u, _, vh = numpy.linalg.svd(numpy.dot(second, first.T))
         rotation = numpy.dot(u, vh)
         if numpy.linalg.det(rotation) < 0.0:
-            # This is a reflection: negate the direction of the smallest singular value.
+            # This is a reflection, so negate the direction of the smallest singular value.
             rotation -= numpy.outer(u[:, 2], vh[2, :] * 2.0)
         matrix[:3, :3] = rotation
     else:
@@ -225,7 +225,7 @@ class Arcball:
     """A virtual trackball: converts mouse movements in a window to rotations. Source: Shoemake, Graphics Gems IV (1994)."""
 
     def __init__(self, initial: ArrayLike | None = None) -> None:
-        """Start with the rotation ``initial``, a quaternion or a matrix. Raise ValueError."""
+        """Start with the rotation ``initial``, a quaternion or a matrix. Raise ValueError if it is neither."""
         import numpy
 
         from minirospy.ros.tf.tf.vectors import quaternion_from_matrix

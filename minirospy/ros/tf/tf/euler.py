@@ -1,7 +1,7 @@
-"""Conversions between Euler angles and rotations, with the 24 sequences of axes; a quaternion's angles need no numpy.
+"""Conversions between Euler angles and rotations, with the 24 axis sequences; euler_from_quaternion needs no numpy.
 
-An axes string consists of a frame (s: static, r: rotating) and three axes in the order of the rotations. The algorithm
-over (first axis, parity, repetition, frame) is Shoemake's, "Euler angle conversion", Graphics Gems IV (1994).
+An axes string consists of a frame (s: static, r: rotating) and three axes in the order of the rotations. The algorithm,
+based on (first axis, parity, repetition, frame), is Shoemake's, "Euler angle conversion", Graphics Gems IV (1994).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Axes = str | tuple[int, int, int, int]
 def _sequences() -> dict[str, tuple[int, int, int, int]]:
     """Return (first axis, parity, repetition, frame) for each axes string.
 
-    The angles about rotating axes are those about static axes in reverse order.
+    The angles about rotating axes are the angles about static axes in reverse order.
     """
     found = {}
     for first in range(3):
@@ -56,7 +56,10 @@ TUPLE_TO_AXES = {value: key for key, value in AXES_TO_TUPLE.items()}
 
 
 def euler_matrix(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> NDArray[numpy.float64]:
-    """Return the 4x4 matrix of three rotations, in radians; ``axes`` as a string or a tuple. Raise KeyError."""
+    """Return the 4x4 matrix for three rotations, in radians; ``axes`` as a string or a tuple.
+
+    Raise KeyError if ``axes`` is unknown.
+    """
     import numpy
 
     first, parity, repetition, frame = _tuple(axes)
@@ -81,7 +84,10 @@ def euler_matrix(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> NDArra
 
 
 def euler_from_matrix(matrix: ArrayLike, axes: Axes = "sxyz") -> tuple[float, float, float]:
-    """Return the angles of a rotation matrix, 3x3 or larger; one of several possible triples. Raise KeyError."""
+    """Return the angles of a rotation matrix, 3x3 or larger; one of several possible triples.
+
+    Raise KeyError if ``axes`` is unknown.
+    """
     import numpy
 
     rows: list[list[float]] = numpy.asarray(matrix, dtype=numpy.float64)[:3, :3].tolist()
@@ -91,12 +97,15 @@ def euler_from_matrix(matrix: ArrayLike, axes: Axes = "sxyz") -> tuple[float, fl
 def euler_from_quaternion(
     quaternion: Sequence[float] | NDArray[numpy.float64], axes: Axes = "sxyz"
 ) -> tuple[float, float, float]:
-    """Return the angles of a quaternion [x, y, z, w], of any length. Raise KeyError, ValueError."""
+    """Return the angles of a quaternion [x, y, z, w], which need not be normalized.
+
+    Raise KeyError if ``axes`` is unknown, ValueError if the quaternion does not have four numbers.
+    """
     return _angles(rotation_rows(quaternion), axes)
 
 
 def quaternion_from_euler(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> NDArray[numpy.float64]:
-    """Return the quaternion [x, y, z, w] of three rotations, in radians. Raise KeyError."""
+    """Return the quaternion [x, y, z, w] for three rotations, in radians. Raise KeyError if ``axes`` is unknown."""
     import numpy
 
     first, parity, repetition, frame = _tuple(axes)
@@ -125,7 +134,7 @@ def quaternion_from_euler(ai: float, aj: float, ak: float, axes: Axes = "sxyz") 
 
 
 def rotation_rows(quaternion: Sequence[float] | NDArray[numpy.float64]) -> list[list[float]]:
-    """Return the rows of the 3x3 matrix of a quaternion of any length; for the zero quaternion, the identity's."""
+    """Return the rows of the 3x3 matrix for a quaternion, which need not be normalized; the identity for a zero quaternion."""
     x, y, z, w = (float(each) for each in quaternion[:4])
     square = x * x + y * y + z * z + w * w
     if square < EPSILON:

@@ -40,22 +40,22 @@ _WITHOUT_THREAD = "cannot wait for transform without a dedicated thread that lis
 
 
 def xyz_to_mat44(pos: _Point) -> NDArray[numpy.float64]:
-    """Return the 4x4 matrix of a Point or Vector3."""
+    """Return the 4x4 translation matrix for a Point or Vector3."""
     return transformations.translation_matrix((pos.x, pos.y, pos.z))
 
 
 def xyzw_to_mat44(ori: geometry_msgs.msg.Quaternion) -> NDArray[numpy.float64]:
-    """Return the 4x4 matrix of a Quaternion message."""
+    """Return the 4x4 rotation matrix for a Quaternion message."""
     return transformations.quaternion_matrix((ori.x, ori.y, ori.z, ori.w))
 
 
 def strip_leading_slash(s: str) -> str:
-    """Return a frame's name as tf2 expects it."""
+    """Return a frame name without its leading slash, as tf2 expects it."""
     return s[1:] if s.startswith("/") else s
 
 
 class Transformer:
-    """Stores transforms and answers lookups. ``interpolate`` has no effect."""
+    """Stores transforms and performs lookups. ``interpolate`` has no effect."""
 
     def __init__(self, interpolate: bool = True, cache_time: Moment | None = None) -> None:
         self._buffer = Buffer(cache_time, debug=False)
@@ -96,7 +96,10 @@ class Transformer:
         timeout: Moment,
         polling_sleep_duration: Moment | None = None,
     ) -> None:
-        """Wait up to ``timeout`` for a transform; ``polling_sleep_duration`` has no effect. Raise tf.Exception."""
+        """Wait up to ``timeout`` for a transform; ``polling_sleep_duration`` has no effect.
+
+        Raise tf.Exception after the timeout.
+        """
         self._check_thread()
         target, source = strip_leading_slash(target_frame), strip_leading_slash(source_frame)
         self._raise_unless(
@@ -145,7 +148,7 @@ class Transformer:
         return list(yaml.safe_load(self._buffer.all_frames_as_yaml()) or {})
 
     def getLatestCommonTime(self, source_frame: str, dest_frame: str) -> rospy.Time:
-        """Return the newest time at which a lookup succeeds. Raise tf.Exception."""
+        """Return the newest time at which a lookup succeeds. Raise tf.Exception if there is none."""
         return self._buffer.get_latest_common_time(
             strip_leading_slash(source_frame), strip_leading_slash(dest_frame)
         )
@@ -153,7 +156,8 @@ class Transformer:
     def lookupTransform(self, target_frame: str, source_frame: str, time: Moment) -> Tuples:
         """Return the pose of the source frame in the target frame: [x, y, z] and the quaternion [x, y, z, w].
 
-        Raise tf.LookupException, tf.ConnectivityException, tf.ExtrapolationException.
+        Raise tf.LookupException if a frame is unknown, tf.ConnectivityException if the frames are not connected,
+        tf.ExtrapolationException if there is no data for ``time``.
         """
         target, source = strip_leading_slash(target_frame), strip_leading_slash(source_frame)
         return _tuples(self._buffer.lookup_transform(target, source, time))
@@ -195,7 +199,7 @@ class Transformer:
     ) -> tuple[Vector, Vector]:
         """Return the velocities of ``tracking_frame`` relative to ``observation_frame``, expressed in ``reference_frame``.
 
-        They are those of the origin of ``reference_point_frame``, over ``averaging_interval`` around ``time`` (0: until the
+        They apply to the origin of ``reference_point_frame``, over ``averaging_interval`` around ``time`` (0: until the
         newest data). ``ref_point`` has no effect, as in real ROS.
         """
         import numpy
@@ -226,7 +230,8 @@ class Transformer:
             transformations.translation_matrix(point_place), transformations.quaternion_matrix(point_turn)
         )
         moved = numpy.dot(to_point, (*place, 1.0))[:3] - place
-        # Real ROS uses a dot product here, although a cross product would be correct; the results must match.
+        # Real ROS uses a dot product here, although a cross product would be correct; the results must match real
+        # ROS.
         linear = linear + numpy.dot(angular, moved)
         return tuple(linear.tolist()), tuple(angular.tolist())
 
@@ -235,7 +240,7 @@ class Transformer:
         self._using_dedicated_thread = value
 
     def getTFPrefix(self) -> str:
-        """Return "", because tf2 has no prefixes."""
+        """Return "", because tf2 does not support prefixes."""
         return ""
 
     def _check_thread(self) -> None:
@@ -250,16 +255,19 @@ class Transformer:
 
 
 class TransformerROS(Transformer):
-    """A transformer of stamped messages."""
+    """A transformer for stamped messages."""
 
     def asMatrix(self, target_frame: str, hdr: Header) -> NDArray[numpy.float64]:
-        """Return the 4x4 matrix from a header's frame, at its stamp, to ``target_frame``. Raise as lookupTransform does."""
+        """Return the 4x4 matrix from a header's frame, at its stamp, to ``target_frame``.
+
+        Raise exceptions as lookupTransform does.
+        """
         return self.fromTranslationRotation(*self.lookupTransform(target_frame, hdr.frame_id, hdr.stamp))
 
     def fromTranslationRotation(
         self, translation: Sequence[float], rotation: Sequence[float]
     ) -> NDArray[numpy.float64]:
-        """Return the 4x4 matrix of a translation (x, y, z) and a quaternion (x, y, z, w)."""
+        """Return the 4x4 matrix for a translation (x, y, z) and a quaternion (x, y, z, w)."""
         return transformations.concatenate_matrices(
             transformations.translation_matrix(translation), transformations.quaternion_matrix(rotation)
         )

@@ -1,6 +1,6 @@
-"""Homogeneous 4x4 matrices of single transformations, and the parameters of such matrices.
+"""Homogeneous 4x4 matrices for single transformations, and the parameters of such matrices.
 
-A plane is given by a point and a normal. numpy is imported when a function is called.
+A plane is given by a point and a normal. Each function imports numpy when it is called.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def translation_matrix(direction: ArrayLike) -> Floats:
 
 
 def translation_from_matrix(matrix: ArrayLike) -> Floats:
-    """Return the translation vector of a matrix."""
+    """Return a matrix's translation vector."""
     import numpy
 
     moved: Floats = numpy.array(matrix)[:3, 3].copy()
@@ -62,7 +62,7 @@ def translation_from_matrix(matrix: ArrayLike) -> Floats:
 
 
 def reflection_matrix(point: ArrayLike, normal: ArrayLike) -> Floats:
-    """Return the matrix of a reflection in a plane."""
+    """Return the matrix for a reflection in a plane."""
     import numpy
 
     across = unit_vector(numpy.asarray(normal)[:3])
@@ -73,7 +73,7 @@ def reflection_matrix(point: ArrayLike, normal: ArrayLike) -> Floats:
 
 
 def reflection_from_matrix(matrix: ArrayLike) -> tuple[Floats, Floats]:
-    """Return a point and the normal of a reflection's plane. Raise ValueError."""
+    """Return a point in a reflection's plane and the plane's normal. Raise ValueError if the matrix is not a reflection."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -99,7 +99,7 @@ def rotation_matrix(angle: float, direction: ArrayLike, point: ArrayLike | None 
 
 
 def rotation_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats]:
-    """Return the angle, the axis, and a point on the axis. Raise ValueError."""
+    """Return the angle, the axis, and a point on the axis. Raise ValueError if the matrix is not a rotation."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -139,7 +139,7 @@ def scale_matrix(
 
 
 def scale_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats | None]:
-    """Return the factor, the origin and the direction (None: all) of a scaling matrix. Raise ValueError."""
+    """Return a scaling matrix's factor, origin and direction (None: all). Raise ValueError if the matrix is not a scaling."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -198,7 +198,7 @@ def projection_matrix(
 def projection_from_matrix(
     matrix: ArrayLike, pseudo: bool = False
 ) -> tuple[Floats, Floats, Floats | None, Floats | None, bool]:
-    """Return the arguments of :func:`projection_matrix` for this matrix. Raise ValueError."""
+    """Return the arguments of :func:`projection_matrix` for this matrix. Raise ValueError if the matrix is not a projection."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -228,7 +228,7 @@ def projection_from_matrix(
 def clip_matrix(
     left: float, right: float, bottom: float, top: float, near: float, far: float, perspective: bool = False
 ) -> Floats:
-    """Return the matrix from a view volume to the cube from -1 to 1. Raise ValueError.
+    """Return the matrix that maps a view volume to the cube from -1 to 1. Raise ValueError if the volume is invalid.
 
     ``perspective``: the volume is a frustum.
     """
@@ -259,7 +259,7 @@ def clip_matrix(
 
 
 def shear_matrix(angle: float, direction: ArrayLike, point: ArrayLike, normal: ArrayLike) -> Floats:
-    """Return the matrix that shears by the angle ``angle`` (radians) along a direction in a plane.
+    """Return the matrix that shears by ``angle`` (radians) along a direction in a plane.
 
     Raise ValueError if the direction is not in the plane.
     """
@@ -277,7 +277,7 @@ def shear_matrix(angle: float, direction: ArrayLike, point: ArrayLike, normal: A
 
 
 def shear_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats, Floats]:
-    """Return the angle, the direction, a point and the normal of the plane. Raise ValueError."""
+    """Return the angle, the direction, a point in the plane and the plane's normal. Raise ValueError if it is not a shear."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -304,7 +304,7 @@ def shear_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats, Floats]
 
 
 def _eigenvector(matrix: Floats, value: float, missing: str, *, last: bool = True) -> Floats:
-    """Return the real part of the last (or first) eigenvector for an eigenvalue. Raise ValueError(missing)."""
+    """Return the real part of the last (or first) eigenvector for an eigenvalue. Raise ValueError(missing) if there is none."""
     import numpy
 
     values, vectors = numpy.linalg.eig(matrix)

@@ -1,4 +1,4 @@
-"""Functions on vectors and quaternions [x, y, z, w] as numpy arrays; numpy is imported when a function is called."""
+"""Functions on vectors and quaternions [x, y, z, w] as numpy arrays; each function imports numpy when it is called."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = [
 
 
 def vector_norm(data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None) -> Any:
-    """Return the length of a vector, or the lengths along ``axis``; with ``out``, store them there and return None."""
+    """Return a vector's length, or the lengths along ``axis``; with ``out``, store them there and return None."""
     import numpy
 
     squared = numpy.square(numpy.asarray(data, dtype=numpy.float64))
@@ -72,7 +72,7 @@ def unit_vector(
 
 
 def random_vector(size: int | Sequence[int]) -> NDArray[numpy.float64]:
-    """Return random numbers in [0, 1) in the given shape."""
+    """Return an array of the given shape that contains random numbers in [0, 1)."""
     import numpy
 
     numbers: NDArray[numpy.float64] = numpy.random.random(size)
@@ -80,7 +80,7 @@ def random_vector(size: int | Sequence[int]) -> NDArray[numpy.float64]:
 
 
 def quaternion_about_axis(angle: float, axis: ArrayLike) -> NDArray[numpy.float64]:
-    """Return the quaternion of a rotation by ``angle`` radians about an axis of any length."""
+    """Return the quaternion for a rotation by ``angle`` radians about an axis, which need not be normalized."""
     import numpy
 
     quaternion = numpy.zeros(4)
@@ -93,7 +93,7 @@ def quaternion_about_axis(angle: float, axis: ArrayLike) -> NDArray[numpy.float6
 
 
 def quaternion_matrix(quaternion: ArrayLike) -> NDArray[numpy.float64]:
-    """Return the 4x4 rotation matrix of a quaternion, which need not be normalized."""
+    """Return the 4x4 rotation matrix for a quaternion, which need not be normalized."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -102,7 +102,7 @@ def quaternion_matrix(quaternion: ArrayLike) -> NDArray[numpy.float64]:
 
 
 def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[numpy.float64]:
-    """Return the quaternion of a 4x4 rotation matrix."""
+    """Return the quaternion for a 4x4 rotation matrix."""
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)[:4, :4]
@@ -125,7 +125,7 @@ def quaternion_from_matrix(matrix: ArrayLike) -> NDArray[numpy.float64]:
 
 
 def quaternion_multiply(quaternion1: ArrayLike, quaternion0: ArrayLike) -> NDArray[numpy.float64]:
-    """Return the product of two quaternions: rotates by ``quaternion0``, then by ``quaternion1``."""
+    """Return the product of two quaternions, which rotates by ``quaternion0``, then by ``quaternion1``."""
     import numpy
 
     x0, y0, z0, w0 = numpy.asarray(quaternion0).tolist()
@@ -182,7 +182,7 @@ def quaternion_slerp(
 
 
 def random_quaternion(rand: ArrayLike | None = None) -> NDArray[numpy.float64]:
-    """Return a uniformly distributed random rotation; ``rand``: three numbers from 0 to 1 to compute it from."""
+    """Return a uniformly distributed random rotation, computed from ``rand``, three numbers between 0 and 1, if given."""
     import numpy
 
     numbers = numpy.random.rand(3) if rand is None else numpy.asarray(rand)
@@ -193,5 +193,5 @@ def random_quaternion(rand: ArrayLike | None = None) -> NDArray[numpy.float64]:
 
 
 def random_rotation_matrix(rand: ArrayLike | None = None) -> NDArray[numpy.float64]:
-    """Return the 4x4 matrix of a random rotation."""
+    """Return the 4x4 matrix for a random rotation."""
     return quaternion_matrix(random_quaternion(rand))

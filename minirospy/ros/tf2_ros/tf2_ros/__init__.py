@@ -85,5 +85,6 @@ __all__ = [
     "transform_listener",
 ]
 
-# Its modules import messages of ROS 1, which are not the first of their names where ROS 2 is sourced.
+# Its modules import ROS 1 messages, and if ROS 2 is sourced, its packages of the same names would be imported
+# instead.
 prefer_ros1()

@@ -40,11 +40,11 @@ __all__ = ["Broadcaster", "Buffer"]
 
 _T = TypeVar("_T")
 _LATEST = times.Time()
-_MAX_WAITING = 1000  # messages that are queued while the program is busy; older ones are dropped
+_MAX_WAITING = 1000  # messages queued while the program is busy; older messages are dropped
 
 
 class Buffer:
-    """The frames that are published on /tf and /tf_static, over the last ``cache_time`` seconds.
+    """The frames published on /tf and /tf_static over the last ``cache_time`` seconds.
 
     It listens inside ``async with Buffer(node) as buffer:``. If time jumps back, all non-static transforms are cleared.
     """
@@ -84,11 +84,13 @@ class Buffer:
     async def lookup(
         self, target: str, source: str, time: Moment = _LATEST, *, timeout: float | None = 0.0
     ) -> TransformStamped:
-        """Return the pose of the frame ``source`` in the frame ``target`` at ``time``; by default the latest.
+        """Return the pose of the frame ``source`` in the frame ``target`` at ``time`` (default: the latest pose).
 
-        Wait for it for ``timeout`` seconds of the node's time (None: until the node shuts down). Raise
-        LookupException, ConnectivityException, ExtrapolationException, InvalidArgumentException, and
-        ROSInterruptException if the node shuts down in the meantime.
+        Wait for the transform for ``timeout`` seconds of the node's time (None: until the node shuts down). Raise
+        LookupException if a frame is unknown, ConnectivityException if the frames are not connected, ExtrapolationException if
+        there is no data for ``time``, InvalidArgumentException if a frame name is invalid, and ROSInterruptException if
+        the node
+        shuts down in the meantime.
         """
         stamp = nanoseconds(time)
         found = await self._wait_for(lambda: self._tree.lookup(target, source, stamp), timeout)
@@ -106,7 +108,7 @@ class Buffer:
     ) -> TransformStamped:
         """Return the pose of ``source`` at ``source_time``, relative to ``target`` at ``target_time``.
 
-        The frame ``fixed`` is assumed not to move between the two times. Wait and raise as :meth:`lookup` does.
+        The frame ``fixed`` is assumed not to move between the two times. Wait and raise exceptions as :meth:`lookup` does.
         """
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         found = await self._wait_for(
@@ -124,9 +126,9 @@ class Buffer:
     async def changes(self, target: str, source: str) -> AsyncIterator[TransformStamped]:
         """Yield the latest pose of ``source`` in ``target``, then each change; skip to the newest if the program is busy.
 
-        Stops when the node shuts down. Raise InvalidArgumentException.
+        Stop when the node shuts down. Raise InvalidArgumentException if a frame name is invalid.
         """
-        # Raises for invalid frame names.
+        # Raises InvalidArgumentException for invalid frame names.
         self._tree.why_not(target, source, 0)
         end = asyncio.ensure_future(self._node.spin())
         last: StampedTransform | None = None
@@ -144,7 +146,7 @@ class Buffer:
             end.cancel()
 
     def frames_as_yaml(self) -> str:
-        """Return parent, broadcaster, rate and times of each frame, in the format that view_frames reads."""
+        """Return each frame's parent, broadcaster, rate and times, in the format that view_frames reads."""
         return frames_as_yaml(self._tree)
 
     # --- within
@@ -215,7 +217,7 @@ class Broadcaster:
         await self._moving.publish(TFMessage(list(transforms)))
 
     async def send_static(self, *transforms: TransformStamped) -> None:
-        """Publish transforms on /tf_static, latched, together with all earlier ones; a child frame's last transform wins."""
+        """Publish transforms on /tf_static, latched, together with all earlier ones; the last one for a child frame wins."""
         if self._static is None:
             self._static = self._node.advertise("/tf_static", TFMessage, queue_size=100, latch=True)
         self._kept |= {each.child_frame_id: each for each in transforms}

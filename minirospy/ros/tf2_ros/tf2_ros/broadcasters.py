@@ -45,7 +45,7 @@ class StaticTransformBroadcaster:
 
     @property
     def net_message(self) -> TFMessage:
-        """The message with all transforms that were sent."""
+        """The message that contains all sent transforms."""
         return TFMessage(list(self._sent.get(self.pub_tf.impl, {}).values()))
 
     def sendTransform(self, transform: TransformStamped | Sequence[TransformStamped]) -> None:

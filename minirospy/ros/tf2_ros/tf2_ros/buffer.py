@@ -21,10 +21,10 @@ DEFAULT_CAN_TRANSFORM_POLLING_SCALE = 0.01
 
 
 class Buffer(BufferCore, BufferInterface):
-    """The frames of the last ``cache_time`` (a Duration; 10 s), with lookups that can wait for their data.
+    """The frames over the last ``cache_time`` (a Duration; 10 s), with lookups that can wait for their data.
 
-    ``debug``: offer the service ``~tf2_frames``, which lists the frames, unless this node already does. A wait ends with
-    the insertion that makes the lookup possible. A wait raises an exception if simulated time jumps back by more than
+    ``debug``: offer the service ``~tf2_frames``, which lists the frames, unless this node already offers it. A wait returns
+    after the insertion that makes the lookup possible. A wait raises an exception if simulated time jumps back by more than
     the fraction CAN_TRANSFORM_POLLING_SCALE of its timeout. Thread-safe.
     """
 
@@ -40,8 +40,9 @@ class Buffer(BufferCore, BufferInterface):
     ) -> TransformStamped:
         """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0: the latest common time.
 
-        Wait for it for ``timeout`` (a Duration of ROS time). Raise LookupException, ConnectivityException,
-        ExtrapolationException, InvalidArgumentException, ROSInterruptException at a shutdown, and
+        Wait for the transform for ``timeout`` (a Duration of ROS time). Raise LookupException if a frame is unknown,
+        ConnectivityException if the frames are not connected, ExtrapolationException if there is no data for ``time``,
+        InvalidArgumentException if a frame name is invalid, ROSInterruptException at a shutdown, and
         ROSTimeMovedBackwardsException if simulated time jumps back during the wait.
         """
         if nanoseconds(timeout) <= 0:
@@ -63,7 +64,8 @@ class Buffer(BufferCore, BufferInterface):
     ) -> TransformStamped:
         """Return the pose of ``source_frame`` at ``source_time``, relative to ``target_frame`` at ``target_time``.
 
-        ``fixed_frame`` is assumed not to move between the two times. Wait and raise as :meth:`lookup_transform` does.
+        ``fixed_frame`` is assumed not to move between the two times. Wait and raise exceptions as
+        :meth:`lookup_transform` does.
         """
         if nanoseconds(timeout) > 0:
             self.can_transform_full(
@@ -81,7 +83,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Moment = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> int | tuple[int, str]:
-        """Return whether there is a transform (1 or 0), after at most ``timeout``; with the reason if a tuple is requested.
+        """Return whether there is a transform (1 or 0), waiting up to ``timeout``; include the reason if a tuple is requested.
 
         Raise ROSInterruptException and ROSTimeMovedBackwardsException as :meth:`lookup_transform` does.
         """

@@ -54,9 +54,10 @@ class BufferClient(BufferInterface):
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> TransformStamped:
-        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; wait for it for ``timeout``.
+        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; wait up to ``timeout`` for it.
 
-        Raise the server's LookupException, ..., and TimeoutException if it does not answer.
+        Raise the exception that the server reports, such as LookupException, or TimeoutException if the server does not
+        respond.
         """
         goal = LookupTransformGoal(
             target_frame=target_frame,
@@ -77,7 +78,7 @@ class BufferClient(BufferInterface):
     ) -> TransformStamped:
         """Return the pose of ``source_frame`` at ``source_time``, relative to ``target_frame`` at ``target_time``.
 
-        Raise as :meth:`lookup_transform` does.
+        Raise exceptions as :meth:`lookup_transform` does.
         """
         goal = LookupTransformGoal(
             target_frame=target_frame,

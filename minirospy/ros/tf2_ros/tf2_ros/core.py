@@ -31,7 +31,7 @@ class BufferCore:
     """The tree of frames over the last ``cache_time`` (a Duration; 10 s).
 
     Stamps are exact; the real tf2_py rounds them to the precision of a float in seconds (about 0.2 us today).
-    Rejected transforms are logged, at most once a second per frame and error, with a count.
+    Rejected transforms are logged with a count, at most once a second per frame and error.
     """
 
     def __init__(self, cache_time: Moment | None = None) -> None:
@@ -54,9 +54,9 @@ class BufferCore:
         self._insert(transform, authority, True)
 
     def insert_message(self, data: bytes, authority: str, is_static: bool = False) -> None:
-        """Insert a serialised TFMessage. If earlier messages had the same layout, it is not decoded now.
+        """Insert a serialised TFMessage. If its layout is the same as that of earlier messages, decode it only when needed.
 
-        Not in the real tf2_py. Raise DeserializationError.
+        Not in the real tf2_py. Raise DeserializationError if the bytes are invalid.
         """
         with self._lock:
             self._tree.insert_message(data, authority, is_static=is_static)
@@ -72,7 +72,8 @@ class BufferCore:
     def lookup_transform_core(self, target_frame: str, source_frame: str, time: Moment) -> TransformStamped:
         """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0: the latest common time.
 
-        Raise LookupException, ConnectivityException, ExtrapolationException, InvalidArgumentException.
+        Raise LookupException if a frame is unknown, ConnectivityException if the frames are not connected,
+        ExtrapolationException if there is no data for ``time``, InvalidArgumentException if a frame name is invalid.
         """
         stamp = nanoseconds(time)
         _check_names(target_frame, source_frame)
@@ -87,7 +88,7 @@ class BufferCore:
     ) -> TransformStamped:
         """Return the pose of ``source_frame`` at ``source_time``, relative to ``target_frame`` at ``target_time``.
 
-        ``fixed_frame`` is assumed not to move between the two times. Raise as :meth:`lookup_transform_core` does.
+        ``fixed_frame`` is assumed not to move between the two times. Raise exceptions as :meth:`lookup_transform_core` does.
         """
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         _check_names(target_frame, source_frame, fixed_frame)
@@ -116,7 +117,8 @@ class BufferCore:
     def get_latest_common_time(self, target_frame: str, source_frame: str) -> Time:
         """Return the newest time at which a lookup succeeds; zero if all transforms between the frames are static.
 
-        Raise LookupException, InvalidArgumentException; TransformException if the frames are not connected.
+        Raise LookupException if a frame is unknown, InvalidArgumentException if a frame name is invalid, TransformException if
+        the frames are not connected.
         """
         _check_names(target_frame, source_frame)
         with self._lock:
@@ -125,7 +127,7 @@ class BufferCore:
     # --- what there is
 
     def all_frames_as_yaml(self, time: Moment | float = 0.0) -> str:
-        """Return parent, broadcaster, rate and times of each frame; ``time`` has no effect, as in real ROS."""
+        """Return each frame's parent, broadcaster, rate and times; ``time`` has no effect, as in real ROS."""
         with self._lock:
             return frames_as_yaml(self._tree)
 
@@ -135,7 +137,7 @@ class BufferCore:
             return self._tree.frames_as_string()
 
     def _allFramesAsDot(self, time: Moment = _NO_TIME) -> str:
-        """Return the tree as a graphviz graph, with each frame's age if a time is given."""
+        """Return the tree as a graphviz graph, with the age of each frame if a time is given."""
         stamp = nanoseconds(time)
         with self._lock:
             return frames_as_dot(self._tree, stamp)
@@ -158,7 +160,7 @@ class BufferCore:
     # --- within
 
     def on_change(self, function: Callable[[], object]) -> Callable[[], None]:
-        """Call ``function`` after each insertion, in the inserting thread; return a function that stops this."""
+        """Call ``function`` after each insertion, in the inserting thread; return a function that stops these calls."""
         with self._lock:
             self._changed = (*self._changed, function)
 
@@ -206,7 +208,7 @@ class BufferCore:
         return int(why is None), why or ""
 
     def _report(self) -> None:
-        """Log rejected transforms. The lock is not held, because a log handler may call lookups."""
+        """Log rejected transforms, without holding the lock, because a log handler may call lookups."""
         with self._lock:
             refused = self._refused[:]
             del self._refused[: len(refused)]

@@ -1,4 +1,4 @@
-"""The base class of the buffer and of the buffer client: transforms whole messages, and converts between types.
+"""The base class for the buffer and the buffer client: transforms whole messages, and converts between types.
 
 Source: http://wiki.ros.org/tf2_ros, http://wiki.ros.org/tf2/Tutorials/Transforming%20your%20own%20datatypes.
 """
@@ -34,7 +34,7 @@ _Function: TypeAlias = Callable[..., Any]
 
 
 class TypeException(Exception):
-    """Nothing is registered for this type; programs import the package that registers it."""
+    """No conversion is registered for this type; the program must import the package that registers it."""
 
     def __init__(self, errstr: str) -> None:
         super().__init__(errstr)
@@ -42,7 +42,7 @@ class TypeException(Exception):
 
 
 class NotImplementedException(Exception):
-    """A method that a subclass of BufferInterface must implement."""
+    """A subclass of BufferInterface does not implement this method."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -50,7 +50,7 @@ class NotImplementedException(Exception):
 
 
 class _Registry:
-    """Functions by type, or by a pair of types, shared by the whole process."""
+    """Functions by type, or by a pair of types; shared by the whole process."""
 
     def __init__(self) -> None:
         self.functions: dict[object, _Function] = {}
@@ -76,7 +76,7 @@ class TransformRegistration:
         self._registry.functions[key] = callback
 
     def get(self, key: type[_T]) -> Callable[[_T, TransformStamped], _T]:
-        """Return the function for a type. Raise TypeException."""
+        """Return the function registered for a type. Raise TypeException if there is none."""
         return self._registry.get(key)
 
 
@@ -100,20 +100,23 @@ class ConvertRegistration:
         self._convert.functions[key] = callback
 
     def get_from_msg(self, key: type[_T]) -> Callable[..., _T]:
-        """Return the function that converts a message to the type. Raise TypeException."""
+        """Return the function that converts a message to the type. Raise TypeException if none is registered."""
         return self._from_msg.get(key)
 
     def get_to_msg(self, key: type[_A]) -> Callable[[_A], object]:
-        """Return the function that converts an object of the type to a message. Raise TypeException."""
+        """Return the function that converts an object of the type to a message. Raise TypeException if none is registered."""
         return self._to_msg.get(key)
 
     def get_convert(self, key: tuple[type[_A], type[_T]]) -> Callable[[_A], _T]:
-        """Return the direct conversion. Raise TypeException."""
+        """Return the direct conversion. Raise TypeException if none is registered."""
         return self._convert.get(key)
 
 
 def convert(a: object, b_type: type[_T]) -> _T:
-    """Return ``a`` as an object of the type: converted directly, copied, or through a message. Raise TypeException."""
+    """Return ``a`` as an object of the type: converted directly, copied, or through a message.
+
+    Raise TypeException if no conversion is registered.
+    """
     registration = ConvertRegistration()
     try:
         directly = registration.get_convert((type(a), b_type))
@@ -126,7 +129,7 @@ def convert(a: object, b_type: type[_T]) -> _T:
 
 
 def Stamped(obj: _T, stamp: times.Time, frame_id: str) -> _T:
-    """Give an object a ``header`` with stamp and frame, and return it."""
+    """Set an object's ``header`` to a stamp and frame, and return the object."""
     obj.header = Header(frame_id=frame_id, stamp=stamp)  # type: ignore[attr-defined]
     return obj
 
@@ -156,9 +159,9 @@ class BufferInterface:
         timeout: Moment = NO_WAIT,
         new_type: type | None = None,
     ) -> object:
-        """Return a stamped object in ``target_frame``, at its own stamp, converted to ``new_type`` if that is given.
+        """Return a stamped object in ``target_frame``, at its own stamp, converted to ``new_type`` if given.
 
-        Raise TypeException for a type that is not registered, else as :meth:`lookup_transform` does.
+        Raise TypeException for a type that is not registered; otherwise raise exceptions as :meth:`lookup_transform` does.
         """
         do_transform = self.registration.get(type(object_stamped))
         header = object_stamped.header
@@ -177,7 +180,7 @@ class BufferInterface:
     ) -> Any:
         """Return a stamped object in ``target_frame`` at ``target_time``.
 
-        ``fixed_frame`` is assumed not to move between the two times. Raise as :meth:`transform` does.
+        ``fixed_frame`` is assumed not to move between the two times. Raise exceptions as :meth:`transform` does.
         """
         do_transform = self.registration.get(type(object_stamped))
         header = object_stamped.header

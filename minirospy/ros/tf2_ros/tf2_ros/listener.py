@@ -18,7 +18,7 @@ __all__ = ["TransformListener"]
 
 
 class TransformSink(Protocol):
-    """The target of a listener's transforms: a Buffer or the program's own object."""
+    """The object that receives a listener's transforms: a Buffer or the program's own object."""
 
     def set_transform(self, transform: TransformStamped, authority: str, /) -> object:
         """Insert a transform."""
@@ -55,7 +55,7 @@ class TransformListener:
         )
 
     def __del__(self) -> None:
-        # The constructor may have failed, or the interpreter may be exiting.
+        # Suppress all errors: the constructor may have failed, or the interpreter may be exiting.
         with contextlib.suppress(Exception):
             self.unregister()
 
@@ -66,7 +66,7 @@ class TransformListener:
 
     def check_for_reset(self) -> None:
         """Clear the buffer if time has jumped back since the last message."""
-        # Read the time inside the lock: otherwise a thread that is overtaken by another would detect a jump.
+        # Read the time inside the lock: otherwise a thread overtaken by another would report a jump.
         with self.last_update_lock:
             now = rospy.get_time()
             jump, self._last = self._last - now, now

@@ -1,4 +1,4 @@
-"""Conversions between messages and the buffer's numbers: TransformStamped, times, and /tf messages that stay undecoded."""
+"""Conversions between messages and the buffer's numbers: TransformStamped, times, and /tf messages that remain undecoded."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ class Moment(Protocol):
 
 
 def nanoseconds(time: Moment) -> int:
-    """Return a time in nanoseconds; exact if it has ``secs`` and ``nsecs``. Raise TypeError as tf2_py does."""
+    """Return a time in nanoseconds; exact if it has ``secs`` and ``nsecs``.
+
+    Raise TypeError if it is not a time, as tf2_py does.
+    """
     try:
         return time.secs * _BILLION + time.nsecs  # type: ignore[attr-defined, no-any-return]
     except AttributeError:
@@ -55,7 +58,7 @@ def transform_stamped(target: str, source: str, found: StampedTransform) -> Tran
 
 
 class LazyTFMessage(TFMessage):
-    """A TFMessage that keeps its bytes (``raw``) for the buffer, and is decoded only when ``transforms`` is read."""
+    """A TFMessage that stores its bytes (``raw``) for the buffer, and is decoded only when ``transforms`` is read."""
 
     __slots__ = ["raw"]
     _slot_types = TFMessage._slot_types

@@ -1,4 +1,4 @@
-"""tf2_ros.BufferServer: answers the lookups of BufferClients through an action. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.BufferServer: performs the lookups of BufferClients through an action. Source: http://wiki.ros.org/tf2_ros."""
 
 from __future__ import annotations
 
@@ -35,9 +35,10 @@ _CODES: list[tuple[type[TransformException], int]] = [
 
 
 class BufferServer:
-    """Answers lookups in ``buffer`` through the action ``ns`` (tf2_msgs/LookupTransform), each as soon as it is possible.
+    """Performs lookups in ``buffer`` through the action ``ns`` (tf2_msgs/LookupTransform), each as soon as it is possible.
 
-    A goal waits until an insertion makes its lookup possible or its timeout expires; then the result contains the error.
+    A goal stays pending until an insertion makes its lookup possible or its timeout expires; then the result contains the
+    error.
     ``check_period`` (a Duration) is the interval at which simulated time is checked. Real ROS has this class only in C++.
     """
 
@@ -52,7 +53,7 @@ class BufferServer:
         self._check_seconds = check_period.to_sec()
         self._lock = threading.Lock()
         self._pending: list[tuple[actionlib.ServerGoalHandle, times.Time]] = []
-        """The waiting goals, with the ends of their timeouts."""
+        """The pending goals, with their deadlines."""
         self._news = SignalSafeEvent()
         self._server = actionlib.ActionServer(
             ns, LookupTransformAction, self._take_goal, self._cancel, auto_start=False
@@ -87,7 +88,7 @@ class BufferServer:
             handle.set_canceled()
 
     def _work(self) -> None:
-        """Answer due goals after each insertion and at each timeout."""
+        """Complete due goals after each insertion and at each timeout."""
         with rospy.interrupting(self._news.set):
             while not rospy.is_down():
                 self._news.clear()
@@ -96,7 +97,7 @@ class BufferServer:
                 wait_for_event(self._news, self._next_look())
 
     def _due(self) -> list[actionlib.ServerGoalHandle]:
-        """Remove and return the goals that are possible or have timed out."""
+        """Remove and return the goals whose lookup is possible or that have timed out."""
         now = rospy.get_rostime()
         with self._lock:
             waiting, self._pending = self._pending, []

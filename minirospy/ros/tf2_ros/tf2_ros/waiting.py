@@ -1,4 +1,4 @@
-"""Waiting for a transform: until an insertion, a shutdown, the timeout, or a jump in time."""
+"""Waiting for a transform, until an insertion, a shutdown, the timeout, or a time jump."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds
 
 __all__ = ["wait_until"]
 
-_JUMP = times.Duration(3)  # a wall clock that is set back by more than this ends a wait
+_JUMP = times.Duration(3)  # a wall clock that is set back by more than this aborts a wait
 _SIMULATED_SLICE = 0.01  # seconds; a change of simulated time does not wake a waiting thread
 
 

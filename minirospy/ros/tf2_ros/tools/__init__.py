@@ -1,11 +1,12 @@
-"""The programs of tf, tf2_ros and tf2_tools, on the buffer and the public node API.
+"""The programs of tf, tf2_ros and tf2_tools, based on the buffer and the public node API.
 
-Each has a ``main(words)`` that receives the command line's arguments without remappings, and returns the exit status.
+Each has a ``main(words)`` that receives the command-line arguments without remappings, and returns the exit status.
 Messages, usage errors and statuses are those of ROS's programs. Source: http://wiki.ros.org/tf/Debugging%20tools,
 http://wiki.ros.org/tf2_ros, http://wiki.ros.org/tf2_tools.
 """
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# The modules below import messages of ROS 1; if ROS 2 is sourced, its packages of the same names would come first.
+# The modules below import ROS 1 messages; if ROS 2 is sourced, its packages of the same names would be imported
+# instead.
 prefer_ros1()

@@ -1,4 +1,4 @@
-"""Conversion of quaternions to angles, in the same steps as ROS's two programs, so that the signs of zeros match."""
+"""Conversion of quaternions to angles, in the same steps as ROS's two programs, so that zeros have the same signs."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _repeat(rate: float, echo: Callable[[], bool]) -> None:
-    """Call ``echo`` at a rate until it returns False or the node is shut down."""
+    """Call ``echo`` at the given rate until it returns False or the node is shut down."""
     rhythm = rospy.Rate(rate)
     while not rospy.is_shutdown() and echo():
         try:
@@ -152,7 +152,7 @@ def _pose(found: TransformStamped, precision: int, angles: Callable[[Quaternion]
 
 
 def _rounded(nanoseconds: int, digits: int) -> str:
-    """Return a time in seconds with ``digits`` decimals, without the rounding errors of a float."""
+    """Return a time in seconds with ``digits`` decimals, without float rounding errors."""
     if digits > 6:
         return f"{nanoseconds / 1e9:.{digits}f}"
     scaled = round(nanoseconds / 10 ** (9 - digits))
@@ -171,7 +171,7 @@ def _positive(text: str) -> float:
 
 
 def _precision() -> int | None:
-    """Return the parameter ~precision. Raise ToolError."""
+    """Return the parameter ~precision. Raise ToolError if it is invalid."""
     value = rospy.get_param("~precision", None)
     if value is None:
         return None

@@ -1,4 +1,4 @@
-"""tf_monitor: how late each frame's transforms arrive, and how often each node sends them.
+"""tf_monitor: measures the delay of each frame's transforms, and the rate at which each node sends them.
 
 Source: http://wiki.ros.org/tf#tf_monitor. Nodes are shown by name, as the real program did before tf2.
 """
@@ -24,7 +24,7 @@ from minirospy.ros.tf2_ros.tools.program import ToolError, report, run_program
 __all__ = ["Delays", "main"]
 
 _USAGE = "TF_Monitor: usage: tf_monitor framea frameb"
-_KEPT = 1000  # number of delays in an average, and of messages in a rate
+_KEPT = 1000  # delays per average, and messages per rate
 _STEP = 0.01
 _STEPS = 20  # measurements of the delay between two frames per report
 _SMOOTHING = 0.01
@@ -32,7 +32,7 @@ _MIN_PERIOD = 1e-8
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run tf_monitor, for all frames or for those between two; return the exit status."""
+    """Run tf_monitor, for all frames or for those between two frames; return the exit status."""
     return run_program(_run, words)
 
 
@@ -46,7 +46,7 @@ class Delays:
         self._node_times: dict[str, deque[float]] = {}
 
     def add(self, sender: str, frames: Sequence[tuple[str, float]], now: float, *, is_static: bool) -> None:
-        """Record a message: each child frame with its stamp. Static transforms are never late."""
+        """Record a message: each child frame with its stamp. Static transforms count as having no delay."""
         sender = sender + "(static)" * is_static
         late = [(child, 0.0 if is_static else now - stamp) for child, stamp in frames]
         for child, delay in late:
@@ -57,7 +57,7 @@ class Delays:
         self._node_times.setdefault(sender, deque(maxlen=_KEPT)).append(now)
 
     def frame_lines(self, chain: Sequence[str] | None = None) -> Iterator[str]:
-        """Yield a line for each frame, only for those in ``chain`` if it is given."""
+        """Yield a line for each frame; if ``chain`` is given, only for the frames in it."""
         for child in sorted(self._delays):
             if chain is None or child in chain:
                 average, most = _average_and_most(self._delays[child])

@@ -1,4 +1,4 @@
-"""The common part of the programs: their arguments, their errors, a buffer with a listener."""
+"""The code that the programs share: their arguments, their errors, a buffer with a listener."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ USAGE_STATUS = 255  # exit status of a usage error: ROS's programs return -1
 
 
 class ToolError(MinirospyError):
-    """A program cannot continue: prints ``text`` to stdout, ``str()`` to stderr, and sets the exit status.
+    """A program cannot continue: it prints ``text`` to stdout and ``str()`` to stderr, and exits with the status.
 
-    ``level`` is the log level of the line; if it is empty, the line is printed without one.
+    ``level`` is the line's log level; if it is empty, the line is printed without a level.
     """
 
     def __init__(
@@ -44,15 +44,15 @@ def run_program(body: Callable[[Sequence[str]], int | None], words: Sequence[str
     except (rospy.ROSInterruptException, KeyboardInterrupt):
         return 0
     except BrokenPipeError:
-        # The text that is still buffered cannot be written either.
+        # The text that is still buffered cannot be written, so discard it.
         sys.stdout = None
         return 0
 
 
 def report(line: str, level: str = "ERROR") -> None:
-    """Print a line in the format of ROS's console, even before there is a node; without a level, print it unchanged.
+    """Print a line in the format of ROS's console, even if there is no node yet; without a level, print it unchanged.
 
-    The level INFO goes to stdout, all others to stderr.
+    The level INFO is printed to stdout, all others to stderr.
     """
     head = f"[{level}] [{time.time():.6f}]: " if level else ""
     print(escaped(head + line, "\n"), file=sys.stdout if level == "INFO" else sys.stderr, flush=True)

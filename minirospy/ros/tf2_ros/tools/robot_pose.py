@@ -41,7 +41,7 @@ def _run(words: Sequence[str]) -> None:
         try:
             found = buffer.lookup_transform(map_frame.lstrip("/"), base_frame.lstrip("/"), rospy.Time(0))
         except TransformException:
-            # A robot that has not been localised yet has no pose.
+            # A robot that is not localised yet has no pose.
             pass
         else:
             position = found.transform.translation

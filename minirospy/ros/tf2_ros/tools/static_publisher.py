@@ -41,9 +41,9 @@ Usage: {_NAME} /param_name
 {_ABOUT}"""  # noqa: W291
 
 _MIN_PERIOD = 0.001
-"""Shortest period in seconds: a period of 0 would keep this process and all listeners busy."""
+"""Minimum period in seconds: a period of 0 would keep this process and all listeners busy."""
 _TOLERANCE = 0.01
-"""Largest deviation of a quaternion's squared length from 1: beyond it, every listener rejects the transform."""
+"""Maximum deviation of a quaternion's squared length from 1: beyond it, every listener rejects the transform."""
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
@@ -52,7 +52,7 @@ def main_tf(words: Sequence[str] | None = None) -> int:
 
 
 def main_tf2(words: Sequence[str] | None = None) -> int:
-    """Run tf2_ros's program: the same arguments without a period, or a parameter's name; return the exit status."""
+    """Run tf2_ros's program: the same arguments without a period, or a parameter name; return the exit status."""
     return run_program(_run_tf2, words)
 
 
@@ -96,7 +96,10 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _transform(numbers: Sequence[str], parent: str, child: str) -> TransformStamped:
-    """Return the transform of x y z yaw pitch roll, or x y z qx qy qz qw. Raise ToolError."""
+    """Return the transform built from x y z yaw pitch roll, or x y z qx qy qz qw.
+
+    Raise ToolError if the arguments are invalid.
+    """
     x, y, z, *turn = (
         _number(number, what) for number, what in zip(numbers, _names(len(numbers)), strict=True)
     )
@@ -124,7 +127,7 @@ def _number(text: str, what: str) -> float:
 
 
 def _checked(transform: TransformStamped) -> TransformStamped:
-    """Return the transform if listeners accept it. Raise ToolError."""
+    """Return the transform unchanged. Raise ToolError if listeners would reject it."""
     parent, child = transform.header.frame_id, transform.child_frame_id
     # Listeners ignore a leading slash.
     if parent.removeprefix("/") == child.removeprefix("/"):
@@ -141,7 +144,10 @@ def _checked(transform: TransformStamped) -> TransformStamped:
 
 
 def _transform_of_parameter(name: str) -> TransformStamped:
-    """Return the transform in a parameter, which has the fields of a TransformStamped. Raise ToolError."""
+    """Return the transform in a parameter, which has the fields of a TransformStamped.
+
+    Raise ToolError if the parameter is not set or invalid.
+    """
     rospy.loginfo("Looking for TF in parameter: %s", name)
     try:
         value = rospy.get_param(name, None)

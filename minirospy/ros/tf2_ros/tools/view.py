@@ -35,7 +35,7 @@ _VERSION = re.compile(r"version (\d+\.?\d*)")
 
 
 class FrameRecord(NamedTuple):
-    """A frame of a listing; values are strings, as printed."""
+    """One frame in a listing; values are strings, as printed."""
 
     name: str
     parent: str
@@ -108,7 +108,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _listen() -> None:
-    """Wait for transforms to arrive, in real time, as a bag may be paused. Raise ROSInterruptException at a shutdown."""
+    """Wait for transforms to arrive, in real time because a bag may be paused. Raise ROSInterruptException at a shutdown."""
     end = time.monotonic() + _SECONDS
     while time.monotonic() < end:
         if rospy.is_shutdown():
@@ -117,7 +117,7 @@ def _listen() -> None:
 
 
 def _graph_of_node(name: str) -> str:
-    """Return the graph that a tf or tf2 node offers; wait for its service. Raise ToolError."""
+    """Return the graph that a tf or tf2 node offers; wait for its service. Raise ToolError if the call fails."""
     from tf.srv import FrameGraph
 
     rospy.init_node("view_frames", anonymous=True)
@@ -142,7 +142,7 @@ def _graph_of_node(name: str) -> str:
 
 
 def read_records(listing: str) -> list[FrameRecord]:
-    """Parse a buffer's YAML listing into frames, whatever characters the frames' names contain."""
+    """Parse a buffer's YAML listing into frames; frame names may contain any characters."""
     pattern = re.compile(
         r"^(.*): \n  parent: '(.*)'\n  broadcaster: '(.*)'\n  rate: (.*)\n  most_recent_transform: (.*)\n"
         r"  oldest_transform: (.*)\n  buffer_length: (.*)\n",
@@ -180,7 +180,7 @@ def tf2_graph(records: Sequence[FrameRecord], now: float) -> str:
 
 
 def read_edges(dot: str) -> Iterator[Edge]:
-    """Yield the edges of a graph that either program wrote."""
+    """Yield the edges in a graph that either program wrote."""
     for parent, child, label in _EDGE.findall(dot):
         lines = [line.strip() for line in label.split("\\n") if line.strip()]
         yield Edge(_unquoted(parent), _unquoted(child), tuple(lines))
@@ -205,7 +205,7 @@ def _draw_svg(dot: str) -> None:
 
 
 def _save(name: str, text: str) -> None:
-    """Write a file into the current folder. Raise ToolError."""
+    """Write a file into the current folder. Raise ToolError if it cannot be written."""
     try:
         Path(name).write_text(text, encoding="utf-8")
     except OSError as error:

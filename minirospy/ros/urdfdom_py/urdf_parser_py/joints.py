@@ -28,7 +28,7 @@ _ORIGIN = Element("origin", ObjectOf(Pose), False)
 
 
 class JointDynamics(Object):
-    """Damping and friction of a joint."""
+    """A joint's damping and friction."""
 
     TAG = "dynamics"
     FIELDS = (Attribute("damping", _NUMBER, False), Attribute("friction", _NUMBER, False))
@@ -92,7 +92,7 @@ class JointMimic(Object):
 
 
 class SafetyController(Object):
-    """The limits that a controller enforces."""
+    """The limits that a safety controller enforces."""
 
     TAG = "safety_controller"
     FIELDS = (
@@ -116,7 +116,7 @@ class SafetyController(Object):
 
 
 class Joint(Object):
-    """A joint between two links, which are given by name."""
+    """A joint between two links; the links are given by name."""
 
     TYPES = ["unknown", "revolute", "continuous", "prismatic", "floating", "planar", "fixed"]
     TAG = "joint"
@@ -177,7 +177,7 @@ class Joint(Object):
 
 
 class PR2Transmission(Object):
-    """A transmission of the PR2."""
+    """A PR2 transmission."""
 
     TAG = "pr2_transmission"
     FIELDS = (
@@ -204,7 +204,7 @@ class PR2Transmission(Object):
 
 
 class Actuator(Object):
-    """An actuator of a transmission."""
+    """A transmission's actuator."""
 
     TAG = "actuator"
     FIELDS = (_NAME, Element("mechanicalReduction", _NUMBER, False))
@@ -215,7 +215,7 @@ class Actuator(Object):
 
 
 class TransmissionJoint(Object):
-    """A joint of a transmission."""
+    """A transmission's joint."""
 
     TAG = "joint"
     FIELDS = (_NAME, Many("hardwareInterface", _TEXT))

@@ -131,7 +131,7 @@ class GeometricType(Codec[Object]):
     _KINDS: dict[str, type[Object]] = {kind.TAG: kind for kind in (Box, Cylinder, Sphere, Mesh)}
 
     def from_xml(self, node: ET.Element, path: Path) -> Object:
-        """Return the shape. Raise AssertionError if there is not exactly one."""
+        """Return the shape. Raise AssertionError unless there is exactly one."""
         if len(node) != 1:
             raise AssertionError("One element only for geometric")
         kind = self._KINDS.get(node[0].tag)
@@ -190,7 +190,7 @@ class Material(Object):
 
 
 class LinkMaterial(Material):
-    """The material of a shape, which may be only a name."""
+    """A shape's material, which may be only a name."""
 
     def check_valid(self) -> None:
         """Accept a material that is only a name."""
@@ -249,7 +249,7 @@ class Inertia(Object):
 
 
 class Inertial(Object):
-    """The mass and inertia of a link."""
+    """A link's mass and inertia."""
 
     TAG = "inertial"
     FIELDS = (

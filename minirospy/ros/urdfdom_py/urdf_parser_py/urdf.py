@@ -114,13 +114,16 @@ class Robot(Object):
 
     @classmethod
     def from_parameter_server(cls, key: str = "robot_description") -> Robot:
-        """Return the robot in a parameter. Raise KeyError if it is not set; else raise as from_xml_string does."""
+        """Return the robot described by a parameter.
+
+        Raise KeyError if the parameter is not set, and the exceptions that from_xml_string raises if it is invalid.
+        """
         from minirospy import client as rospy
 
         return cls.from_xml_string(rospy.get_param(key))
 
     def add_aggregate(self, xml_var: str, obj: Any) -> None:
-        """Add a part of the robot."""
+        """Add a part to the robot."""
         super().add_aggregate(xml_var, obj)
         if xml_var == "joint":
             self.joint_map[obj.name] = obj
@@ -158,7 +161,7 @@ class Robot(Object):
         return chain[::-1]
 
     def get_root(self) -> str:
-        """Return the only link without a parent. Raise AssertionError if there is not exactly one."""
+        """Return the only link without a parent. Raise AssertionError unless there is exactly one."""
         roots = [name for name in self.link_map if name not in self.parent_map]
         if len(roots) > 1:
             raise AssertionError("Multiple roots detected, invalid URDF.")

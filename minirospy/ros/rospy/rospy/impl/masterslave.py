@@ -43,7 +43,7 @@ class ROSHandler(XmlRpcHandler):
         return self._call("getName", args, value=self.name)
 
     def getUri(self, *args: object) -> Answer:
-        """Return the URI of the server that uses this handler; None before."""
+        """Return the URI of the server that uses this handler, or None if no server uses it yet."""
         return self._call("getUri", args, value=self.uri)
 
     def getMasterUri(self, *args: object) -> Answer:
@@ -56,7 +56,7 @@ class ROSHandler(XmlRpcHandler):
         return self._call("getPid", args)
 
     def getBusStats(self, *args: object) -> Answer:
-        """Return the transferred bytes and messages."""
+        """Return the number of transferred bytes and messages."""
         return self._call("getBusStats", args)
 
     def getBusInfo(self, *args: object) -> Answer:
@@ -64,11 +64,11 @@ class ROSHandler(XmlRpcHandler):
         return self._call("getBusInfo", args)
 
     def getPublications(self, *args: object) -> Answer:
-        """Return [topic, type] of each topic that the node publishes."""
+        """Return [topic, type] for each topic that the node publishes."""
         return self._call("getPublications", args)
 
     def getSubscriptions(self, *args: object) -> Answer:
-        """Return [topic, type] of each topic that the node subscribes to."""
+        """Return [topic, type] for each topic that the node subscribes to."""
         return self._call("getSubscriptions", args)
 
     def paramUpdate(self, *args: object) -> Answer:
@@ -80,7 +80,7 @@ class ROSHandler(XmlRpcHandler):
         return self._call("publisherUpdate", args)
 
     def requestTopic(self, *args: object) -> Answer:
-        """Return the address of a topic of this node."""
+        """Return the address at which this node serves a topic."""
         return self._call("requestTopic", args)
 
     def shutdown(self, *args: object) -> Answer:
@@ -97,7 +97,7 @@ class ROSHandler(XmlRpcHandler):
         self.done = True
 
     def _call(self, method: str, args: tuple[object, ...], **known: object) -> Answer:
-        """Return the answer of the node's own API; ``value``, if given, replaces the answer's value."""
+        """Return the response of the node's own API; ``value``, if given, replaces the response's value."""
         session = current_session()
         if session.node is None:
             return -1, "the node has not been initialized", known.get("value", 0)

@@ -1,4 +1,4 @@
-"""This node's topics and services, in the form of rospy.impl.registration."""
+"""This node's topics and services, with the interface of rospy.impl.registration."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class TopicManager:
     """Lists the node's publications, subscriptions and connections."""
 
     def get_publications(self) -> list[list[str]]:
-        """Return [topic, type] of each topic that this node publishes."""
+        """Return [topic, type] for each topic that this node publishes."""
         return self._query("get_publications")
 
     def get_subscriptions(self) -> list[list[str]]:
-        """Return [topic, type] of each topic that this node subscribes to."""
+        """Return [topic, type] for each topic that this node subscribes to."""
         return self._query("get_subscriptions")
 
     def get_topics(self) -> set[str]:
@@ -46,7 +46,7 @@ class TopicManager:
         return [tuple(row) for row in self._query("get_bus_info")]
 
     def get_pub_sub_stats(self) -> tuple[list[object], list[object]]:
-        """Return the statistics of publications and of subscriptions, in the format of getBusStats."""
+        """Return the publication and subscription statistics, in the format of getBusStats."""
         stats = self._query("get_bus_stats")
         return (stats[0], stats[1]) if stats else ([], [])
 
@@ -67,7 +67,7 @@ class ServiceManager:
         return [(name, service.uri) for name, service in list(current_session().offered.items())]
 
     def get_service(self, resolved_service_name: str) -> Service[object] | None:
-        """Return the service of this name; None if this node does not provide it."""
+        """Return the service with this name, or None if this node does not provide it."""
         return current_session().offered.get(resolved_service_name)
 
 

@@ -1,4 +1,4 @@
-"""rospy.impl.tcpros: constants of TCPROS."""
+"""rospy.impl.tcpros: TCPROS constants."""
 
 from minirospy.ros.rospy.rospy.impl.transport import DEFAULT_BUFF_SIZE
 

@@ -1,15 +1,15 @@
-"""rospy.impl.transport and tcpros_base: the directions of a connection in getBusInfo, and constants of TCPROS."""
+"""rospy.impl.transport and tcpros_base: the connection directions in getBusInfo, and TCPROS constants."""
 
 __all__ = ["BIDIRECTIONAL", "INBOUND", "OUTBOUND"]
 
 INBOUND, OUTBOUND, BIDIRECTIONAL = "i", "o", "b"
 TCPROS = "TCPROS"
 DEFAULT_BUFF_SIZE = 65536
-"""The default of Subscriber's ``buff_size``."""
+"""The default value for Subscriber's ``buff_size``."""
 
 
 def __getattr__(name: str) -> object:
-    # Programs use them in annotations. Imported on use, because they import asyncio.
+    # Programs use these names in annotations. Import them on use, because their module imports asyncio.
     if name in ("Transport", "DeadTransport"):
         from minirospy.runtime.transport.links import OutLink
 

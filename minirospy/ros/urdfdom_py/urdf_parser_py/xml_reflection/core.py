@@ -31,14 +31,14 @@ on_error: Callable[[str], object] = on_error_stderr
 
 
 def report(message: str) -> None:
-    """Call the program's replacement of on_error, else on_error."""
+    """Call the program's replacement for on_error, else on_error."""
     module = sys.modules.get("urdf_parser_py.xml_reflection.core")
     replaced = getattr(module, "on_error", on_error_stderr)
     (on_error if replaced is on_error_stderr else replaced)(message)
 
 
 class Path:
-    """The path of an element in a description."""
+    """The path to an element in a description."""
 
     def __init__(self, tag: str, parent: Path | None = None, suffix: str = "") -> None:
         self.tag = tag
@@ -51,7 +51,7 @@ class Path:
 
 
 class ParseError(Exception):
-    """A description cannot be read: the error (``e``) and its place (``path``)."""
+    """A description cannot be read: the error (``e``) and the element's path (``path``)."""
 
     def __init__(self, e: Exception, path: Path) -> None:
         self.e = e
@@ -63,7 +63,7 @@ class Codec(Generic[_V]):
     """Converts between a value and an element or an attribute's string."""
 
     def from_string(self, text: str) -> _V:
-        """Convert a string to a value. Raise ValueError."""
+        """Convert a string to a value. Raise ValueError if the string is invalid."""
         raise NotImplementedError
 
     def to_string(self, value: _V) -> str:
@@ -91,12 +91,12 @@ class Number(Codec[float]):
     """A number."""
 
     def from_string(self, text: str) -> float:
-        """Convert a string to a number. Raise ValueError."""
+        """Convert a string to a number. Raise ValueError if the string is not a number."""
         return float(text)
 
 
 class VectorOf(Codec[Iterable[float]]):
-    """A list of numbers of a fixed length."""
+    """A fixed-length list of numbers."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -190,7 +190,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Many:
-    """Child elements that occur any number of times, stored as a list in the attribute that is called ``name`` + "s"."""
+    """Child elements that occur any number of times, stored as a list in the attribute ``name`` + "s"."""
 
     name: str
     codec: Codec[Any]
@@ -206,28 +206,34 @@ class Object:
 
     @classmethod
     def from_xml_string(cls: type[_T], xml_string: str | bytes) -> _T:
-        """Return the object from an XML string. Raise ParseError, xml.etree.ElementTree.ParseError."""
+        """Return the object parsed from an XML string.
+
+        Raise ParseError if the description is invalid, xml.etree.ElementTree.ParseError if the string is not XML.
+        """
         return cls.from_xml(_root(xml_string), Path(cls.TAG))
 
     @classmethod
     def from_xml_file(cls: type[_T], file_path: str) -> _T:
-        """Return the object from a file. Raise OSError; else raise as from_xml_string does."""
+        """Return the object parsed from a file.
+
+        Raise OSError if it cannot be read, and the errors that from_xml_string raises.
+        """
         return cls.from_xml_string(File(file_path).read_bytes())
 
     @classmethod
     def from_xml(cls: type[_T], node: ET.Element, path: Path) -> _T:
-        """Return the object from an element. Raise ParseError."""
+        """Return the object parsed from an element. Raise ParseError if the element is invalid."""
         found = cls()
         found.read_xml(node, path)
         return found
 
     def parse(self: _T, xml_string: str | bytes) -> _T:
-        """Read an XML string into this object; return the object. Raise as from_xml_string does."""
+        """Read an XML string into this object; return the object. Raise exceptions as from_xml_string does."""
         self.read_xml(_root(xml_string), Path(self.TAG))
         return self
 
     def read_xml(self, node: ET.Element, path: Path) -> None:
-        """Read an element into this object. Raise ParseError."""
+        """Read an element into this object. Raise ParseError if the element is invalid."""
         self._read_attributes(node, path)
         self._read_elements(node, path)
         attributes = {each.name for each in self.FIELDS if isinstance(each, Attribute)}
@@ -288,13 +294,13 @@ class Object:
         setattr(self, field.name, [*default] if isinstance(default, list) else default)
 
     def post_read_xml(self) -> None:
-        """Do nothing; programs' classes override it to react after reading."""
+        """Do nothing; subclasses in programs override it to run code after reading."""
 
     def check_valid(self) -> None:
         """Raise an exception if the object is invalid."""
 
     def pre_write_xml(self) -> None:
-        """Do nothing; programs' classes override it to prepare for writing."""
+        """Do nothing; subclasses in programs override it to prepare for writing."""
 
     # --- XML out
 
