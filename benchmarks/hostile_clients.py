@@ -204,9 +204,8 @@ def _flood(port: int, request: bytes, count: int, end: float) -> None:
 
 async def serve() -> None:
     """Role: run the dashboard with rosbridge; print its ports and its node's URI, and run until stdin is closed."""
-    from minirospy.base.heap import return_large_blocks
-
     from minirospy import Node
+    from minirospy.base.heap import return_large_blocks
     from minirospy.web.access import Access
     from minirospy.web.bridge import BridgeOptions
     from minirospy.web.dashboard.dashboard import Dashboard

@@ -25,7 +25,7 @@ _H = TypeVar("_H", bound="Handle")
 
 
 class Handle:
-    """An object that registers in the background: ``await handle`` waits until the master knows it."""
+    """An object that registers in the background: ``await handle`` waits until it is registered with the master."""
 
     _registration: asyncio.Task[None]
 
@@ -53,7 +53,7 @@ class Handle:
 async def registered(
     register: Callable[[_T], Awaitable[None]], part: _T, what: str, faults: RateLimitedLogger
 ) -> None:
-    """Wait for a registration; as in rospy, a refusal by the master is only logged."""
+    """Wait for a registration to finish; as in rospy, only log it if the master refuses."""
     try:
         await register(part)
     except (MasterUnreachableError, RpcError) as error:

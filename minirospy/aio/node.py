@@ -54,27 +54,27 @@ _PROBE_SECONDS = 5.0
 MAX_REGISTRATION_FAULTS = 5  # log lines in ten seconds: a bridge may have thousands of topics
 _BILLION = 1_000_000_000
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
-"""The text that the Slave API logs when `shutdown` is called."""
+"""The message that the Slave API logs when `shutdown` is called."""
 
 
 class _Unspecified:
-    """The default of ``default``, since a caller may want None back."""
+    """The type of ``default`` if the caller passes none; None would not do, since a caller may want None returned."""
 
 
 _UNSPECIFIED = _Unspecified()
 
 
 class Node:
-    """A node of the computation graph, which exists inside ``async with Node("name") as node:``.
+    """A node in the computation graph, which exists inside ``async with Node("name") as node:``.
 
-    ``name`` is without a namespace; ``anonymous`` appends a number to it. ``argv`` are remappings, private
-    parameters and special names as on a command line (``sys.argv`` for a program that roslaunch starts; by
-    default none, since a process may hold several nodes). ``master_uri``, ``host`` and ``namespace`` stand in
-    for ROS_MASTER_URI, ROS_HOSTNAME and ROS_NAMESPACE. ``rosout``: whether log lines go to /rosout.
-    ``simulated_time``: whether the node follows /clock if /use_sim_time is set. ``registration_fault_lines``: log lines in ten
-    seconds about what the master does not register.
+    ``name`` has no namespace; ``anonymous`` appends a number to it. ``argv`` contains remappings, private
+    parameters and special names as on a command line (pass ``sys.argv`` in a program that roslaunch starts; the
+    default is empty, since a process may have several nodes). ``master_uri``, ``host`` and ``namespace`` replace
+    ROS_MASTER_URI, ROS_HOSTNAME and ROS_NAMESPACE. ``rosout``: whether log lines are published to /rosout.
+    ``simulated_time``: whether the node follows /clock if /use_sim_time is set. ``registration_fault_lines``: the most
+    log lines in ten seconds about registrations that the master refused.
 
-    Entering waits for a master. Call all methods except :meth:`shutdown` in the event loop that entered.
+    Entering the block waits for a master. Call all methods except :meth:`shutdown` in the event loop that entered it.
     Source: http://wiki.ros.org/Nodes.
     """
 
@@ -91,7 +91,7 @@ class Node:
         simulated_time: bool = True,
         registration_fault_lines: int = MAX_REGISTRATION_FAULTS,
     ) -> None:
-        """Create the node. Raise ValueError on a name that is empty or has a namespace."""
+        """Create the node. Raise ValueError if the name is empty or has a namespace."""
         if not name:
             raise ValueError("name must not be empty")
         if "/" in name:
@@ -108,11 +108,11 @@ class Node:
         name = special.get("__name") or (names.anonymous_name(name) if anonymous else name)
         self.name = names.canonicalize(self._environment.namespace + "/" + name)
         self.log = logging.getLogger("rosout" + self.name.replace("/", "."))
-        """Python's logger of this node: to the terminal as rospy prints, and to /rosout."""
+        """The node's logger, which writes to the terminal, as rospy does, and to /rosout."""
+        # Logs registrations that the master refused
         self.registration_faults = RateLimitedLogger(self.log, registration_fault_lines)
-        """Logs what the master has not registered."""
 
-        # The reason given by another process, such as the master for a new node of the same name
+        # The reason that another process gave for the shutdown, such as the master if a new node has the same name
         self.shutdown_request = ""
 
         self._remappings = self._arguments.resolved_remappings(self.name)
@@ -143,7 +143,7 @@ class Node:
         await self.close()
 
     async def start(self) -> None:
-        """Open the node's servers and wait for a master; entering ``async with`` calls this.
+        """Open the node's servers and wait for a master; ``async with`` calls this on entry.
 
         Raise ROSInitException if the node cannot listen, or has been started before.
         """
@@ -191,12 +191,12 @@ class Node:
         """Print log lines on the terminal, unless the program has configured logging. :meth:`start` calls this."""
         if self.log.level == logging.NOTSET:
             self.log.setLevel(logging.INFO)
-        # A program that has configured logging gets the lines through its own handlers.
+        # If the program has configured logging, its own handlers print the lines.
         if not self.log.hasHandlers():
             self._add_handler(TerminalHandler(self))
 
     async def close(self) -> None:
-        """Leave the graph: close topics and services, unregister the node. Idempotent."""
+        """Leave the graph: close all topics and services, and unregister the node. Idempotent."""
         if self._is_closed:
             return
         self._is_closed = True
@@ -215,7 +215,7 @@ class Node:
                     await server.cancel()
 
     def shutdown(self, reason: object = "") -> None:
-        """Request the node to shut down, from any thread: :meth:`spin` and loops over messages return, sleeps are interrupted.
+        """Request the node to shut down: :meth:`spin` and loops over messages return, sleeps are interrupted. Thread-safe.
 
         The node leaves the graph at the end of its ``async with`` block. `rosnode kill` calls this too.
         """
@@ -228,7 +228,7 @@ class Node:
 
     @property
     def is_started(self) -> bool:
-        """Return whether the node has found a master, and so is in the graph."""
+        """Return whether the node has connected to a master, and so is in the graph."""
         return self._is_started
 
     @property
@@ -251,7 +251,7 @@ class Node:
         return self._node.uri
 
     def resolve(self, name: str) -> str:
-        """Return the global name of ``name`` as this node sees it."""
+        """Return the global name of ``name``, resolved relative to this node."""
         return names.resolve(name, self.name, self._remappings)
 
     # --- topics
@@ -261,8 +261,8 @@ class Node:
 
         While the program is busy, the newest ``queue_size`` messages are queued; older ones are dropped and counted
         (``dropped``). The subscription starts immediately, in the background; ``await node.subscribe(...)`` waits until
-        the master knows it. It is closed by :meth:`Subscription.close`, or when it is garbage-collected.
-        Raise ValueError on a ``queue_size`` below 1.
+        it is registered with the master. It is closed by :meth:`Subscription.close`, or when it is garbage-collected.
+        Raise ValueError if ``queue_size`` is below 1.
         """
         if queue_size < 1:
             raise ValueError(f"queue_size is {queue_size}: a subscription keeps at least one message")
@@ -282,8 +282,9 @@ class Node:
     ) -> RawSubscription:
         """Subscribe to ``topic``, of any type unless ``type_`` is given: ``deliver(bytes, publisher's connection header)``.
 
-        ``deliver`` is called on the loop, and must be quick; the same applies to ``on_change``, called when a publisher has
-        connected. The bytes may be kept. ``await node.subscribe_raw(...)`` waits until the master knows the subscription.
+        ``deliver`` is called on the loop and must return quickly, and so must ``on_change``, which is called when a publisher
+        has connected. ``deliver`` may keep the bytes. ``await node.subscribe_raw(...)`` waits until the subscription is
+        registered with the master.
         """
         resolved = self.resolve(topic)
         state = self._subscribed.get(resolved)
@@ -293,7 +294,7 @@ class Node:
         return RawSubscription(state, deliver, on_change)
 
     async def wait_for_message(self, topic: str, message_class: type[_M], timeout: float | None = None) -> _M:
-        """Return the next message of ``topic``.
+        """Return the next message on ``topic``.
 
         Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the node shuts down meanwhile.
         """
@@ -311,9 +312,9 @@ class Node:
         tcp_nodelay: bool = False,
         on_change: Callable[[], object] | None = None,
     ) -> Publisher[_M]:
-        """Return a publisher of ``topic``; ``await node.advertise(...)`` waits until the master knows it.
+        """Return a publisher for ``topic``; ``await node.advertise(...)`` waits until it is registered with the master.
 
-        ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: no
+        ``queue_size``: how many messages may be queued for a slow subscriber before the oldest is dropped (0: no
         limit; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later receives the
         last message. ``headers``: fields for the connection header. ``on_change`` is called on the loop when a subscriber
         has connected or disconnected. Raise ValueError if this node publishes the topic with another type.
@@ -341,7 +342,7 @@ class Node:
     async def publish(self, topic: str, message: Message) -> None:
         """Publish one message; the topic stays advertised.
 
-        The first message of a topic waits up to a second for the subscribers that the master knows.
+        Before the first message on a topic, wait up to a second for the subscribers that are registered with the master.
         """
         resolved = self.resolve(topic)
         kept = self._kept.get(resolved)
@@ -349,7 +350,7 @@ class Node:
             publisher: Publisher[Message] = self.advertise(resolved, type(message))
             kept = self._kept[resolved] = (publisher, self._spawn(publisher.wait_for_expected()))
         publisher, expected = kept
-        # Concurrent publishers of the topic wait, too.
+        # Concurrent calls that publish on the topic wait too.
         await asyncio.wait([expected])
         await publisher.publish(message)
 
@@ -382,11 +383,11 @@ class Node:
         service_class: ServiceClass[_Request, _Response],
         handler: Callable[[_Request], Awaitable[object]] | Callable[[_Request], object],
     ) -> Service:
-        """Offer a service; ``await node.serve(...)`` waits until the master knows it.
+        """Offer a service; ``await node.serve(...)`` waits until it is registered with the master.
 
         ``handler(request)`` returns a response, a dictionary of some of its fields, a list or tuple of all
-        their values, or the value of its only field. An ``async def`` handler runs as a task on the loop, any
-        other in a worker thread. An exception from it becomes the error of the client's call.
+        its field values, or the value of its only field. An ``async def`` handler runs as a task on the loop, any
+        other in a worker thread. If the handler raises, the client's call fails with that error.
         Raise ServiceException if this node already offers the service.
         """
         resolved = self.resolve(service)
@@ -395,7 +396,7 @@ class Node:
         return Service(self, resolved, service_class, handler)
 
     async def wait_for_service(self, service: str, timeout: float | None = None) -> None:
-        """Wait until a service is registered and answers.
+        """Wait until a service is registered and responds.
 
         Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the node shuts down meanwhile.
         """
@@ -408,9 +409,10 @@ class Node:
     # --- parameters
 
     async def get_param(self, name: str, default: object = _UNSPECIFIED) -> Any:
-        """Return a parameter's value, or ``default``.
+        """Return a parameter's value, or ``default`` if it is not set.
 
-        Raise KeyError if it is neither set nor has a default, MasterUnreachableError.
+        Raise KeyError if the parameter is not set and there is no default, MasterUnreachableError if the master does not
+        respond.
         """
         try:
             return await self._node.master("getParam", self.resolve(name))
@@ -420,11 +422,11 @@ class Node:
             return default
 
     async def set_param(self, name: str, value: object) -> None:
-        """Set a parameter; a dictionary sets a whole namespace. Raise RpcError on a value that has no XML-RPC type."""
+        """Set a parameter; a dictionary sets a whole namespace. Raise RpcError if XML-RPC has no type for the value."""
         await self._node.master("setParam", self.resolve(name), value)
 
     async def has_param(self, name: str) -> bool:
-        """Return whether a parameter, or a namespace of that name, is set."""
+        """Return whether a parameter or a namespace with that name is set."""
         return bool(await self._node.master("hasParam", self.resolve(name)))
 
     async def delete_param(self, name: str) -> None:
@@ -435,7 +437,7 @@ class Node:
             raise KeyError(name) from error
 
     async def search_param(self, name: str) -> str | None:
-        """Return the full name of the closest parameter, upwards from this node's namespace; None if there is none."""
+        """Search for a parameter from this node's namespace upwards; return the full name of the first match, or None."""
         try:
             return str(await self._node.master("searchParam", name))
         except RpcRefused:
@@ -473,7 +475,7 @@ class Node:
     # --- time
 
     def now(self) -> Time:
-        """Return the time: simulated with /use_sim_time (zero until the first /clock), otherwise the machine's."""
+        """Return the current time: simulated time with /use_sim_time (zero until the first /clock), otherwise the system time."""
         now = self._simulated.now if self._simulated else time.time_ns()
         return Time(*divmod(now, _BILLION))
 
@@ -535,7 +537,7 @@ class Node:
                     is_reported = True
                 await self.sleep(0.25)
             except RpcFault:
-                return  # a master, though one without this call, such as that of @foxglove/ros1
+                return  # a master without this call, such as @foxglove/ros1
             else:
                 return
 

@@ -1,4 +1,4 @@
-"""Changes of parameters, as reported by the master."""
+"""Changes of parameters that the master reports."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ParameterWatch:
     async def add(self, name: str) -> object:
         """Subscribe to a parameter (global name) and return its value, or ``{}`` if it is not set.
 
-        Raise MasterUnreachableError, RpcError.
+        Raise MasterUnreachableError if the master does not respond, RpcError if the call fails.
         """
         runtime = self._node._node
         value: object = await runtime.master("subscribeParam", runtime.uri, name)
@@ -38,13 +38,16 @@ class ParameterWatch:
         return value
 
     async def remove(self, name: str) -> None:
-        """Unsubscribe from a parameter. Raise as :meth:`add`."""
+        """Unsubscribe from a parameter.
+
+        Raise MasterUnreachableError if the master does not respond, RpcError if the call fails.
+        """
         runtime = self._node._node
         runtime.parameters.discard(name)
         await runtime.master("unsubscribeParam", runtime.uri, name)
 
     def changed_in_worker(self, name: str, value: object) -> None:
-        """Pass on a change that the master has sent to the node's server."""
+        """Pass a change that the master has sent to the node's server on to the listeners."""
         with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._changed, name, value)
 
@@ -53,7 +56,7 @@ class ParameterWatch:
         self._node._later(self._add_again)
 
     def _changed(self, name: str, value: object) -> None:
-        # If the name is below the one subscribed to, the master reports it with a trailing slash.
+        # The master appends a slash to a name that is below the one subscribed to.
         for listener in list(self.listeners):
             listener(name.rstrip("/") or "/", value)
 

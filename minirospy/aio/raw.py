@@ -1,4 +1,4 @@
-"""Topics and services of any type as bytes, for programs that forward them, such as bridges and relays."""
+"""Topics and services of any type, as bytes, for programs that forward them, such as bridges and relays."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PROBE_SECONDS = 5.0
 
 
 class RawSubscription(Handle):
-    """A topic's messages as bytes, delivered as they arrive; made by :meth:`Node.subscribe_raw`, closed by :meth:`close`."""
+    """A topic's messages as bytes, delivered as they arrive; created by :meth:`Node.subscribe_raw`, closed by :meth:`close`."""
 
     def __init__(
         self,
@@ -66,13 +66,14 @@ class RawSubscription(Handle):
         self._deliver(frame, header)
 
     def _end(self) -> None:
-        """Do nothing: no task waits for messages."""
+        """Do nothing, because no task waits for messages."""
 
 
 class RawService(Handle):
     """A service that works on bytes: ``handler(request, client's connection header)`` returns the response's bytes.
 
-    A ServiceException from it becomes the error of the client's call. ``await`` waits until the master knows the service.
+    If the handler raises ServiceException, the client's call fails with its message. ``await`` waits until the service is
+    registered with the master.
     """
 
     def __init__(self, node: Node, name: str, type_: InterfaceType, handler: AsyncHandler) -> None:
@@ -93,7 +94,7 @@ class RawService(Handle):
         )
 
     async def close(self) -> None:
-        """Stop offering the service; calls in progress get their answers. Idempotent."""
+        """Stop offering the service; calls in progress still get their responses. Idempotent."""
         await asyncio.wait([self._registration])
         with contextlib.suppress(MasterUnreachableError, RpcError):
             await self._node._node.unserve(self._server)
@@ -115,7 +116,7 @@ ANY_CLASS = raw_class(InterfaceType(ANY, ANY))
 
 
 async def call_raw(node: Node, service: str, md5sum: str, request: bytes) -> bytes:
-    """Return the bytes of a service's response to the bytes of a request. Raise ServiceException with the reason."""
+    """Call a service with a serialized request; return the serialized response. Raise ServiceException if the call fails."""
     client = await _connect(node, service, md5sum)
     try:
         return await client.call(request)
@@ -130,7 +131,7 @@ async def call_raw(node: Node, service: str, md5sum: str, request: bytes) -> byt
 
 
 async def service_header(node: Node, service: str) -> Header:
-    """Return a service's connection header, which includes its type. Raise ServiceException."""
+    """Return a service's connection header, which includes its type. Raise ServiceException if the service is not available."""
     client = await _connect(node, service, ANY, probe=True)
     client.close()
     return client.header

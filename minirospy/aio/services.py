@@ -1,4 +1,4 @@
-"""Services of a node in an event loop, and calls of services."""
+"""A node's services in an event loop, and service calls."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ServiceClass(Protocol[_Request_co, _Response_co]):
 
 
 class ServiceProxy(Generic[_Response_co]):
-    """Calls a service; made by :meth:`Node.service_proxy`. With ``persistent``, calls wait for each other."""
+    """Calls a service; created by :meth:`Node.service_proxy`. With ``persistent``, concurrent calls run one at a time."""
 
     def __init__(
         self,
@@ -70,7 +70,7 @@ class ServiceProxy(Generic[_Response_co]):
         self._lock = asyncio.Lock()
 
     async def __call__(self, *args: object, **kwds: object) -> _Response_co:
-        """Call the service. Raise as :meth:`Node.call` does."""
+        """Call the service. Raise the same exceptions as :meth:`Node.call`."""
         message = args_kwds_to_message(self._service_class._request_class, args, kwds)
         number_header(message, next(self._sequence))
         request = serialized(message)
@@ -94,16 +94,16 @@ class ServiceProxy(Generic[_Response_co]):
                 keeping = isinstance(error.__cause__, CallFailed)
                 raise
             finally:
-                # After a cancelled call, the next one would read the cancelled call's answer.
+                # After a cancelled call, the next call on this connection would read the cancelled call's response.
                 if not keeping:
                     self._disconnect()
 
         return response
 
     def close(self) -> None:
-        """Close a persistent connection; a call that another task makes on it fails. Idempotent."""
+        """Close a persistent connection; if another task is calling through it, that call fails. Idempotent."""
         if self._lock.locked() and self._client:
-            # The call closes the socket; closing it here would leave the call waiting.
+            # Let the call in progress close the socket: closing it here would not wake the call.
             self._client.hang_up()
         else:
             self._disconnect()
@@ -156,7 +156,7 @@ class ServiceProxy(Generic[_Response_co]):
 
 
 class Service(Handle):
-    """A service that a node offers; made by :meth:`Node.serve`."""
+    """A service that a node offers; created by :meth:`Node.serve`."""
 
     def __init__(
         self,
@@ -193,7 +193,7 @@ class Service(Handle):
         )
 
     async def close(self) -> None:
-        """Stop offering the service; calls in progress get their answers. Idempotent."""
+        """Stop offering the service; calls in progress still get their responses. Idempotent."""
         await asyncio.wait([self._registration])
         if self._node._node.services.get(self.name) is self._server:
             self._node._served.discard(self.name)

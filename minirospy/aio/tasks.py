@@ -1,6 +1,6 @@
 """Long-running tasks: an unexpected error is reported in one line, and the work continues.
 
-asyncio reports a task's exception only when the task is garbage-collected, which never happens if its owner keeps it.
+asyncio reports a task's exception only when the task is garbage-collected, which never happens while its owner refers to it.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ _MAX_CHARACTERS = 500
 
 
 class ErrorReporter:
-    """Reports unexpected errors of some work: one line every ten seconds, with a count of the others."""
+    """Reports unexpected errors in some work: one line every ten seconds, with a count of the suppressed ones."""
 
     def __init__(self, log: logging.Logger, work: str) -> None:
-        """Take ``work``, its name in the log line, such as "the watch of the graph"."""
+        """Report errors under the name ``work``, such as "the watch of the graph"."""
         self._log = log
         self._lines = RateLimitedLogger(log)
         self._work = work
@@ -37,7 +37,7 @@ class ErrorReporter:
         self._log.debug("%s failed", self._work, exc_info=error)
 
     def of_task(self, task: asyncio.Future[None]) -> None:
-        """Report a task's exception; a callback for ``add_done_callback``."""
+        """Report a task's exception; pass this method to ``add_done_callback``."""
         if not task.cancelled() and (error := task.exception()):
             self.report(error)
 

@@ -22,7 +22,7 @@ class Rate:
     """Keeps a loop at ``hz`` iterations per second: ``async for _ in node.rate(hz)``, or ``await rate.sleep()``."""
 
     def __init__(self, node: Node, hz: float) -> None:
-        """Start the first period. Raise ValueError if ``hz`` is not above 0."""
+        """Start the first period. Raise ValueError if ``hz`` is not positive."""
         if hz <= 0:
             raise ValueError(f"a rate of {hz} Hz: it has to be above 0")
         self._node = node
@@ -33,10 +33,10 @@ class Rate:
         return self._turns()
 
     async def sleep(self) -> None:
-        """Sleep for the rest of the period. Raise as :meth:`Node.sleep` does."""
+        """Sleep for the rest of the period. Raise the same exceptions as :meth:`Node.sleep`."""
         now = self._node.now().to_nsec()
-        # Time jumped back, or the work took several periods: neither wait very long, nor make up for the missed
-        # periods.
+        # Time jumped back, or the work took several periods: start a new period now, so that the sleep is not very
+        # long and the missed periods are not made up for.
         if not self._last <= now <= self._last + 2 * self._period:
             self._last = now
         self._last += self._period
@@ -54,7 +54,7 @@ class Rate:
 
 
 class SimulatedTime:
-    """The time of the last /clock message, in nanoseconds; 0 before the first one."""
+    """The time in the last /clock message, in nanoseconds; 0 before the first one."""
 
     def __init__(self, stopping: asyncio.Event) -> None:
         self.now = 0
@@ -80,6 +80,6 @@ class SimulatedTime:
                 raise ROSTimeMovedBackwardsException((start - self.now) / 1e9)
 
     async def _next_tick(self) -> None:
-        # A shutdown of the node causes no tick, so check for it now and then.
+        # A node shutdown does not change the time, so wake up periodically to check for it.
         with contextlib.suppress(asyncio.TimeoutError):
             await asyncio.wait_for(self._tick.wait(), _LOOK_SECONDS)

@@ -1,4 +1,4 @@
-"""The publishers and subscriptions of a node in an event loop. Messages are serialized and deserialized on the loop."""
+"""A node's publishers and subscriptions in an event loop. Messages are serialized and deserialized on the loop."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _JOIN_SECONDS = 1.0
 
 
 class Subscription(Handle, Generic[_M_co]):
-    """The messages of a topic, for ``async for``; made by :meth:`Node.subscribe`.
+    """The messages on a topic, for ``async for``; created by :meth:`Node.subscribe`.
 
     The iteration ends when the subscription is closed or the node shuts down.
     """
@@ -143,7 +143,7 @@ class Subscription(Handle, Generic[_M_co]):
 
 
 class Publisher(Handle, Generic[_M_co]):
-    """Publishes messages on a topic; made by :meth:`Node.advertise`."""
+    """Publishes messages on a topic; created by :meth:`Node.advertise`."""
 
     def __init__(self, node: Node, state: PublishedTopic, message_class: type[_M_co], *, waits: bool) -> None:
         self.topic = state.publication.topic
@@ -154,7 +154,7 @@ class Publisher(Handle, Generic[_M_co]):
         self._registration = state.join(self)
 
     def publish_raw(self, body: bytes) -> None:
-        """Publish a message that is already serialized. Does not wait. Raise ROSException if the publisher is closed."""
+        """Publish a message that is already serialized, without waiting. Raise ROSException if the publisher is closed."""
         state = self._state
         if state is None or self._node.is_shutdown:
             raise ROSException("publish() to a closed topic")
@@ -164,10 +164,10 @@ class Publisher(Handle, Generic[_M_co]):
             publication.publish(LargeFrame((body,), len(body)) if large else serialize_frame(body))
 
     async def publish(self, *args: object, **kwds: object) -> None:
-        """Publish a message, or the message with these field values.
+        """Publish a message, or a message with the given field values.
 
-        Does not wait for subscribers, except with ``queue_size=None``. Raise ROSException if the publisher is closed,
-        ROSSerializationException or TypeError on invalid values.
+        Wait for slow subscribers only with ``queue_size=None``. Raise ROSException if the publisher is closed,
+        ROSSerializationException or TypeError if a value is invalid.
         """
         if not self._registration.done():
             await self
@@ -220,7 +220,7 @@ class Publisher(Handle, Generic[_M_co]):
             await asyncio.wait_for(self._wait_for(state.publication.expected), _JOIN_SECONDS)
 
     async def close(self) -> None:
-        """Stop publishing; the topic is unregistered with its last publisher in this node. Idempotent."""
+        """Stop publishing; the node's last publisher on a topic also unregisters the topic. Idempotent."""
         state, self._state = self._state, None
         if state:
             await state.leave(self)
@@ -251,7 +251,7 @@ class SubscribedTopic:
 
     def join(self, handle: Subscription[Message] | RawSubscription) -> asyncio.Task[None]:
         self._handles.add(handle)
-        # `async for ... break` drops the subscription without closing it.
+        # `async for ... break` discards the subscription without closing it.
         weakref.finalize(handle, self._node._later, self._leave_if_empty).atexit = False
         return self._registration
 
@@ -268,7 +268,7 @@ class SubscribedTopic:
             handle._end()
 
     async def _leave_if_empty(self) -> None:
-        # A new subscription may join meanwhile.
+        # Another subscription may be added while this waits.
         await asyncio.wait([self._registration])
         if self._handles or self._node._subscribed.get(self.topic) is not self:
             return
@@ -277,7 +277,7 @@ class SubscribedTopic:
             await self._node._node.unsubscribe(self.subscription)
 
     def _deliver(self, frame: Frame, header: Header) -> None:
-        # A small frame is in a buffer that the next receive reuses.
+        # Copy a small frame: it is in a buffer that the next receive overwrites.
         kept = frame if len(frame) > CHUNK else bytes(frame)
         for handle in list(self._handles):
             handle._put(kept, header)
@@ -318,7 +318,7 @@ class PublishedTopic:
             raise
 
     async def _leave_if_empty(self) -> None:
-        # A new publisher may join meanwhile.
+        # Another publisher may be added while this waits.
         await asyncio.wait([self._registration])
         for link in self.publication.links:
             if not self._handles:
@@ -331,7 +331,7 @@ class PublishedTopic:
             await self._node._node.unadvertise(self.publication)
 
     def publish(self, message: Message) -> None:
-        """Send a message to all subscribers; callable from any thread."""
+        """Send a message to all subscribers. Thread-safe."""
         if self.publication.links or self.publication.latch:
             if self._has_header:
                 assert is_stamped(message)

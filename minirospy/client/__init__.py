@@ -154,12 +154,13 @@ __all__ = [
     "wait_for_service",
 ]
 
-# Before the first message is imported: if ROS 2 is sourced, its packages of the same names come first on the path.
+# Do this before the first message is imported: if ROS 2 is sourced, its packages with the same names are first on the
+# path.
 prefer_ros1()
 
 
 def spin() -> None:
-    """Wait until the node shuts down. Raise ROSInitException before init_node."""
+    """Wait until the node shuts down. Raise ROSInitException if init_node has not been called."""
     current_session().spin()
 
 
@@ -169,14 +170,14 @@ def is_shutdown() -> bool:
 
 
 def on_shutdown(h: Callable[[], object]) -> None:
-    """Call ``h`` when the node shuts down, before it leaves the graph. Raise TypeError."""
+    """Call ``h`` when the node shuts down, before it leaves the graph. Raise TypeError if ``h`` is not callable."""
     current_session().lifecycle.add_hook(h)
 
 
 def signal_shutdown(reason: object) -> None:
     """Shut the node down; the hooks run in this thread."""
     current_session().lifecycle.signal_shutdown(reason)
-    # The caller needs no further notification: anything the thread does now is clean-up, and may sleep.
+    # Do not notify the calling thread again: anything that it does from now on is clean-up, and may sleep.
     current_session().poll_shutdown()
 
 
@@ -205,17 +206,17 @@ def is_shutdown_requested() -> bool:
 
 
 def is_down() -> bool:
-    """Return whether the node has shut down. For libraries: the calling thread does not count as one that polls."""
+    """Return whether the node has shut down. For libraries: does not record that the calling thread polls for the shutdown."""
     return current_session().is_shutdown()
 
 
 def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None]:
-    """While the block runs, let a shutdown call ``interrupt``, which must unblock calls in it, from any thread."""
+    """During the block, let a shutdown call ``interrupt``, in any thread; it must unblock calls made in the block."""
     return current_session().lifecycle.interrupting(interrupt)
 
 
 def resolve_name(name: str, caller_id: str | None = None) -> str:
-    """Return the global, remapped name of ``name``, as seen by this node or the node ``caller_id``."""
+    """Return ``name`` remapped and as a global name, resolved relative to this node or the node ``caller_id``."""
     return current_session().resolve(name and str(name), caller_id)
 
 
@@ -230,5 +231,8 @@ def myargv(argv: Sequence[str] | None = None) -> list[str]:
 
 
 def load_command_line_node_params(argv: Sequence[str]) -> dict[str, object]:
-    """Return the private parameters on a command line: ``_rate:=5`` gives {"rate": 5}. Raise ROSInitException."""
+    """Return the private parameters on a command line; ``_rate:=5`` yields {"rate": 5}.
+
+    Raise ROSInitException if a value is not valid YAML.
+    """
     return private_parameters(names.parse_arguments(argv))

@@ -1,4 +1,4 @@
-"""The links of a topic as programs see them in ``impl.connections``, with the attributes of rospy's transports.
+"""A topic's links, as programs read them from ``impl.connections``, with the attributes of rospy's transports.
 
 Source: http://docs.ros.org/en/noetic/api/rospy/html/rospy.impl.transport-module.html (class Transport).
 """
@@ -21,7 +21,7 @@ class Connection(NamedTuple):
 
     ``direction`` is "i" (from a publisher) or "o" (to a subscriber); ``name`` is the topic; ``id`` is unique in the node.
     ``endpoint_id`` is the URI of the publisher's Slave API, or the name of the subscribing node. ``callerid_pub``,
-    ``header``, ``type`` and ``md5sum`` are those that the publisher sent; they are empty if this node is the publisher.
+    ``header``, ``type`` and ``md5sum`` have the values that the publisher sent; they are empty if this node is the publisher.
     ``stat_bytes`` and ``stat_num_msg`` count the bytes and messages received or sent.
     """
 
@@ -41,11 +41,11 @@ class Connection(NamedTuple):
     done: bool = False
 
     def get_transport_info(self) -> str:
-        """Return the link's description in the Slave API's getBusInfo."""
+        """Return the link's description, as getBusInfo in the Slave API returns it."""
         return connection_text(self.link)
 
     def close(self) -> None:
-        """Close the link. A subscriber reconnects as long as the publisher is registered."""
+        """Close the link. A subscriber reconnects if the publisher is still registered."""
         self.link.close()
 
 

@@ -1,4 +1,4 @@
-"""Critical sections of the main thread, in which no signal is dispatched."""
+"""Critical sections in the main thread, during which no signal is dispatched."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ __all__ = ["Deferral", "is_main_thread"]
 
 
 class Deferral:
-    """A critical section of the main thread: ``with deferral:`` delays the dispatch of a signal to the end of the block.
+    """A critical section in the main thread: ``with deferral:`` delays the dispatch of signals until the end of the block.
 
-    A shutdown hook may publish, log or register, so it must not run while the main thread is in the middle of one of these.
-    Has no effect in other threads, where no signal arrives.
+    A shutdown hook may publish, log or register, so it must not run while the main thread is in the middle of such a call.
+    Has no effect in other threads, because signals do not interrupt them.
     """
 
     def __init__(self) -> None:
-        self.pending = False  # a signal waits for the main thread; set by the signal handler
+        self.pending = False  # a signal waits for the main thread to dispatch it; set by the signal handler
         # Dispatches the pending signal; called in the main thread
         self.dispatch: Callable[[], object] = lambda: None
         self._depth = 0

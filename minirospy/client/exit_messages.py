@@ -1,4 +1,4 @@
-"""The messages of an interrupted process: what it still waits for, and no tracebacks of the interrupt."""
+"""What an interrupted process prints: what it is still waiting for. Tracebacks of the interrupt are suppressed."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ __all__ = ["report_waiting", "suppress_tracebacks"]
 
 
 def report_waiting(*, is_leaving: bool) -> None:
-    """Print what the process still waits for; ``is_leaving``: the node waits for the master to unregister it."""
+    """Print what the process is still waiting for; ``is_leaving``: the node waits for the master to unregister it."""
     what = "the master to unregister this node" if is_leaving else _what_runs()
     advice = "Press Ctrl-C again to interrupt it, and a third time to end the process"
-    # The terminal may be gone.
+    # The terminal may have been closed.
     with contextlib.suppress(OSError, ValueError, AttributeError):
         print(f"shutdown: still waiting for {what}. {advice}", file=sys.stderr, flush=True)
 
@@ -30,7 +30,7 @@ def _what_runs() -> str:
         if thread.is_alive() and (place := _place(frames.get(thread.ident or 0))):
             return f"thread {thread.name} at {place}"
 
-    # The main thread runs no code of the program, so it waits for other threads at exit.
+    # The main thread has left the program's code, so it is waiting for other threads to exit.
     if len(threads) > 1:
         return f"thread {threads[1].name}"
     loaded = sys.modules.get("multiprocessing")
@@ -39,7 +39,7 @@ def _what_runs() -> str:
 
 
 def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
-    """Let an uncaught expected error exit the program, or a thread, without a traceback and with status 0."""
+    """Let the program, or a thread, exit without a traceback and with status 0 on an expected uncaught error."""
     hooks = sys.excepthook, threading.excepthook, sys.unraisablehook
 
     def is_interrupt(error: BaseException | None) -> bool:

@@ -1,4 +1,4 @@
-"""The identity of a node: its name, its namespace, and its settings from the command line and the environment.
+"""A node's identity: its name, its namespace, and its settings from the command line and the environment.
 
 Source: http://wiki.ros.org/Names, http://wiki.ros.org/Remapping%20Arguments.
 """
@@ -23,10 +23,13 @@ _UNNAMED = "unnamed"
 
 
 class Identity:
-    """A node's name, and name resolution relative to it. Before :meth:`take_name` it is that of a program without a node."""
+    """A node's name, and name resolution relative to it.
+
+    Before :meth:`take_name` it is the identity of a program without a node.
+    """
 
     def __init__(self, previous: Identity | None = None) -> None:
-        """Take ``previous``, the identity to use until :meth:`take_name`, except for topics, which ignore it."""
+        """Use the identity ``previous`` until :meth:`take_name` is called, except for topic names."""
         # Keys are resolved names; empty before init_node
         self.remappings: dict[str, str] = previous.remappings if previous else {}
         self._name: str | None = previous._name if previous else None
@@ -36,14 +39,14 @@ class Identity:
 
     @property
     def environment(self) -> Environment:
-        """The environment that the process started in."""
+        """The environment when the process started."""
         if self._environment is None:
             self._environment = _read_environment()
         return self._environment
 
     @property
     def arguments(self) -> names.Arguments:
-        """The command line: the one passed to init_node, or before that the one of the process."""
+        """The command line: the one passed to init_node, or before that, the process's own."""
         if self._arguments is None:
             self._arguments = names.parse_arguments(sys.argv)
         return self._arguments
@@ -56,23 +59,23 @@ class Identity:
         return self._name
 
     def be_called(self, name: str) -> None:
-        """Use a global name until :meth:`take_name` is called."""
+        """Use the global name ``name`` until :meth:`take_name` is called."""
         self._name = name
 
     def resolve(self, name: str, caller_id: str | None = None) -> str:
-        """Return the global name of ``name``, as seen by this node or the node ``caller_id``."""
+        """Return the global name of ``name``, resolved relative to this node or the node ``caller_id``."""
         node_name = caller_id or self.name
         if name and names.is_private(name):
-            # As in rospy, a slash after `~` is kept, and `~/x` is `/x`.
+            # As in rospy, do not remove a slash after `~`; `~/x` resolves to `/x`.
             resolved = names.join(node_name, names.canonicalize(name)[1:])
         else:
             resolved = names.resolve(name, node_name)
         return self.remappings.get(resolved, resolved)
 
     def resolve_topic(self, name: str) -> str:
-        """Return the global name of a topic, whose handle keeps the name resolved at its creation.
+        """Return the global name of a topic; a publisher or subscriber uses the name that was resolved when it was created.
 
-        Before init_node the remappings of the process's command line apply, and a private name raises ValueError.
+        Before init_node, apply the remappings on the process's command line, and raise ValueError if the name is private.
         """
         if self._is_named:
             return self.resolve(name)
@@ -81,7 +84,7 @@ class Identity:
         return names.resolve(name, self.name, self.arguments.resolved_remappings(self.name))
 
     def remap(self, name: str, caller_id: str | None = None) -> str:
-        """Return the command line's remapping for exactly this spelling of ``name``; otherwise ``name`` itself."""
+        """Return the command line's remapping of ``name`` exactly as spelled, or ``name`` itself if there is none."""
         mapped = self.arguments.remappings.get(name)
         return name if mapped is None else names.resolve(mapped, caller_id or self.name)
 
@@ -90,7 +93,10 @@ class Identity:
         self._arguments = names.parse_arguments(argv)
 
     def take_name(self, name: str, argv: Sequence[str], anonymous: bool) -> None:
-        """Read the environment, and become the node ``name`` of the command line ``argv``. Raise ROSInitException."""
+        """Read the environment, and become the node ``name`` with the command line ``argv``.
+
+        Raise ROSInitException if the environment or the command line is invalid.
+        """
         arguments = self._arguments = names.parse_arguments(argv)
         self._is_named = True
         try:
@@ -106,7 +112,7 @@ class Identity:
 
 
 def private_parameters(arguments: names.Arguments) -> dict[str, object]:
-    """Return the values of ``_param:=value``, parsed as YAML. Raise ROSInitException on invalid YAML."""
+    """Return the values of ``_param:=value`` arguments, parsed as YAML. Raise ROSInitException if one is not valid YAML."""
     if arguments.wrong:
         raise ROSInitException(
             f"invalid command-line parameters: [{arguments.wrong[0]}] has more than one :="
@@ -136,7 +142,7 @@ def warn_of_illegal_name(name: str, stacklevel: int = 3) -> None:
 
 
 def _read_environment() -> Environment:
-    """Return the environment, overridden by the process's own command line.
+    """Return the environment, with overrides from the process's own command line.
 
     As in rospy, the ``argv`` that a program passes to init_node is ignored here, except for ``__name``.
     """

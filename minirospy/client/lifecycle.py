@@ -24,8 +24,8 @@ _log = logging.getLogger(__name__)
 class ROSInterruptException(errors.ROSInterruptException, KeyboardInterrupt):
     """The node's shutdown interrupted a blocking call; as in rospy, this is also a KeyboardInterrupt.
 
-    asyncio would treat a KeyboardInterrupt as a request to stop its loop, so `minirospy.aio` raises the base class, which is
-    also `minirospy.ROSInterruptException` and catches both.
+    asyncio would treat a KeyboardInterrupt as a request to stop its loop, so `minirospy.aio` raises the base class.
+    `minirospy.ROSInterruptException` is that base class, so catching it covers both.
     """
 
 
@@ -35,7 +35,10 @@ class _ThisThread(threading.local):
 
 
 class _Interrupting:
-    """The context manager of :meth:`Lifecycle.interrupting`; a class, for speed, since each service call uses it."""
+    """The context manager that :meth:`Lifecycle.interrupting` returns.
+
+    It is a class, because each service call uses it and a generator is slower.
+    """
 
     __slots__ = ("_interrupt", "_lifecycle")
 
@@ -56,11 +59,14 @@ class Lifecycle:
     """The node's shutdown: which functions it calls, and in which order."""
 
     def __init__(self, leave: Callable[[], object]) -> None:
-        """Take ``leave()``, which removes the node from the graph."""
+        """Call ``leave()`` at a shutdown to remove the node from the graph."""
         self._leave = leave
         self._lock = threading.RLock()
         self._claim = threading.Lock()
-        """Locked from the start of the shutdown on. It is a lock, since a signal handler may run between any two steps."""
+        """Locked once the shutdown has started.
+
+        A lock and not a flag, because a signal handler may run between a test and an assignment.
+        """
         # Set after the shutdown hooks have run: every blocking call returns
         self.shutting_down = SignalSafeEvent()
         self.left = SignalSafeEvent()  # set when the node has left the graph
@@ -70,22 +76,22 @@ class Lifecycle:
         # Called after ``hooks``, including hooks that were added by a hook
         self.late_hooks: list[Callable[[], object]] = []
         self.interrupts: list[Callable[[], object]] = []
-        """Called to unblock blocking calls, once is_shutdown() is true and before the node leaves the graph."""
+        """Called to unblock blocking calls, after is_shutdown() has become true and before the node leaves the graph."""
 
         self.deferral = Deferral()
         self.machine = ShutdownMachine()
         self._this_thread = _ThisThread(self.machine.main)
 
     def add_hook(self, hook: Callable[[], object], hooks: list[Callable[[], object]] | None = None) -> None:
-        """Call ``hook`` when the node shuts down, or now if it already has.
+        """Call ``hook`` when the node shuts down, or now if it has already shut down.
 
         ``hooks`` is one of the lists above, by default the first.
 
-        Raise TypeError.
+        Raise TypeError if ``hook`` is not callable.
         """
         if not callable(hook):
             raise TypeError(f"shutdown hook [{hook}] must be a function or callable object: {type(hook)}")
-        # Otherwise a signal dispatched in between could shut down without this hook.
+        # Without the deferral, a signal dispatched in between could shut the node down without this hook.
         with self.deferral, self._lock:
             if not self.is_shutdown():
                 (self.hooks if hooks is None else hooks).append(hook)
@@ -98,8 +104,8 @@ class Lifecycle:
         Return False, without waiting, if a shutdown is already in progress.
         """
         with self.deferral:
-            # Enter the deferral first: a second signal right after the claim would leave the shutdown claimed but
-            # never done.
+            # Enter the deferral before claiming the shutdown: a second signal right after the claim would leave the
+            # shutdown claimed but never done.
             if not self._claim.acquire(blocking=False):
                 return False
             _log.debug("signal_shutdown [%s]", reason)
@@ -124,9 +130,10 @@ class Lifecycle:
         return True
 
     def interrupting(self, interrupt: Callable[[], object]) -> contextlib.AbstractContextManager[None]:
-        """While a block runs, let a shutdown call ``interrupt`` to unblock calls in it.
+        """During a block, let a shutdown call ``interrupt`` to unblock calls made in it.
 
-        A signal handler may call it at any moment of the main thread, so the events that it sets are SignalSafeEvents.
+        A signal handler may call ``interrupt`` at any point in the main thread, so the events that it sets are
+        SignalSafeEvents.
         """
         return _Interrupting(self, interrupt)
 
@@ -140,7 +147,7 @@ class Lifecycle:
 
     @property
     def is_shutdown_requested(self) -> bool:
-        """Return whether a shutdown has started; its hooks may still be running."""
+        """Return whether a shutdown has started; the hooks may still be running."""
         return self._claim.locked()
 
     def is_shutdown(self) -> bool:
@@ -162,10 +169,10 @@ class Lifecycle:
         return is_shutdown
 
     def check_interrupted_sleep(self) -> None:
-        """Notify the calling thread, whose sleep was interrupted by a shutdown. Raise ROSInterruptException.
+        """Record that the calling thread, whose sleep a shutdown interrupted, is notified; raise ROSInterruptException.
 
-        In a loop that polls is_shutdown() the sleep just returns early, as with rospy: the loop will poll, and the code after
-        it still runs. The exception is for a thread that never polls, or that sleeps again without having polled.
+        In a loop that polls is_shutdown() the sleep just returns early, as in rospy: the loop polls next, and the code after
+        it still runs. The exception is raised in a thread that never polls, or that sleeps again without having polled.
         """
         state = self._this_thread.state
         if state.awareness is not Awareness.POLLS:
@@ -178,13 +185,13 @@ class Lifecycle:
         return ROSInterruptException(text)
 
     def is_interrupt(self, error: BaseException) -> bool:
-        """Return whether an error that terminates the program, or a thread of it, is the interrupt that was raised there."""
+        """Return whether an error that terminates a thread is the interrupt that was raised in that thread."""
         if isinstance(error, KeyboardInterrupt) and self.machine.signals:
             return True
         return isinstance(error, errors.ROSInterruptException) and self.is_shutdown_requested
 
     def _run_hooks(self) -> None:
-        """Run the hooks, also those added meanwhile by hooks or other threads; then set ``shutting_down``."""
+        """Run the hooks, including those that hooks or other threads add meanwhile; then set ``shutting_down``."""
         while not self.shutting_down.is_set():
             for hooks in (self.hooks, self.late_hooks):
                 while hooks:
@@ -199,7 +206,7 @@ class Lifecycle:
             with self.deferral.lifted():
                 hook()
         except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - the others have to run
-            # A KeyboardInterrupt is the second Ctrl-C. Ignore write errors: the terminal may be gone.
+            # A KeyboardInterrupt here is the second Ctrl-C. Ignore write errors: the terminal may have been closed.
             if type(error) is not KeyboardInterrupt:
                 with contextlib.suppress(OSError, ValueError):
                     traceback.print_exc()

@@ -65,16 +65,16 @@ _F = TypeVar("_F", bound=Callable[..., None])
 
 
 class LogFunction(Protocol):
-    """The type of ``loginfo`` and similar functions."""
+    """The type of ``loginfo`` and the other plain log functions."""
 
     def __call__(
         self, msg: object, *args: object, logger_name: str | None = None, **kwargs: Unpack[Keywords]
     ) -> None:
-        """Log ``msg % args``; ``logger_name`` names a logger below "rosout"."""
+        """Log ``msg % args``; ``logger_name`` is a logger below "rosout"."""
 
 
 class ThrottledLogFunction(Protocol):
-    """The type of ``loginfo_throttle`` and similar functions."""
+    """The type of ``loginfo_throttle`` and the other throttled log functions."""
 
     def __call__(
         self,
@@ -84,7 +84,7 @@ class ThrottledLogFunction(Protocol):
         logger_name: str | None = None,
         **kwargs: Unpack[Keywords],
     ) -> None:
-        """Log, but at most once in ``period`` seconds from this call site."""
+        """Log at most once per ``period`` seconds from this call site."""
 
 
 def logger_of(name: str | None) -> logging.Logger:
@@ -103,7 +103,7 @@ def write(
     stack_info: bool = False,
     stacklevel: int = 1,
 ) -> None:
-    """Log for the caller at ``frame``. Like rospy, prefix a method's name with its class."""
+    """Log for the caller at ``frame``. Like rospy, prefix a method's name with its class name."""
     at = frame
     while stacklevel > 1 and at.f_back is not None:
         stacklevel, at = stacklevel - 1, at.f_back
@@ -135,7 +135,10 @@ def _log_function(level: int, name: str) -> LogFunction:
 
 
 class _CallSites:
-    """The call sites that have logged: when, and which text. A site is one call expression, whatever function it calls."""
+    """Records when each call site last logged, and which message.
+
+    A call site is one call expression, even if it calls several functions.
+    """
 
     def __init__(self) -> None:
         self._once: set[tuple[str, int, int]] = set()
@@ -155,7 +158,7 @@ class _CallSites:
         place, now = _place(frame), current_session().clock.now()
         before = self._times.get(place)
         pause = period.to_nsec() if isinstance(period, times.Duration) else int(period * 1e9)
-        # If simulated time has jumped back, start again.
+        # Start again if simulated time has jumped back.
         due = before is None or now - before > pause or now < before
         if due:
             self._times[place] = now
@@ -196,7 +199,7 @@ def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLo
         if not logger.isEnabledFor(level):
             return
         frame = sys._getframe(1)
-        # A period of 0 counts as none: then only the text decides, if at all.
+        # A period of 0 means none: then log if the message has changed, or always.
         due = places.is_due(frame, period) if period else not identical
         if identical:
             due = places.is_new(frame, msg) or due
@@ -214,7 +217,7 @@ def _named(function: _F, name: str, doc: str) -> _F:
 
 
 def _place(frame: FrameType) -> tuple[str, int, int]:
-    """Return the location of a call site; two calls on one line have different ones."""
+    """Return the location of a call site; two calls on one line have different locations."""
     return frame.f_code.co_filename, frame.f_lineno, frame.f_lasti
 
 

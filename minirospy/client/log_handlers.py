@@ -50,14 +50,14 @@ class RosStreamHandler(DeferringHandler):
     def __init__(
         self, colorize: bool = True, stdout: TextIO | None = None, stderr: TextIO | None = None
     ) -> None:
-        """Take the streams ``stdout`` and ``stderr``; None: those in ``sys`` at the time of writing a line."""
+        """Print to ``stdout`` and ``stderr``, by default the streams that ``sys`` has when a line is written."""
         super().__init__()
         self._colorize = colorize
         self._stdout = stdout
         self._stderr = stderr
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write one line. A message that does not match its arguments raises TypeError, as in rospy."""
+        """Write one line. Raise TypeError if a message does not match its arguments, as in rospy."""
         line = _line(record)
         is_fine = record.levelno < logging.WARNING
         stream = (self._stdout or sys.stdout) if is_fine else (self._stderr or sys.stderr)
@@ -69,16 +69,16 @@ class RosStreamHandler(DeferringHandler):
             try:
                 stream.write(line + "\n")
             except UnicodeEncodeError:
-                # The terminal's encoding may lack some characters, as on Windows.
+                # The terminal's encoding may lack some characters, for example on Windows.
                 encoding = stream.encoding or "ascii"
                 stream.write(line.encode(encoding, "backslashreplace").decode(encoding) + "\n")
             stream.flush()
         except RuntimeError:
-            # A signal handler may log while the line that it interrupted is being written.
+            # Writing fails if a signal handler logs during the write that it interrupted.
             with contextlib.suppress(OSError, ValueError):
                 os.write(stream.fileno(), (line + "\n").encode(errors="backslashreplace"))
         except (OSError, ValueError, AttributeError):
-            # There is no terminal, or it was closed; this is not an error of the program.
+            # There is no terminal, or it was closed, which is not the program's fault.
             pass
 
 
@@ -86,7 +86,7 @@ class RosOutHandler(DeferringHandler):
     """Publishes log records to /rosout (http://wiki.ros.org/rosout); a program may add it to its own loggers."""
 
     def __init__(self, level: int = 0, *, tell_topics: bool = True) -> None:
-        """Take ``tell_topics``: whether each message lists the topics that the node publishes."""
+        """Include the topics that the node publishes in each message if ``tell_topics`` is set."""
         from rosgraph_msgs.msg import Log
 
         from minirospy.client.publisher import Publisher
@@ -97,7 +97,7 @@ class RosOutHandler(DeferringHandler):
         self._busy = threading.local()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Publish one record, unless it comes from publishing itself."""
+        """Publish one record, unless the publishing code itself logged it."""
         session = current_session()
         node = session.node
         if getattr(self._busy, "yes", False) or node is None or session.is_shutdown():
@@ -163,7 +163,7 @@ def _wall_time(record: logging.LogRecord, form: str | None = None) -> str:
 
 
 def _stamp(record: logging.LogRecord, form: str | None = None) -> str:
-    """Return the wall time, followed by the simulated time if that is used."""
+    """Return the wall time, followed by the simulated time if the node uses it."""
     wall = _wall_time(record, form)
     clock = current_session().clock
     return f"{wall}, {clock.now() / 1e9:f}" if isinstance(clock, SimulatedClock) else wall

@@ -1,4 +1,4 @@
-"""The logging of a node from init_node on: its loggers' handlers, its log file, its logger services.
+"""A node's logging after init_node: its loggers' handlers, its log file, its logger services.
 
 Source: http://wiki.ros.org/rospy/Overview/Logging.
 """
@@ -33,9 +33,9 @@ _log = logging.getLogger(__name__)
 def configure(session: Session, log_level: int | None, log_file: str | None) -> None:
     """Set up the node's handlers: terminal and log file. ``log_file``: the ``__log:=`` argument.
 
-    A configuration file of the user's (ROS_PYTHON_LOG_CONFIG_FILE, or config/python_logging.conf or .yaml in ROS_HOME)
+    A user's configuration file (ROS_PYTHON_LOG_CONFIG_FILE, or config/python_logging.conf or .yaml in ROS_HOME)
     replaces these handlers, as http://wiki.ros.org/rospy/Overview/Logging describes. A file that cannot be
-    written or read is reported in one line. Raise ValueError on a log level that rospy does not have.
+    written or read is reported in one line. Raise ValueError if rospy has no such log level.
     """
     if log_level is not None and log_level not in PYTHON_LEVELS:
         raise ValueError(
@@ -52,7 +52,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     except OSError:
         _warn(f"cannot create log directory [{path.parent}]. Please set ROS_LOG_DIR to a writable location.")
 
-    # For a user's configuration file, and for programs that search for their log.
+    # A user's configuration file uses this, and so do programs that look for their log file.
     os.environ["ROS_LOG_FILENAME"] = str(path)
     if not _configured_by_file(session):
         _rosout.setLevel(logging.INFO)
@@ -61,12 +61,12 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     if log_level is not None:
         _rosout.setLevel(PYTHON_LEVELS[log_level])
 
-    # Warnings of the library itself get the same handlers.
+    # The library's own warnings use the same handlers.
     ours = logging.getLogger("minirospy")
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
     terminal = RosStreamHandler()
     terminal.setLevel(logging.DEBUG if log_level == DEBUG else logging.WARNING)
-    # rospy logs its own warnings with the program's logger, whose level may hide them.
+    # rospy logs its own warnings with the program's logger, so the program's log level may hide them; do the same.
     terminal.addFilter(lambda record: _rosout.isEnabledFor(record.levelno))
     _add_handler(session, ours, terminal)
     if path.parent.parent == session.identity.environment.log_dir:
@@ -96,7 +96,7 @@ def _add_handler(session: Session, logger: logging.Logger, handler: logging.Hand
 
 
 def _offer_logger_services() -> None:
-    """Offer the services that list the node's loggers and set their levels."""
+    """Offer the services that list the node's loggers and set their log levels."""
     from roscpp.msg import Logger
     from roscpp.srv import GetLoggers, GetLoggersResponse, SetLoggerLevel, SetLoggerLevelResponse
 
@@ -142,11 +142,11 @@ def _configured_by_file(session: Session) -> bool:
 
 
 def _log_to_file(session: Session, path: Path) -> None:
-    """Write all loggers to the node's file, like rospy, without printing anything twice on the terminal."""
+    """Write the output of all loggers to the node's file, like rospy, without printing anything twice on the terminal."""
     from minirospy.runtime.master.log_file import LogFileHandler
 
     class RotatingFileHandler(DeferringHandler, LogFileHandler):
-        """A handler with the class name that programs expect among the root logger's handlers in rospy."""
+        """A handler with the class name that programs written for rospy expect among the root logger's handlers."""
 
     try:
         file = RotatingFileHandler(path, _FILE_BYTES, _FILE_BACKUPS)
@@ -158,8 +158,8 @@ def _log_to_file(session: Session, path: Path) -> None:
     root = logging.root
     if not root.handlers:
         root.setLevel(logging.INFO)
-    # Keep handlers that the program itself added to the root logger before (basicConfig), which rospy removes. Filter
-    # them so that lines from rosout are not printed on the terminal twice.
+    # Keep handlers that the program added to the root logger earlier (basicConfig), although rospy removes them.
+    # Filter them so that rosout lines are not printed on the terminal twice.
     for handler in root.handlers:
         if isinstance(handler, logging.StreamHandler) and handler.stream in (sys.stdout, sys.stderr):
             handler.addFilter(_is_not_ours)
@@ -171,9 +171,9 @@ def _is_not_ours(record: logging.LogRecord) -> bool:
 
 
 def _link_latest(folder: Path) -> None:
-    """Link ``latest``, next to the folder of a run, to that folder."""
+    """Link ``latest``, beside a run's folder, to that folder."""
     link = folder.parent / "latest"
-    # The file system has no links, or another node was faster.
+    # The file system does not support links, or another node created the link first.
     with contextlib.suppress(OSError, NotImplementedError):
         if link.is_symlink():
             if link.resolve() == folder.resolve():

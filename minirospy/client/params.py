@@ -36,14 +36,14 @@ _T = TypeVar("_T")
 
 
 class Unspecified:
-    """The default of ``default``, since a caller may want None back."""
+    """The type of ``default`` if the caller passes none; None would not do, since a caller may want None returned."""
 
 
 UNSPECIFIED = Unspecified()
 
 
 class MasterGoneError(ROSException, ConnectionRefusedError):
-    """The master does not answer. rospy raises the socket's error, and programs may catch either."""
+    """The master does not respond. rospy raises the socket error, so programs may catch either class."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -53,7 +53,7 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
     """Return a parameter's value, or ``default`` if it is not set.
 
     As in rospy, bytes and dates are returned as xmlrpc.client.Binary and DateTime.
-    Raise KeyError if it is neither set nor has a default, ROSException if the master fails.
+    Raise KeyError if the parameter is not set and there is no default, ROSException if the master fails.
     """
     value = _get(current_session().resolve(param_name)) if _may_be_name(param_name) else NOT_SET
     if value is not NOT_SET:
@@ -91,7 +91,7 @@ def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
 def set_param(param_name: str, param_value: object) -> None:
     """Set a parameter; a dictionary sets a whole namespace.
 
-    Raise TypeError or OverflowError on a value that XML-RPC has no type for, ROSException if the master fails.
+    Raise TypeError or OverflowError if XML-RPC has no type for a value, ROSException if the master fails.
     """
     name = current_session().resolve(param_name)
     warn_of_illegal_name(param_name)
@@ -100,12 +100,12 @@ def set_param(param_name: str, param_value: object) -> None:
     except ROSException:
         check_sendable(param_value)
         raise
-    # The master does not notify the node that sets the parameter.
+    # The master notifies other nodes, but not the one that sets the parameter.
     current_session().parameter_changed(name)
 
 
 def has_param(param_name: str) -> bool:
-    """Return whether a parameter, or a namespace of that name, is set. Raise ROSException."""
+    """Return whether a parameter or a namespace with that name is set. Raise ROSException if the master fails."""
     if not _may_be_name(param_name):
         return False
     name = current_session().resolve(param_name)
@@ -127,7 +127,7 @@ def delete_param(param_name: str) -> None:
 
 
 def search_param(param_name: str) -> str | None:
-    """Return the closest parameter of this name, upwards from this node's namespace; None if there is none.
+    """Search for a parameter from this node's namespace upwards; return the full name of the first match, or None.
 
     Raise ROSException if the master fails, or the name is private.
     """
@@ -145,14 +145,14 @@ def search_param(param_name: str) -> str | None:
 
 
 def get_param_names() -> list[str]:
-    """Return the names of all parameters. Raise ROSException."""
+    """Return the names of all parameters. Raise ROSException if the master fails."""
     return _ask("list", "/", current_session().master.get_param_names)
 
 
 class KeptParameters:
-    """The cache of get_param_cached, for a program that reads it or wants notifications of changes.
+    """The cache behind get_param_cached, for programs that read it or need notifications of changes.
 
-    Such a program may replace :meth:`update` by its own function.
+    Such a program may replace :meth:`update` with its own function.
     """
 
     def __init__(self) -> None:
@@ -160,7 +160,7 @@ class KeptParameters:
         current_session().parameter_listeners.append(self._dispatch)
 
     def get(self, key: str) -> Any:
-        """Return a parameter that was read with get_param_cached before. Raise KeyError."""
+        """Return a parameter from the cache. Raise KeyError if get_param_cached has not read it before."""
         session = current_session()
         if session.node is None or session.resolve(key) not in session.node.parameters:
             raise KeyError(key)
@@ -186,7 +186,7 @@ def get_param_server_cache() -> KeptParameters:
 
 
 def _get(name: str) -> object:
-    """Return the value, or NOT_SET."""
+    """Return the parameter's value, or NOT_SET."""
     try:
         return _ask("get", name, lambda: current_session().master.get_param(name))
     except ROSException as error:
@@ -196,7 +196,7 @@ def _get(name: str) -> object:
 
 
 def _may_be_name(param_name: object) -> bool:
-    """Return whether the value can be a parameter's name: a string, or None for the node's namespace."""
+    """Return whether the value can be a parameter name: a string, or None for the node's namespace."""
     return param_name is None or isinstance(param_name, str)
 
 
@@ -210,13 +210,13 @@ def _ask(verb: str, name: str, call: Callable[[], _T]) -> _T:
 
 
 def as_xmlrpc_client(value: object) -> object:
-    """Return a value with bytes and dates in xmlrpc.client's wrappers, like Python's own client."""
+    """Return a value whose bytes and dates are wrapped in xmlrpc.client's classes, as Python's own client returns them."""
     if isinstance(value, dict):
         return {key: as_xmlrpc_client(item) for key, item in value.items()}
     if isinstance(value, list):
         return [as_xmlrpc_client(item) for item in value]
     if isinstance(value, bytes) or _is_date(value):
-        # Imported here: http.client and its imports cost more than the rest of this module.
+        # Imported here, because http.client and the modules that it imports cost more than the rest of this module.
         import xmlrpc.client
 
         return xmlrpc.client.Binary(value) if isinstance(value, bytes) else xmlrpc.client.DateTime(value)
@@ -224,7 +224,7 @@ def as_xmlrpc_client(value: object) -> object:
 
 
 def check_sendable(value: object) -> None:
-    """Raise rospy's exception for a value for which XML-RPC has no type."""
+    """Raise the exception that rospy raises if XML-RPC has no type for a value."""
     if value is None:
         raise TypeError("cannot marshal None unless allow_none is enabled")
 

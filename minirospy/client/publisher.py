@@ -1,4 +1,4 @@
-"""The Publisher of rospy: it serializes messages here, in the thread that publishes.
+"""rospy's Publisher. It serializes messages in the thread that publishes.
 
 Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 """
@@ -40,7 +40,7 @@ __all__ = ["PublishedTopic", "Publisher", "SubscribeListener"]
 
 _log = logging.getLogger("rosout")
 _OF_THE_LIBRARY = frozenset({"/rosout", "/statistics"})
-"""Topics on which the library itself publishes: errors about them are not reported to the program."""
+"""Topics on which the library itself publishes; errors on them are not reported to the program."""
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 
 
@@ -50,7 +50,7 @@ class SubscribeListener:
     def peer_subscribe(
         self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
     ) -> None:
-        """Handle a new subscriber: ``topic_publish`` publishes to all subscribers, ``peer_publish`` only to this one."""
+        """Handle a new subscriber: ``topic_publish`` publishes to all subscribers, ``peer_publish`` to the new one only."""
 
     def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
         """Handle the disconnection of a subscriber; ``num_peers`` remain."""
@@ -59,11 +59,11 @@ class SubscribeListener:
 class Publisher(Topic[_M_co]):
     """Publishes messages of ``data_class`` on a topic.
 
-    ``queue_size``: how many messages may wait for a slow subscriber before the oldest is dropped (0: no
+    ``queue_size``: how many messages may be queued for a slow subscriber before the oldest is dropped (0: no
     limit; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later receives
-    the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is notified of
-    subscribers, in a thread of the library, one event at a time; an object that is not a listener is ignored,
-    with a warning. Raise ValueError on a bad name, class or queue_size.
+    the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is notified when subscribers
+    connect and disconnect, in a library thread, one event at a time; an object that is not a listener is ignored,
+    with a warning. Raise ValueError if the name, the class or queue_size is invalid.
     """
 
     impl: PublishedTopic | None
@@ -104,10 +104,10 @@ class Publisher(Topic[_M_co]):
         self._session.when_ready(state.register, state.title)
 
     def publish(self, *args: object, **kwds: object) -> None:
-        """Publish a message, or the message with these field values.
+        """Publish a message, or a message with the given field values.
 
-        Raise ROSException before init_node and after unregister, ROSSerializationException or TypeError on
-        invalid values. Waits for a subscriber a few milliseconds at most, except with ``queue_size=None``.
+        Raise ROSException before init_node and after unregister, ROSSerializationException or TypeError if a value
+        is invalid. Blocks for a few milliseconds at most on a slow subscriber, except with ``queue_size=None``.
         """
         state = self.impl
         if state is None:
@@ -117,7 +117,7 @@ class Publisher(Topic[_M_co]):
         else:
             state.check_initialized()
             if len(args) == 1 and isinstance(args[0], AnyMsg):
-                # As in rospy, the bytes are not checked against the type.
+                # As in rospy, do not check the bytes against the type.
                 state.publish(args[0])
             else:
                 state.publish(args_kwds_to_message(self.data_class, args, kwds))
@@ -125,8 +125,8 @@ class Publisher(Topic[_M_co]):
     def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> bool:
         """Wait until ``count`` subscribers are connected; return False if that takes longer than ``timeout`` seconds.
 
-        A subscriber does not receive messages published before it was connected, unless the topic is latched.
-        Raise ROSException before init_node and after unregister, ROSInterruptException at a shutdown.
+        Messages published before a subscriber has connected do not reach it, unless the topic is latched.
+        Raise ROSException before init_node and after unregister, ROSInterruptException if the node shuts down.
         """
         if self.impl is None:
             raise ROSException("wait_for_subscribers() on an unregistered() handle")
@@ -137,14 +137,14 @@ class PublishedTopic(SharedTopic):
     """A topic published by this process; its Publishers share this object."""
 
     def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:
-        # Imported here, since it imports asyncio.
+        # Imported here, because the module imports asyncio.
         from minirospy.runtime.node.topics import Publication
 
         super().__init__(session, topic, data_class)
         self._deferral = session.lifecycle.deferral
         self.publication = Publication(topic, InterfaceType.of(data_class), on_link=self._on_link)
         self._handles: set[Publisher[Message]] = set()
-        # Notified of subscribers; a program may add and remove listeners
+        # Notified when subscribers connect and disconnect; a program may add and remove listeners
         self.subscriber_listeners: list[SubscribeListener] = []
         self._events: InOrder | None = None
         self._waiting: list[Callable[[], None]] = []
@@ -183,11 +183,12 @@ class PublishedTopic(SharedTopic):
         publication.headers.update(headers or {})
 
     def register(self) -> None:
-        """Register with the master, only once."""
+        """Register with the master. Only the first call has an effect."""
         with self._session.lock:
             if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
-            # Set before registering: a subscriber may connect immediately, and a publish() before the answer counts.
+            # Set this before registering: a subscriber may connect immediately, and a publish() before the master's
+            # response counts too.
             self._registered = True
             wait = self._session.start(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)
@@ -201,7 +202,7 @@ class PublishedTopic(SharedTopic):
             del self._session.published[self.resolved_name]
             if not self._session.node or self._session.is_shutdown():
                 return
-            # Start this before another thread can publish the topic again.
+            # Start this now, before another thread can publish the topic again.
             wait = self._session.start(self._session.node.unadvertise(self.publication))
         unregister_from_master(wait)
 
@@ -234,7 +235,7 @@ class PublishedTopic(SharedTopic):
         self.is_latch = True
 
     def add_subscriber_listener(self, l: SubscribeListener) -> None:  # noqa: E741 - as rospy calls it
-        """Notify ``l`` of subscribers that connect and disconnect from now on; warn if it is not a listener, and ignore it."""
+        """Notify ``l`` when subscribers connect and disconnect from now on; warn and ignore it if it is not a listener."""
         if _is_listener(l):
             self.subscriber_listeners.append(l)
         else:
@@ -262,7 +263,7 @@ class PublishedTopic(SharedTopic):
             self._log_unheard()
 
     def forget_subscribers(self) -> None:
-        """Stop publishing to the present subscribers: this process is a fork, and they are connected to its parent."""
+        """Stop publishing to the current subscribers: this process is a fork, and they are connected to the parent process."""
         self.publication.links = ()
         self._registered = False
 
@@ -294,7 +295,7 @@ class PublishedTopic(SharedTopic):
         return [connection_to_subscriber(link, self.resolved_name) for link in self.publication.links]
 
     def get_stats(self) -> tuple[str, int, list[tuple[object, ...]]]:
-        """Return the topic's row of the Slave API's getBusStats."""
+        """Return the topic's row for the Slave API's getBusStats."""
         rows: list[tuple[object, ...]] = [
             (c.id, c.stat_bytes, c.stat_num_msg, not c.done) for c in self.connections
         ]
@@ -309,9 +310,10 @@ class PublishedTopic(SharedTopic):
         return any(link.peer == endpoint_id for link in self.publication.links)
 
     def _log_unheard(self) -> None:
-        """Log that the first message had no subscriber: as a warning only if the master knows one that is still connecting.
+        """Log that the first message had no subscriber.
 
-        Many topics have no subscriber at first, or ever.
+        Log a warning only if the master reports a subscriber that is still connecting: many topics have no subscriber at
+        first, or ever.
         """
         if self.publication.expected and not self._session.is_shutdown():
             _log.warning(
@@ -330,12 +332,12 @@ class PublishedTopic(SharedTopic):
         try:
             message.serialize(pieces)
         except SerializationOverflowError:
-            # rospy does not convert struct's OverflowError: programs catch that type.
+            # rospy does not convert struct's OverflowError, so programs catch that type.
             raise
         except SerializationError as error:
             if not self._has_header or getattr(message.header, "frame_id", "") is not None:
                 raise self._refused(message, error) from None
-            # rospy replaces None by "0".
+            # rospy replaces None with "0".
             message.header.frame_id = "0"
             pieces.clear()
             try:
@@ -345,7 +347,7 @@ class PublishedTopic(SharedTopic):
         return pieces.frame()
 
     def _refused(self, message: Message, error: SerializationError) -> ROSSerializationException:
-        """Return the error for a message that does not match its type: rospy's text, then the topic."""
+        """Return the error for a message that does not match its type: rospy's message, then the topic."""
         where = f"topic {self.resolved_name}, type {message._type}"
         return ROSSerializationException(f"{error}\n({where})")
 
@@ -367,7 +369,7 @@ class PublishedTopic(SharedTopic):
             for handle in list(self._handles)[:1]:
                 link.send(self._frame(args_kwds_to_message(handle.data_class, args, kwds)))
 
-        # Read the attribute in the worker: it may be a property, which runs the user's code.
+        # Read the attribute in the worker, because it may be a property that runs the user's code.
         for listener in list(self.subscriber_listeners):
             if is_up:
                 self._events.start(
@@ -385,12 +387,12 @@ def _notify(listener: SubscribeListener, event: str, *args: object) -> None:
 
 
 def _is_listener(value: object) -> bool:
-    """Return whether an object has a method of SubscribeListener; programs need not derive from it."""
+    """Return whether an object has a SubscribeListener method; programs need not derive from the class."""
     return any(hasattr(value, name) for name in ("peer_subscribe", "peer_unsubscribe"))
 
 
 def _not_a_listener(value: object) -> str:
-    """Return the warning about an argument that is not a listener; with it, rospy refuses every subscriber."""
+    """Return the warning about an argument that is not a listener; rospy would reject every subscriber because of it."""
     text = f"subscriber_listener {value!r} is ignored: it has no method peer_subscribe or peer_unsubscribe."
     if isinstance(value, int):
         return f"{text} The third argument of Publisher is not the queue size: write queue_size={value!r}"
@@ -398,7 +400,10 @@ def _not_a_listener(value: object) -> str:
 
 
 def _checked_size(queue_size: int | None) -> int | None:
-    """Return a Publisher's queue_size as rospy interprets it: a negative one means unlimited. Raise ValueError."""
+    """Return a Publisher's queue_size; as in rospy, a negative one means unlimited.
+
+    Raise ValueError if it is neither an integer nor None.
+    """
     if queue_size is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""The Service and ServiceProxy of rospy. Source: http://wiki.ros.org/rospy/Overview/Services."""
+"""rospy's Service and ServiceProxy. Source: http://wiki.ros.org/rospy/Overview/Services."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ _NO_CONTACT = "failed to contact, will keep trying"
 class Service(Generic[_S_co]):
     """Offers a service: ``handler(request)`` returns the response.
 
-    The handler may return a response, a dictionary of some of its fields, a list or tuple of all their
-    values, or the value of its only field. An exception from it becomes the error of the client's call;
-    ``error_handler(error, type, error, traceback)`` is then called in place of a log line. Each connection has
+    The handler may return a response, a dictionary of some of its fields, a list or tuple of all its field
+    values, or the value of its only field. If the handler raises, the client's call fails with that error, and
+    ``error_handler(error, type, error, traceback)``, if given, is called instead of logging it. Each connection has
     a separate thread, so a handler may run several times concurrently. ``buff_size`` is accepted for compatibility.
-    Raise ValueError on an empty name, ServiceException if this node already offers the service.
+    Raise ValueError if the name is empty, ServiceException if this node already offers the service.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Service(Generic[_S_co]):
         return self._ended.is_set()
 
     def shutdown(self, reason: str = "") -> None:
-        """Stop offering the service; a call in progress gets its answer."""
+        """Stop offering the service; a call in progress still gets its response."""
         self._ended.set()
         with self._session.lock:
             server, self._server = self._server, None
@@ -113,7 +113,7 @@ class Service(Generic[_S_co]):
             del self._session.offered[self.resolved_name]
             if not server or not self._session.node or self._session.is_shutdown():
                 return
-            # Start this before another thread can offer the service again.
+            # Start this now, before another thread can offer the service again.
             wait = self._session.start(self._session.node.unserve(server))
         unregister_from_master(wait)
 
@@ -145,7 +145,7 @@ class Service(Generic[_S_co]):
             _log.critical("unable to register service [%s] with master: %s", self.resolved_name, why)
 
     def _handle(self, body: memoryview, header: Header) -> bytes:
-        """Handle the bytes of a request and return those of the response (in a worker)."""
+        """Handle a serialized request and return the serialized response. Runs in a worker thread."""
         try:
             request = self.request_class()
             request.deserialize(body if self._takes_memoryview else bytes(body))
@@ -157,7 +157,7 @@ class Service(Generic[_S_co]):
             return buffer.getvalue()
         except ServiceException as error:
             raise ServiceException(f"service cannot process request: {error}") from error
-        except Exception as error:  # raised by the user's handler; it is sent to the client
+        except Exception as error:  # an error in the user's handler; it is sent to the client
             self._report(error)
             raise ServiceException(f"error processing request: {error}") from error
 
@@ -176,9 +176,9 @@ class Service(Generic[_S_co]):
 class ServiceProxy(Generic[_S_co]):
     """Calls a service: ``proxy(request)``, or with the request's fields as arguments.
 
-    ``persistent`` keeps one connection for all calls, and reconnects after the server has closed it. Several threads
-    may use a proxy; with ``persistent`` they wait for each other. ``headers`` are added to the
-    connection header, which the handler finds in ``request._connection_header``.
+    ``persistent`` uses one connection for all calls, and reconnects after the server has closed it. Several threads
+    may use a proxy; with ``persistent``, their calls run one at a time. ``headers`` are added to the
+    connection header, which the handler can read from ``request._connection_header``.
     """
 
     def __init__(
@@ -188,7 +188,7 @@ class ServiceProxy(Generic[_S_co]):
         persistent: bool = False,
         headers: Mapping[str, str] | None = None,
     ) -> None:
-        # A name that was never set (None) raises an error only when it is called.
+        # If the name was never set (None), only a call raises an error.
         self.resolved_name = current_session().resolve(str(name) if name else "")
         self.service_class = service_class
         self.request_class: type[Message] = service_class._request_class
@@ -203,7 +203,7 @@ class ServiceProxy(Generic[_S_co]):
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
         self._client_session: Session | None = None
-        # The number of calls that reached the service: the seq of requests that start with a header.
+        # Counts the calls that reached the service. It is the seq of requests whose first field is a header.
         self._calls = 0
         self._lock = threading.Lock()
 
@@ -225,7 +225,7 @@ class ServiceProxy(Generic[_S_co]):
             return self._exchange(self._connect(body), body, keep=False)
         with self._lock:
             if self._client and (self._client.has_ended() or self._client_session is not current_session()):
-                # In a fork the connection belongs to the parent: two processes would read each other's responses.
+                # In a fork the connection belongs to the parent: the two processes would read each other's responses.
                 self._disconnect()
             if self._client is None:
                 self._client, self._client_session = self._connect(body), current_session()
@@ -236,10 +236,10 @@ class ServiceProxy(Generic[_S_co]):
         wait_for_service(self.resolved_name, timeout)
 
     def close(self) -> None:
-        """Close a persistent connection; a call that another thread makes on it fails."""
+        """Close a persistent connection; if another thread is calling through it, that call fails."""
         client = self._client
         if client and self._lock.locked():
-            # Closing a socket does not wake a thread that waits for it, so shut it down; that thread then closes it.
+            # Shut the socket down: closing it would not wake a thread that reads from it. That thread then closes it.
             client.hang_up()
         else:
             self._disconnect()
@@ -255,7 +255,8 @@ class ServiceProxy(Generic[_S_co]):
         try:
             request.serialize(buffer)
         except SerializationError:
-            # rospy connects first, so an error about a missing service or wrong type precedes serialization errors.
+            # Connect first, as rospy does, so that an error about a missing service or wrong type precedes
+            # serialization errors.
             if self._client is None:
                 self._connect_by_master(None, b"").close()
             self._calls += 1
@@ -263,7 +264,7 @@ class ServiceProxy(Generic[_S_co]):
         return buffer.getvalue()
 
     def _connect(self, request: bytes) -> ServiceClient:
-        """Return a connection for sending ``request``, which may already have been sent on it."""
+        """Return a connection for sending ``request``; the request may already have been sent on it."""
         ahead = self._connect_ahead()
         try:
             return self._connect_by_master(ahead, request)
@@ -272,9 +273,9 @@ class ServiceProxy(Generic[_S_co]):
                 ahead.close()
 
     def _connect_ahead(self) -> ServiceClient | None:
-        """Return a connection to the service's last address, opened while the master is queried for the present one.
+        """Return a connection to the service's last known address, opened while the master is queried for the current one.
 
-        Only to this machine, since connecting elsewhere may take long.
+        Do this only for addresses on this machine, since connecting to others may take long.
         """
         from minirospy.runtime.node.service_client import parse_service_uri
 
@@ -308,8 +309,8 @@ class ServiceProxy(Generic[_S_co]):
             raise ServiceException(f"unable to contact master: {error}") from error
         try:
             if ahead and ahead.uri == uri:
-                # The server may have been about to exit: then connect again. A server that does not answer may
-                # already have received the request.
+                # The server may have been about to exit: then connect again. Do not retry if the server does not
+                # respond, because it may have received the request.
                 with contextlib.suppress(ConnectionError, WireError):
                     ahead.finish(request)
                     return ahead
@@ -357,10 +358,10 @@ class ServiceProxy(Generic[_S_co]):
 
 
 def wait_for_service(service: str, timeout: float | Duration | None = None) -> None:
-    """Wait until a service is registered and answers.
+    """Wait until a service is registered and responds.
 
     Raise ROSException after ``timeout`` seconds, ROSInterruptException if the node shuts down, ValueError
-    on a timeout of 0.
+    if the timeout is 0.
     """
     session = current_session()
     name = session.resolve(str(service) if service else "")
@@ -382,7 +383,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
             _log.warning("wait_for_service(%s): %s", name, why)
             reported.add(why)
         elif not reported and time.monotonic() - start > _SILENT_SECONDS:
-            # rospy never logs anything here, which hides a misspelled name.
+            # rospy logs nothing here, so a misspelled name goes unnoticed.
             _log.info("wait_for_service(%s): %s, waiting...", name, why)
             reported.add(why)
         pause = _POLL_SECONDS if end is None else min(_POLL_SECONDS, max(0.0, end - time.monotonic()))
@@ -391,7 +392,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
 
 
 def _probe(name: str, timeout: float) -> str | None:
-    """Return the reason why the service cannot be called yet; None if it can."""
+    """Return the reason why the service cannot be called yet, or None if it can."""
     from minirospy.runtime.node.service_client import ServiceClient
 
     session = current_session()

@@ -1,6 +1,6 @@
-"""The single node of a process: the state that rospy's functions share, in an object that is replaced and never reset.
+"""The process's single node: the state that rospy's functions share, in an object that is replaced and never reset.
 
-Publishers, services, time and log register with the session; it imports none of them.
+Publishers, services, time and log register with the session; this module imports none of them.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ __all__ = ["Session", "current_session", "replace_session", "replace_session_in_
 
 _T = TypeVar("_T")
 _MASTER_SECONDS = 30.0
-"""Time limit of a call; on a small computer, many nodes that start together wait for each other."""
+"""Time limit for a call. It is long because many nodes that start together on a small computer delay each other."""
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
 _log = logging.getLogger(__name__)
 
 
 class Session:
-    """A node of this process, from before init_node until after its shutdown: its name, lifecycle, clock, tables and loop."""
+    """The process's node, from before init_node until after its shutdown: its name, lifecycle, clock, tables and loop."""
 
     def __init__(self, previous: Session | None = None, *, is_fork: bool = False) -> None:
-        """Take ``previous``, the session to replace; its name, clock and listeners remain in use until init_node."""
+        """Replace the session ``previous``; its name, clock and listeners remain in use until init_node is called."""
         self.is_fork = is_fork
         self.is_abandoned = False  # this process is a fork, and the session belongs to its parent
         self._forked_from = previous.name if previous and is_fork else ""
@@ -66,7 +66,7 @@ class Session:
         )
         """Called with the name and the value of each parameter that the master reports as changed."""
         self.on_replaced: list[Callable[[], object]] = previous.on_replaced if previous else []
-        """Called by the next init_node; each function removes something that this session has installed in the process."""
+        """Called by the next init_node; each function removes something that this session installed in the process."""
         # The arguments of init_node; None before it is called
         self.init_arguments: tuple[object, ...] | None = None
         self.node: Node | None = None  # set when init_node is done
@@ -85,7 +85,7 @@ class Session:
         return self.identity.name
 
     def resolve(self, name: str, caller_id: str | None = None) -> str:
-        """Return the global name of ``name``, as seen by this node or the node ``caller_id``."""
+        """Return the global name of ``name``, resolved relative to this node or the node ``caller_id``."""
         return self.identity.resolve(name, caller_id)
 
     @property
@@ -95,7 +95,7 @@ class Session:
 
     @property
     def master(self) -> MasterProxy:
-        """The master's proxy; calls run in the caller's own thread."""
+        """The proxy for the master; calls run in the caller's thread."""
         if self._master is None or self._master.caller_id != self.name:
             environment = self.identity.environment
             self._master = MasterProxy(
@@ -104,7 +104,7 @@ class Session:
         return self._master
 
     def open_node(self, xmlrpc_port: int, tcpros_port: int) -> None:
-        """Start the loop and the node's servers. Raise ROSInitException."""
+        """Start the loop and the node's servers. Raise ROSInitException if a server cannot listen."""
         # Imported here: a program without a node need not import asyncio.
         from minirospy.runtime.node.node import Node
         from minirospy.runtime.transport.loop import LoopThread
@@ -125,7 +125,7 @@ class Session:
             raise ROSInitException(f"node [{self.name}] cannot listen: {error}") from error
 
     def publish_node(self) -> None:
-        """Make the opened node the process's node, and register everything that waited for it."""
+        """Make the opened node the process's node, and register everything that was created before it."""
         with self.lock:
             self.node = self._opened
             waiting, self._waiting_for_node = self._waiting_for_node, []
@@ -152,33 +152,33 @@ class Session:
         return self.is_fork and self.node is None and not self.is_shutdown()
 
     def why_fork_has_no_effect(self, handle: str) -> str:
-        """Return the text of the error about a handle that has no effect in a fork."""
+        """Return the error message for a handle that has no effect in a fork."""
         return (
             f"{handle} has no effect in this process, which is a fork of node [{self._forked_from}]: call "
             "rospy.init_node() in the child process, and create it after that"
         )
 
     def report_fork(self, handle: str) -> None:
-        """Log, once for each handle, that it has no effect in this fork of a node."""
+        """Log, once per handle, that it has no effect in this fork of a node."""
         if handle not in self._reported:
             self._reported.add(handle)
             logging.getLogger("rosout").error("%s", self.why_fork_has_no_effect(handle))
 
     def run(self, coroutine: Coroutine[object, object, _T]) -> _T:
-        """Run ``coroutine`` on the node's loop and wait for it. Raise ROSInterruptException at a shutdown."""
+        """Run ``coroutine`` on the node's loop and wait for it. Raise ROSInterruptException if the node shuts down meanwhile."""
         return self.start(coroutine)()
 
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[], _T]:
         """Start ``coroutine`` on the node's loop; return a function that waits for its result.
 
-        A lock keeps the starts in order.
+        Calls start their coroutines one at a time, in order.
 
-        Raise as :meth:`run` does.
+        Raise ROSInterruptException if the node shuts down meanwhile.
         """
         assert self._loop is not None
         loop = self._loop
         with self.lifecycle.deferral:
-            # A shutdown at this point would wait for the loop to close, which needs a lock that this thread holds.
+            # A shutdown during this call would wait for the loop to close, which needs a lock that this thread holds.
             wait = self._or_interrupted(lambda: loop.start(coroutine))
         return lambda: self._or_interrupted(lambda: wait(None))
 
@@ -201,7 +201,7 @@ class Session:
     def poll_shutdown(self) -> bool:
         """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
         if self._installs_signals:
-            # A fork keeps the default signal handling until it polls.
+            # A fork uses the default signal handling until it polls.
             self._installs_signals = False
             self.signals.install()
         return self.lifecycle.poll_shutdown()
@@ -215,27 +215,27 @@ class Session:
         self.lifecycle.spin()
 
     def shut_down_at_exit(self) -> None:
-        """Shut down when the program exits. If another thread is doing that, wait for it."""
+        """Shut down when the program exits. If another thread is already shutting down, wait for it."""
         if self._opened or self.is_fork:
             self.lifecycle.signal_shutdown("atexit")
             wait_for_event(self.lifecycle.left, None)
         self.signals.flush_at_exit()
 
     def abandon_in_fork(self) -> None:
-        """Detach the remains of this session in a fork: the node, its sockets and its locks belong to the parent."""
+        """In a fork, detach what the session refers to: the node, its sockets and its locks belong to the parent."""
         self.is_abandoned = True
         for published in self.published.values():
             published.forget_subscribers()
         self.published, self.subscribed, self.offered = {}, {}, {}
         self.node = None
-        # Another thread of the parent may have held it.
+        # Another thread in the parent may have held the lock during the fork.
         self.lock = threading.RLock()
         self.signals.release()
 
     # --- helpers
 
     def _leave(self) -> None:
-        """Leave the graph. Waits as long as the master answers: see Node.close(), which sets the limits."""
+        """Leave the graph. Waits for the master's responses; Node.close() sets the time limits."""
         if self._opened and self._loop:
             try:
                 # After a signal the watchdog prints the reason for waiting.
@@ -264,8 +264,8 @@ class Session:
             raise self.lifecycle.interrupted("rospy shutdown") from error
 
     def _on_shutdown_request(self, reason: str) -> None:
-        """Shut down at the request of another process; like rospy, print the reason."""
-        # The terminal may be gone.
+        """Shut down because another process requested it; like rospy, print the reason."""
+        # The terminal may have been closed.
         with contextlib.suppress(OSError, ValueError):
             print(
                 "shutdown request" + (f": {request[1]}" if (request := _REQUEST.match(reason)) else ""),
@@ -297,9 +297,9 @@ def current_session() -> Session:
 
 
 def replace_session() -> None:
-    """Let init_node make another node, once the node has left the graph; no effect before that, or after a signal.
+    """Let init_node create another node once the node has left the graph; no effect before that, or after a signal.
 
-    Objects that the program made for the old node, such as its publishers, stay with it.
+    Objects that the program created for the old node, such as publishers, remain attached to it.
     """
     session = _Process.session
     if session.lifecycle.left.is_set() and not session.lifecycle.machine.signals:
@@ -308,7 +308,7 @@ def replace_session() -> None:
 
 
 def replace_session_in_fork() -> None:
-    """Give a fork a new session: the name, the time and log lines remain, the node stays with the parent."""
+    """Replace the session in a fork: the name, the time and the logging remain; the node belongs to the parent."""
     session = _Process.session
     _Process.session = Session(session, is_fork=True)
     if session.is_shutdown():

@@ -1,7 +1,7 @@
 """The shutdown of a process that is a node, as a state machine; docs/shutdown.md draws it.
 
-Events come in: a signal, a phase that the node has entered, a tick of the clock. Actions come out. This module touches no
-thread, signal or clock: :mod:`minirospy.client.signals` is the shell that performs the actions.
+Its inputs are events: a signal, a phase that the node has entered, a clock tick. Its outputs are actions. This module uses
+no threads, signals or clocks: :mod:`minirospy.client.signals` performs the actions.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import enum
 
 __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 
-_GRACE_SECONDS = 0.5  # for the main thread to start the hooks, and again to notice that is_shutdown() is true
+_GRACE_SECONDS = 0.5  # for the main thread to start the hooks, and again to see that is_shutdown() is true
 _REPORT_SECONDS = 2.0
 
 
@@ -21,11 +21,11 @@ class Phase(enum.IntEnum):
     HOOKS = 1  # is_shutdown() is still false
     DOWN = 2  # is_shutdown() is true, blocking calls are interrupted
     LEAVING = 3  # the node waits for the master to unregister it
-    LEFT = 4  # the master no longer knows the node
+    LEFT = 4  # the master has unregistered the node
 
 
 class Action(enum.Enum):
-    """An action for the shell to perform."""
+    """An action that :mod:`minirospy.client.signals` performs."""
 
     RUN_HOOKS = "shut down in a thread of the library: the main thread does not run Python code"
     INTERRUPT = "raise ROSInterruptException in the main thread"
@@ -36,16 +36,16 @@ class Action(enum.Enum):
 
 
 class Awareness(enum.IntEnum):
-    """How much a thread of the program knows of the shutdown."""
+    """How far a thread in the program has been notified of the shutdown."""
 
     NONE = 0  # it has never called is_shutdown()
     POLLS = 1
-    CUT_SHORT = 2  # it polls, but has not done so since the shutdown interrupted its sleep
-    NOTIFIED = 3  # by is_shutdown() or an exception: anything it does now is clean-up
+    CUT_SHORT = 2  # it polls, but has not polled since the shutdown interrupted its sleep
+    NOTIFIED = 3  # notified by is_shutdown() or an exception: anything the thread does now is clean-up
 
 
 class ThreadState:
-    """The state of the shutdown from the view of one thread of the program."""
+    """The shutdown state as one thread in the program sees it."""
 
     __slots__ = ("awareness",)
 
@@ -54,7 +54,7 @@ class ThreadState:
 
 
 class ShutdownMachine:
-    """The rules: the actions that follow a signal, and after how long.
+    """The rules that decide which actions follow a signal, and when.
 
     Time is the value that the caller passes as ``now``, in seconds. One thread calls :meth:`signal` and :meth:`tick`; any
     thread may set :attr:`phase` and the awareness of :attr:`main`.
@@ -63,16 +63,16 @@ class ShutdownMachine:
     def __init__(self) -> None:
         self.main = ThreadState()
         self.main_has_ended = False
-        self.runs_in_main = False  # the main thread itself runs the hooks, and leaves the graph
+        self.runs_in_main = False  # the main thread itself runs the hooks and unregisters the node
         self.phase = Phase.RUNNING
         self.signals = 0
         self._signalled = 0.0
-        # The earliest time at which the main thread could notice that is_shutdown() is true
+        # The earliest time at which the main thread could see that is_shutdown() is true
         self._free: float | None = None
         self._done: set[Action] = set()
 
     def signal(self, now: float) -> list[Action]:
-        """Count a signal from the user and return its actions other than the shutdown itself."""
+        """Count a signal from the user and return the resulting actions, except for the shutdown itself."""
         self.signals += 1
         if self.signals == 1:
             self._signalled = now
@@ -82,13 +82,13 @@ class ShutdownMachine:
 
         is_leaving = self.phase is Phase.LEAVING
         if is_leaving and self.runs_in_main:
-            # The main thread is not in the program's code.
+            # The main thread is not running the program's code.
             return [Action.STOP_LEAVING]
         self._done.add(Action.INTERRUPT)
         return [Action.STOP_LEAVING, Action.KEYBOARD_INTERRUPT] if is_leaving else [Action.KEYBOARD_INTERRUPT]
 
     def tick(self, now: float) -> list[Action]:
-        """Return the actions that are due after a signal; each action once."""
+        """Return the actions that are due after a signal. Each action is returned once."""
         if not self.signals:
             return []
         if self._free is None and self.phase >= (Phase.LEFT if self.runs_in_main else Phase.DOWN):
@@ -107,5 +107,5 @@ class ShutdownMachine:
 
     @property
     def main_ends_by_itself(self) -> bool:
-        """Return whether the main thread needs no exception: it has exited, or is aware of the shutdown."""
+        """Return whether the main thread needs no exception, because it has exited or has been notified of the shutdown."""
         return self.main_has_ended or self.main.awareness > Awareness.NONE

@@ -1,4 +1,4 @@
-"""Let SIGINT, SIGTERM, SIGHUP and Windows' SIGBREAK shut the node down: the shell of `minirospy.client.shutdown`.
+"""Let SIGINT, SIGTERM, SIGHUP and Windows' SIGBREAK shut the node down, as `minirospy.client.shutdown` decides.
 
 The handler runs in the main thread and only marks a signal as pending. A watchdog thread reads the signals from a
 file descriptor, even while the main thread is in C code, feeds the state machine and performs its actions.
@@ -27,20 +27,20 @@ _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 _EXIT_STATUS = 130
 
 _DEFER_SECONDS = 0.05
-"""Wait this long for the main thread's next call of rospy: only there a hook cannot interrupt a half-done step."""
+"""Wait this long for the main thread's next rospy call: only there the hooks cannot interrupt a half-finished operation."""
 
 _TICK_SECONDS = 0.01
-# Limit of one tick, so that time in which the process or the machine was suspended does not count
+# Maximum time counted for one tick, so that time during which the process or the machine was suspended is not counted
 _MAX_STEP = 0.05
 
 
 class SignalWatchdog:
-    """Handles the signals of this process, from :meth:`install` on."""
+    """Handles this process's signals after :meth:`install`."""
 
     def __init__(
         self, lifecycle: Lifecycle, stop_leaving: Callable[[], object], is_sending: Callable[[], bool]
     ) -> None:
-        """Take ``stop_leaving()``, which lets the node leave the graph without the master's answer.
+        """Call ``stop_leaving()`` to let the node leave the graph without waiting for the master's response.
 
         ``is_sending()`` returns whether a link's lock is held, so that a hook that publishes could deadlock.
         """
@@ -65,14 +65,14 @@ class SignalWatchdog:
         return self._sending is not None
 
     def install(self) -> None:
-        """Let the signals shut the node down. Only the main thread can install handlers; no effect in others."""
+        """Let the signals shut the node down. Has no effect outside of the main thread, which alone can install handlers."""
         if threading.current_thread() is not threading.main_thread():
             return
 
         for name in [name for name in _NAMES if hasattr(signal, name)]:
             number = getattr(signal, name)
             handler = signal.getsignal(number)
-            # nohup ignores SIGHUP, and this must stay so.
+            # Leave SIGHUP ignored if nohup has ignored it.
             if handler != self._on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
                 self._previous[number] = handler
                 signal.signal(number, self._on_signal)
@@ -83,11 +83,11 @@ class SignalWatchdog:
             _start(self._watch, receiving, name="minirospy-signals")
         previous = signal.set_wakeup_fd(self._sending.fileno(), warn_on_full_buffer=False)
         if previous != -1:
-            # It belongs to an event loop that was installed first.
+            # The previous file descriptor belongs to an event loop that was installed first.
             signal.set_wakeup_fd(previous)
 
     def release(self) -> None:
-        """Restore the previous handlers, and stop the watchdog thread. In the main thread."""
+        """Restore the previous handlers and stop the watchdog thread. Call this in the main thread."""
         for number, handler in self._previous.items():
             if self._is_handled(number):
                 signal.signal(number, handler)
@@ -100,7 +100,7 @@ class SignalWatchdog:
             self._sending = None
 
     def flush_at_exit(self) -> None:
-        """Flush the program's output while Ctrl-C still works; after this, a third Ctrl-C is handled by the system."""
+        """Flush the program's output while the node still handles Ctrl-C; after this, the system handles a third Ctrl-C."""
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stdout.flush()
         if self._machine.signals > 1:
@@ -115,7 +115,8 @@ class SignalWatchdog:
         self._deferral.pending = True
         self._handled += 1
         if self._sending is not None:
-            # Wake the watchdog even if an event loop has taken the file descriptor. No signal has the number 0.
+            # Wake the watchdog even if an event loop has replaced the file descriptor. Send 0, which is not a signal
+            # number.
             with contextlib.suppress(OSError):
                 self._sending.send(b"\0")
 
@@ -134,7 +135,7 @@ class SignalWatchdog:
         action, self._interrupt = self._interrupt, None
         if action is Action.KEYBOARD_INTERRUPT:
             raise KeyboardInterrupt
-        # If it was notified meanwhile, the exception would interrupt the program's clean-up.
+        # If the main thread was notified meanwhile, the exception would interrupt the program's clean-up.
         if action is Action.INTERRUPT and not self._machine.main_ends_by_itself:
             raise self._lifecycle.interrupted("the program was signalled to end")
 
@@ -161,7 +162,7 @@ class SignalWatchdog:
                 self._perform(machine.tick(now))
 
                 if not (was_pending and deferral.pending):
-                    # Time before the signal does not count.
+                    # Do not count the time before the signal.
                     deferred_at = now
                 elif now - deferred_at >= _DEFER_SECONDS:
                     self._nudge()
@@ -170,9 +171,9 @@ class SignalWatchdog:
         return number in self._previous and signal.getsignal(number) == self._on_signal
 
     def _new_signals(self) -> int:
-        """Return how many signals from the user have arrived that the machine has not counted yet.
+        """Return the number of signals from the user that the machine has not counted yet.
 
-        An event loop may have taken the file descriptor: then only the handler reports a signal.
+        If an event loop has replaced the file descriptor, only the handler reports signals.
         """
         return max(0, max(self._arrived, self._handled) - self._nudges - self._machine.signals)
 
@@ -194,10 +195,10 @@ class SignalWatchdog:
                     os._exit(_EXIT_STATUS)
 
     def _nudge(self) -> None:
-        """Run the handler in the main thread, and interrupt its system call, if any."""
+        """Run the handler in the main thread, interrupting its system call, if any."""
         with self._nudging:
             if self._is_nudge or not self._is_handled(self._number):
-                # Send one at a time: the system merges two undelivered ones, but they are counted.
+                # Send one nudge at a time: the system merges two undelivered ones, but they are counted.
                 return
             self._nudges += 1
             self._is_nudge = True

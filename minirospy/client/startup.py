@@ -1,4 +1,4 @@
-"""init_node: the steps that make a process a node.
+"""init_node: the steps that turn a process into a node.
 
 Source: http://wiki.ros.org/rospy/Overview/Initialization%20and%20Shutdown.
 """
@@ -42,10 +42,10 @@ def init_node(
     xmlrpc_port: int = 0,
     tcpros_port: int = 0,
 ) -> None:
-    """Make this process the node ``name``; waits for a master.
+    """Make this process the node ``name``; wait for a master.
 
-    ``anonymous`` appends a number, so that several nodes of one name can run. ``log_level``: rospy.DEBUG to rospy.FATAL.
-    Raise ValueError on a name that is empty or has a namespace, ROSException if called again with other
+    ``anonymous`` appends a number, so that several nodes with one name can run. ``log_level``: rospy.DEBUG to rospy.FATAL.
+    Raise ValueError if the name is empty or has a namespace, ROSException if called again with other
     arguments, ROSInitException if the node cannot be set up, ROSInterruptException if it is shut down while it
     waits.
     """
@@ -102,7 +102,7 @@ def _check_name(name: str) -> None:
 
 
 def _is_repeated(session: Session, arguments: tuple[object, ...]) -> bool:
-    """Return whether init_node was called before with the same arguments. Raise ROSException if with others."""
+    """Return whether init_node was called before with the same arguments. Raise ROSException if they were different."""
     if session.init_arguments is None:
         return False
     if session.init_arguments != arguments:
@@ -122,7 +122,7 @@ def _warn_of_name(name: str) -> None:
 
 
 def _release_previous(session: Session) -> None:
-    """Remove everything that the process's previous node has installed, such as its log handlers."""
+    """Remove everything that the process's previous node installed, such as its log handlers."""
     for release in session.on_replaced:
         release()
     session.on_replaced.clear()
@@ -130,13 +130,14 @@ def _release_previous(session: Session) -> None:
 
 @functools.cache
 def _install_process_hooks() -> None:
-    """Install the hooks for exit, forks and interrupts, once for all sessions of the process."""
+    """Install the hooks for exit, forks and interrupts, once for all sessions in the process."""
     suppress_tracebacks(_is_interrupt)
     atexit.register(lambda: current_session().shut_down_at_exit())
     if sys.platform != "win32":
         mask: list[set[signal.Signals | int]] = []
 
-        # Python drops a signal that reaches the child before it is set up: Pool.terminate() would wait forever.
+        # Python drops a signal that reaches the child before it is set up, so that Pool.terminate() would wait
+        # forever.
         def block_signals() -> None:
             mask.append(signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM}))
 
@@ -153,11 +154,11 @@ def _install_process_hooks() -> None:
 def _leave_with_child_process() -> None:
     """Shut the node down when the function of a multiprocessing.Process returns.
 
-    Such a process calls the finalizers of multiprocessing, but in some versions of Python no atexit functions.
+    Such a process calls multiprocessing's finalizers, but in some versions of Python no atexit functions.
     """
     process, util = (sys.modules.get(f"multiprocessing.{name}") for name in ("process", "util"))
     if process and util and process.parent_process() is not None:
-        # A high priority: as with atexit, the node leaves before the process joins its own children.
+        # Use a high priority so that, as with atexit, the node leaves before the process joins its own children.
         util.Finalize(None, lambda: current_session().shut_down_at_exit(), exitpriority=100)
 
 
@@ -166,7 +167,7 @@ def _is_interrupt(error: BaseException) -> bool:
 
 
 def _wait_for_master(session: Session) -> None:
-    """Wait until the master answers; if it does not, print that once. Raise ROSInterruptException at a shutdown."""
+    """Wait until the master responds; print once if it does not. Raise ROSInterruptException if the node shuts down."""
     uri = session.identity.environment.master_uri
     is_reported = False
 
@@ -185,7 +186,7 @@ def _wait_for_master(session: Session) -> None:
             if wait_for_event(session.lifecycle.shutting_down, _POLL_SECONDS):
                 break
         except RpcFault:
-            return  # a master without this call, such as that of @foxglove/ros1
+            return  # a master without this call, such as @foxglove/ros1
         except RpcError as error:
             raise ROSInitException(f"what answers at {uri} is not a ROS master: {error}") from error
         else:

@@ -55,7 +55,7 @@ class Spread(NamedTuple):
 
     @classmethod
     def of(cls, values: list[float]) -> Spread:
-        """Return the spread of ``values``; zeros if there are none."""
+        """Return the mean, standard deviation and maximum of ``values``; zeros if there are none."""
         if not values:
             return cls()
         mean = math.fsum(values) / len(values)
@@ -63,7 +63,7 @@ class Spread(NamedTuple):
 
 
 class Report(NamedTuple):
-    """The measurements of one window of one publisher. Times are nanoseconds, spreads seconds, ``traffic`` bytes."""
+    """The measurements for one publisher in one window. Times are in nanoseconds, spreads in seconds, ``traffic`` in bytes."""
 
     publisher: str
     start: int
@@ -89,9 +89,9 @@ class _Window:
 
 
 class TopicStatisticsCounter:
-    """Counts the messages of one topic and returns a report whenever a publisher's window is over.
+    """Counts the messages on one topic and returns a report whenever a publisher's window is over.
 
-    A message is counted in the thread of its connection; each publisher has only one.
+    Each connection's thread counts its own messages; each publisher has only one connection.
     """
 
     def __init__(self, limits: WindowLimits) -> None:
@@ -117,7 +117,7 @@ class TopicStatisticsCounter:
             if window.last_sequence is not None:
                 window.dropped += max(0, sequence - window.last_sequence - 1)
             window.last_sequence = sequence
-            # A stamp of zero means that none is set.
+            # A zero stamp means that none is set.
             if stamp:
                 window.ages.append((now - stamp) / 1e9)
 
@@ -150,7 +150,7 @@ class TopicStatisticsCounter:
 
 
 class StatisticsPublisher:
-    """Counts one topic of this node and publishes the reports on /statistics."""
+    """Counts the messages on one of this node's topics and publishes the reports on /statistics."""
 
     def __init__(self, topic: str) -> None:
         from rosgraph_msgs.msg import TopicStatistics

@@ -1,4 +1,4 @@
-"""The Subscriber of rospy: it deserializes messages here, in the worker that has read them.
+"""rospy's Subscriber. It deserializes messages in the worker that has read them.
 
 Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 """
@@ -32,18 +32,18 @@ _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _BUFF_SIZE = 65536
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
-"""Topics that are not counted: the statistics themselves, and the source of their times."""
+"""Topics that are not counted: the statistics themselves, and the clock that provides their times."""
 
 
 class Subscriber(Topic[_M_co]):
-    """Calls ``callback(message)`` with each message of a topic.
+    """Calls ``callback(message)`` with each message on a topic.
 
     ``callback_args`` is passed to the callback as second argument. ``queue_size``: while the callback is
     busy, keep only this many of the newest messages (None: all, in order). ``buff_size`` is accepted for compatibility:
-    queue_size alone determines which messages are kept. Subscribers of one topic in a process share the connections;
-    they keep as many messages as the largest queue_size. One that joins a latched topic later receives
-    its last message before the constructor returns. Raise ValueError on a bad name or class,
-    ROSException on a bad size.
+    queue_size alone determines which messages are kept. Subscribers to one topic in a process share the connections;
+    they keep as many messages as the largest queue_size. If a Subscriber is added to a latched topic later, its callback
+    receives the last message before the constructor returns. Raise ValueError if the name or class is invalid,
+    ROSException if the size is.
     """
 
     impl: SubscribedTopic | None
@@ -80,8 +80,8 @@ class Subscriber(Topic[_M_co]):
                     self._session, self.resolved_name, data_class
                 )
             state.join(self, queue_size, buff_size, tcp_nodelay)
-            # Read the links after joining: the message of a link opened meanwhile may be delivered twice, but is not
-            # lost.
+            # Read the links after joining: a message on a link that opens meanwhile may be delivered twice, but is
+            # not lost.
             links = state.links
         self.impl = state
 
@@ -95,13 +95,13 @@ class Subscriber(Topic[_M_co]):
             state.replay(data_class, _Callback(callback, callback_args), links)
 
     def unregister(self) -> None:
-        """Stop receiving; the connections are closed with the last Subscriber of the topic in this process."""
+        """Stop receiving; the topic's last Subscriber in this process also closes the connections."""
         super().unregister()
         self.callback = self.callback_args = None
 
 
 def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = None) -> _M:
-    """Return the next message of ``topic``; ``timeout`` in seconds, or a Duration.
+    """Return the next message on ``topic``; ``timeout`` is in seconds, or a Duration.
 
     Raise ROSException after ``timeout``, ROSInterruptException if the node shuts down.
     """
@@ -131,7 +131,7 @@ def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = N
 
 
 class _Callback(NamedTuple):
-    """A subscriber's function with its additional argument."""
+    """A subscriber's function and its additional argument."""
 
     function: Callable[..., object]
     args: object
@@ -146,7 +146,7 @@ class _Receiver(NamedTuple):
 
 
 class SubscribedTopic(SharedTopic):
-    """A topic subscribed to by this process; its Subscribers share this object."""
+    """A topic that this process subscribes to; its Subscribers share this object."""
 
     def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:
         super().__init__(session, topic, data_class)
@@ -168,11 +168,11 @@ class SubscribedTopic(SharedTopic):
 
     @property
     def connections(self) -> list[Connection]:
-        """The links to publishers, in rospy's form."""
+        """The links to publishers, as rospy represents them."""
         return [connection_to_publisher(link, self.resolved_name) for link in self.links]
 
     def get_stats(self) -> tuple[str, list[tuple[object, ...]]]:
-        """Return the topic's row of the Slave API's getBusStats."""
+        """Return the topic's row for the Slave API's getBusStats."""
         return self.resolved_name, [
             (c.id, c.stat_bytes, c.stat_num_msg, -1, not c.done) for c in self.connections
         ]
@@ -211,12 +211,12 @@ class SubscribedTopic(SharedTopic):
             del self._session.subscribed[self.resolved_name]
             if not self._session.node or not self.subscription or self._session.is_shutdown():
                 return
-            # Start this before another thread can subscribe to the topic again.
+            # Start this now, before another thread can subscribe to the topic again.
             wait = self._session.start(self._session.node.unsubscribe(self.subscription))
         unregister_from_master(wait)
 
     def add_callback(self, cb: Callable[..., object], cb_args: object) -> None:
-        """Add the callback ``cb``, and call it immediately with the last message of a latched topic; rosbridge uses this."""
+        """Add the callback ``cb``, and call it immediately with the last message if the topic is latched; rosbridge uses this."""
         callback = _Callback(cb, cb_args)
         with self._session.lock:
             self._added.append(callback)
@@ -225,7 +225,7 @@ class SubscribedTopic(SharedTopic):
         self.replay(self.data_class, callback, links)
 
     def remove_callback(self, cb: Callable[..., object], cb_args: object) -> None:
-        """Remove the callback ``cb``, which add_callback or a Subscriber has added. Raise KeyError."""
+        """Remove a callback that add_callback or a Subscriber has added. Raise KeyError if there is none."""
         with self._session.lock:
             if (callback := _Callback(cb, cb_args)) in self._added:
                 self._added.remove(callback)
@@ -242,11 +242,11 @@ class SubscribedTopic(SharedTopic):
             self._update()
 
     def set_buff_size(self, buff_size: int) -> None:
-        """Record the size, which has no effect, like a Subscriber's ``buff_size``."""
+        """Record the size; like a Subscriber's ``buff_size``, it has no effect."""
         self.buff_size = buff_size
 
     def register(self) -> None:
-        """Register with the master, only once."""
+        """Register with the master. Only the first call has an effect."""
         with self._session.lock:
             node = self._session.node
             if self._registered or not self._handles or not node or self._session.is_shutdown():
@@ -273,7 +273,10 @@ class SubscribedTopic(SharedTopic):
         return 0 if 0 in sizes else max(sizes, default=0)
 
     def _look_for_statistics(self) -> None:
-        """Count the received messages if the parameter is set. In a worker, so that no Subscriber waits for the master."""
+        """Count the received messages if the parameter is set.
+
+        Runs in a worker thread, so that no Subscriber waits for the master.
+        """
         try:
             is_on = self._session.master.get_param("/enable_statistics")
         except (MasterUnreachableError, RpcError):
@@ -309,8 +312,8 @@ class SubscribedTopic(SharedTopic):
             self._deliver(frame, link.header, receivers)
             newest = link.latched
             if newest is not None and newest is not frame:
-                # A newer message arrived meanwhile and may have been delivered before the older one: deliver it
-                # again, as the last one.
+                # A newer message arrived meanwhile, and may have been delivered before this older one: deliver the
+                # newer one again, so that it is the last.
                 self._deliver(newest, link.header, receivers)
 
     def _handle_with(self, callback: _Callback) -> Subscriber[Message]:
@@ -350,10 +353,10 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
         else:
             callback.function(message, callback.args)
     except BaseException as error:
-        # As in rospy, sys.exit() has no effect in a link's thread; inside the call of Subscriber() it exits the
-        # program.
+        # As in rospy, sys.exit() has no effect in a link's thread, but exits the program inside the Subscriber()
+        # call.
         if is_callers_thread and not isinstance(error, Exception):
             raise
-        # While a shutdown hook releases resources of the callback, its errors mean nothing.
+        # While a shutdown hook releases resources that the callback uses, the callback's errors mean nothing.
         if not current_session().lifecycle.is_shutdown_requested:
             _log.error("bad callback: %s\n%s", callback.function, traceback.format_exc())

@@ -1,4 +1,4 @@
-"""The time functions of a node: Time, Duration, sleep, Rate and Timer, on wall or simulated time.
+"""A node's time functions: Time, Duration, sleep, Rate and Timer, on wall or simulated time.
 
 Source: http://wiki.ros.org/rospy/Overview/Time.
 """
@@ -36,13 +36,13 @@ _NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
 
 
 class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSInterruptException):
-    """Simulated time jumped back to ``time`` seconds before a sleep's start; as in rospy, this is also a KeyboardInterrupt."""
+    """Simulated time jumped back to ``time`` seconds before the sleep started; as in rospy, this is also a KeyboardInterrupt."""
 
 
 class Duration(times.Duration):
-    """A time span, ``secs`` and ``nsecs``; may be negative."""
+    """A time span with the fields ``secs`` and ``nsecs``; may be negative."""
 
-    # Pickles must be loadable by other ROS 1 programs, and theirs by this one.
+    # Use rospy's module name, so that programs that use real rospy can load pickles from this one, and vice versa.
     __module__ = "rospy.rostime"
 
     __slots__: list[str] = []
@@ -52,7 +52,7 @@ class Duration(times.Duration):
 
 
 class Time(times.Time):
-    """A point in time, ``secs`` and ``nsecs`` since the epoch."""
+    """A point in time with the fields ``secs`` and ``nsecs`` since the epoch."""
 
     __module__ = "rospy.rostime"
 
@@ -68,7 +68,7 @@ class Time(times.Time):
 
     @classmethod
     def from_seconds(cls, float_secs: float) -> Time:
-        """Return the time of ``float_secs`` seconds; the older name of ``from_sec``."""
+        """Return the time at ``float_secs`` seconds. An older name for ``from_sec``."""
         return cls.from_sec(float_secs)
 
 
@@ -89,30 +89,30 @@ def get_time() -> float:
 
 
 def is_wallclock() -> bool:
-    """Return whether the node uses the machine's time, not a simulated one."""
+    """Return whether the node uses the system time, not simulated time."""
     return not isinstance(current_session().clock, SimulatedClock)
 
 
 def sleep(duration: float | times.Duration) -> None:
-    """Sleep for ``duration`` seconds; not at all if that is negative.
+    """Sleep for ``duration`` seconds; return immediately if that is negative.
 
-    If the node shuts down meanwhile, it raises ROSInterruptException, or in a thread that polls is_shutdown() it returns
-    early. Raise ROSTimeMovedBackwardsException if simulated time jumps back to before the sleep's start.
+    If the node shuts down meanwhile, raise ROSInterruptException, or return early in a thread that polls is_shutdown().
+    Raise ROSTimeMovedBackwardsException if simulated time jumps back to before the sleep started.
     """
     nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)
     _sleep(nanoseconds)
 
 
 class Rate:
-    """Keeps a loop at ``hz`` iterations per second: ``sleep()`` subtracts the time that the loop's own work took.
+    """Runs a loop at ``hz`` iterations per second: ``sleep()`` subtracts the time that the loop's own work took.
 
     ``last_time`` is the start of this period, ``sleep_dur`` its length; a program may change either.
     """
 
     def __init__(self, hz: float, reset: bool = False) -> None:
-        """Take ``reset``: whether to start again, instead of raising, if simulated time jumps back.
+        """Start the first period. ``reset``: start again, instead of raising, if simulated time jumps back.
 
-        Raise ZeroDivisionError on a rate of 0, ROSInitException before init_node.
+        Raise ZeroDivisionError if the rate is 0, ROSInitException before init_node.
         """
         self.last_time = get_rostime()
         self.sleep_dur = Duration(0, int(1e9 / hz))
@@ -123,7 +123,7 @@ class Rate:
         return self._remaining(get_rostime())
 
     def sleep(self) -> None:
-        """Sleep until the period is over. Raise as :func:`sleep` does."""
+        """Sleep until the period is over. Raise the same exceptions as :func:`sleep`."""
         self._sleep(None)
 
     def _sleep(self, stop: threading.Event | None) -> None:
@@ -138,12 +138,12 @@ class Rate:
             return
         period = self.sleep_dur.to_nsec()
         started = self.last_time.to_nsec() + period
-        # If far behind, as after a pause, skip the missed periods.
+        # If far behind, for example after a pause, skip the missed periods.
         now = current_session().clock.now()
         self.last_time = _time(now if now - started > 2 * period else started)
 
     def _remaining(self, curr_time: times.Time) -> Duration:
-        """Return the remaining time of this period at a given time; called by programs' subclasses that sleep differently."""
+        """Return the time left in this period at ``curr_time``. Programs' subclasses that sleep differently call this."""
         return Duration(0, self._left(curr_time.to_nsec()))
 
     def _left(self, now: int) -> int:
@@ -154,9 +154,9 @@ class Rate:
 
 
 class TimerEvent:
-    """The argument of a Timer's callback: expected and real times of this call and of the previous one.
+    """The argument for a Timer's callback: expected and real times of this call and the previous one.
 
-    ``last_duration`` is in seconds; the fields of the previous call are None the first time.
+    ``last_duration`` is in seconds; the fields for the previous call are None the first time.
     """
 
     def __init__(
@@ -178,7 +178,7 @@ class Timer(threading.Thread):
     """Calls ``callback(TimerEvent)`` every ``period`` (a Duration), or once with ``oneshot``, in its own thread.
 
     ``reset``: start again if simulated time jumps back; otherwise the timer stops with
-    ROSTimeMovedBackwardsException. An error of the callback stops it, too; so does ``sys.exit()``, which is logged.
+    ROSTimeMovedBackwardsException. An exception in the callback stops the timer too; so does ``sys.exit()``, which is logged.
     """
 
     def __init__(
@@ -199,7 +199,7 @@ class Timer(threading.Thread):
 
     @property
     def _shutdown(self) -> bool:
-        """Return whether the timer was shut down. Programs read and set this attribute of rospy's Timer."""
+        """Return whether the timer was shut down. Programs read and set this attribute on rospy's Timer."""
         return self._ended.is_set()
 
     @_shutdown.setter
@@ -245,12 +245,12 @@ class Timer(threading.Thread):
 
 
 def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
-    """Sleep; a set ``stop`` ends this without an exception. Without ``stop``, a shutdown of the node interrupts it."""
+    """Sleep; return early if ``stop`` is set. Without ``stop``, raise if the node shuts down."""
     if nanoseconds <= 0:
         return
     session = current_session()
     if session.is_fork_without_node and isinstance(session.clock, SimulatedClock):
-        # Only the parent follows /clock: the sleep would never return.
+        # Only the parent process follows /clock, so the sleep would never return.
         raise ROSInitException(session.why_fork_has_no_effect("simulated time"))
     lifecycle = session.lifecycle
     lifecycle.deferral.poll()

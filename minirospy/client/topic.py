@@ -24,7 +24,7 @@ _M_co = TypeVar("_M_co", bound=protocols.Message, covariant=True)
 
 
 class AnyMsg(Message):
-    """A message of any type: its bytes, and the publisher's description in ``_connection_header``."""
+    """A message of any type: its bytes, and the publisher's connection header in ``_connection_header``."""
 
     _md5sum = ANY
     _type = ANY
@@ -78,13 +78,13 @@ class Topic(Generic[_M_co]):
         self.reg_type = reg_type
 
     def get_num_connections(self) -> int:
-        """Return the number of connected nodes: subscribers of a Publisher, publishers of a Subscriber."""
+        """Return the number of connected nodes: a Publisher's subscribers, or a Subscriber's publishers."""
         return self.impl.get_num_connections() if self.impl else 0
 
     def unregister(self) -> None:
-        """Unregister; the topic's connections are closed with its last handle in this process. Idempotent.
+        """Unregister; the topic's last handle in this process also closes the connections. Idempotent.
 
-        As in rospy, the handle then keeps only its ``name``.
+        As in rospy, only ``name`` remains usable.
         """
         with self._session.lock:
             shared, self.impl = self.impl, None
@@ -94,7 +94,7 @@ class Topic(Generic[_M_co]):
 
 
 class SharedTopic:
-    """The object shared by the handles of one topic in this process: rospy's ``impl``, which user code reads."""
+    """The object that the handles of one topic in this process share: rospy's ``impl``, which user code reads."""
 
     _handles: Collection[Topic[Any]]
 
@@ -116,11 +116,11 @@ class SharedTopic:
 
     @property
     def connections(self) -> list[Connection]:
-        """The links to the other nodes, in rospy's form."""
+        """The links to the other nodes, as rospy represents them."""
         raise NotImplementedError
 
     def get_stats_info(self) -> list[tuple[object, ...]]:
-        """Return the rows of the Slave API's getBusInfo."""
+        """Return the topic's rows for the Slave API's getBusInfo."""
         name = self.resolved_name
         return [
             (c.id, c.endpoint_id, c.direction, c.transport_type, name, True, c.get_transport_info())
@@ -145,7 +145,7 @@ class SharedTopic:
 
 
 def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> None:
-    """Wait for a registration; as in rospy, a refusal by the master is only logged."""
+    """Wait for a registration to finish; as in rospy, only log it if the master refuses."""
     try:
         wait()
     except MasterUnreachableError as error:
@@ -156,7 +156,7 @@ def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> N
 
 
 def unregister_from_master(wait: Callable[[], object]) -> None:
-    """Wait for an unregistration; a master that does not answer is notified later, or has lost the registration."""
+    """Wait for an unregistration to finish. A master that does not respond is notified later, or has lost the registration."""
     try:
         wait()
     except (MasterUnreachableError, RpcError) as error:

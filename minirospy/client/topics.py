@@ -1,4 +1,4 @@
-"""The Publisher and Subscriber of rospy, and the list of published topics.
+"""rospy's Publisher and Subscriber, and the list of published topics.
 
 Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 """
@@ -23,7 +23,7 @@ __all__ = [
 
 
 def get_published_topics(namespace: str = "/") -> list[list[str]]:
-    """Return [topic, type] of each published topic at or below ``namespace``. Raise ROSException."""
+    """Return [topic, type] for each published topic at or below ``namespace``. Raise ROSException if the master fails."""
     try:
         return [list(pair) for pair in current_session().master.get_published_topics(namespace or "")]
     except (MasterUnreachableError, RpcError) as error:

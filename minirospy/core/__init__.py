@@ -1,1 +1,1 @@
-"""The pure packages: bytes, specs and tables in, values and actions out; no sockets, event loops or threads."""
+"""The pure packages: bytes, specs and tables as input, values and actions as output; no sockets, event loops or threads."""

@@ -1,6 +1,6 @@
-"""A thread that stops actuators when their commands stop arriving; nothing that blocks the event loop delays it.
+"""A thread that stops actuators when commands for them stop arriving; nothing that blocks the event loop delays it.
 
-A call that holds Python's global interpreter lock (GIL) does delay the thread, so the servers limit the input of one call.
+A call that holds Python's global interpreter lock (GIL) does delay the thread, so the servers limit one call's input.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ __all__ = ["StopGuard"]
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
-"""Stops an actuator; called in the guard's thread. It checks itself whether a command has arrived meanwhile."""
+"""Stops an actuator; called in the guard's thread. It must check for itself whether a command has arrived meanwhile."""
 
 
 class StopGuard:
     """Calls each function when its deadline passes. Its thread runs while there are deadlines; all methods are thread-safe."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """Take ``clock``, which returns seconds."""
+        """Create the guard; ``clock`` returns seconds."""
         self._clock = clock
         self._changed = threading.Condition()
         self._deadlines: dict[Stop, float] = {}
@@ -33,9 +33,9 @@ class StopGuard:
         # The deadline until which the thread waits.
 
     def arm(self, stop: Stop, deadline: float) -> None:
-        """Call ``stop`` at ``deadline``, a time of the clock, which replaces its previous deadline.
+        """Call ``stop`` at ``deadline``, a time on the clock; this replaces its previous deadline.
 
-        Raise BridgeError without a thread.
+        Raise BridgeError if the thread cannot be started.
         """
         with self._changed:
             self._deadlines[stop] = deadline
@@ -66,7 +66,7 @@ class StopGuard:
                     _log.exception("what is driven could not be stopped")
 
     def _wait(self) -> list[Stop]:
-        """Wait until deadlines have passed, and return their functions; [] once there are no deadlines."""
+        """Wait until deadlines have passed, and return their functions; return [] once there are no deadlines."""
         with self._changed:
             while self._deadlines:
                 now = self._clock()

@@ -14,7 +14,7 @@ from minirospy.core.bag.records import ChunkInfo, Connection
 __all__ = ["BagReader", "Block", "Position", "StoredMessage"]
 
 Position = int | tuple[int, int]
-"""A message's location: its chunk's position and its offset in the chunk; in version 1.2 its position in the file."""
+"""A message's location: its chunk's position and its offset in the chunk; in version 1.2, its position in the file."""
 
 
 class StoredMessage(NamedTuple):
@@ -27,10 +27,10 @@ class StoredMessage(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Consecutive messages in the order of time, from one chunk.
+    """Consecutive messages from one chunk, in time order.
 
-    ``found`` contains time, rank (the index of its connection among the requested ones), offset of the record, and start
-    and end of the body in ``data``. ``chunk`` is the chunk's position; None in bags of version 1.2.
+    ``found`` contains for each message its time, rank (the index of its connection among the requested ones), record offset,
+    and start and end of the body in ``data``. ``chunk`` is the chunk's position, or None in bags of version 1.2.
     """
 
     chunk: int | None
@@ -39,7 +39,7 @@ class Block(NamedTuple):
 
 
 class BagReader(ABC):
-    """The common interface of the readers for each version."""
+    """The common interface of the readers for all versions."""
 
     version: int  # 200 means 2.0
     indexed = True  # the bag has an index, or one was rebuilt
@@ -49,11 +49,14 @@ class BagReader(ABC):
 
     @property
     def version_name(self) -> str:
-        """The version as `rosbag info` prints it."""
+        """The version in the format that `rosbag info` prints."""
         return f"{self.version // 100}.{self.version % 100}" + ("" if self.indexed else " (unindexed)")
 
     def prepare(self) -> None:
-        """Find the connections of a bag without an index, as version 1.2 allows. Raise BagFormatError."""
+        """Find the connections in a bag without an index, which version 1.2 allows.
+
+        Raise BagFormatError if the bag is damaged.
+        """
         return
 
     @abstractmethod
@@ -65,9 +68,9 @@ class BagReader(ABC):
     def messages(
         self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
     ) -> Iterator[StoredMessage]:
-        """Yield the messages of these connections (None: all) from ``start`` to ``end`` in nanoseconds, both included.
+        """Yield the messages on these connections (None: all) from ``start`` to ``end`` in nanoseconds, both included.
 
-        They are in the order of time; messages with equal times in the order of the connections. If the bag is damaged, raise
+        They are in time order; messages with equal times are in the order of the connections. If the bag is damaged, raise
         BagFormatError after yielding the messages before the damage.
         """
         self.prepare()
@@ -80,18 +83,24 @@ class BagReader(ABC):
 
     @abstractmethod
     def message_at(self, position: Position) -> StoredMessage:
-        """Return the message at a position taken from an entry or another message. Raise BagFormatError."""
+        """Return the message at a position from an entry or another message. Raise BagFormatError if there is none."""
 
     @abstractmethod
     def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
-        """Return the indexes of these connections, reading those that have not been read yet. Raise BagFormatError."""
+        """Return the indexes of these connections, reading those that have not been read yet.
+
+        Raise BagFormatError if the bag is damaged.
+        """
 
     def times(self, connections: Iterable[int]) -> list[array[int]]:
-        """Return the times of these connections' messages, in arrays that the caller may keep. Raise BagFormatError."""
+        """Return the times of these connections' messages, in arrays that the caller may keep.
+
+        Raise BagFormatError if the bag is damaged.
+        """
         return [array("Q", index.times) for index in self.index(connections)]
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
-        """Return chunk position -> the chunk's header. Raise BagUnindexedError."""
+        """Return chunk position -> the chunk's header. Raise BagUnindexedError if a header is damaged."""
         return {}
 
     def size(self) -> int:

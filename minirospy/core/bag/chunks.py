@@ -1,7 +1,7 @@
-"""The chunks of a bag: their headers, their decompressed data, and the messages in it.
+"""A bag's chunks: their headers, their decompressed data, and the messages in it.
 
 Messages are found by scanning a chunk's data, not by its index records: that costs no more, and a damaged index cannot
-lead to a wrong message. Threads decompress the next chunks in advance, since bz2 and lz4 release the GIL.
+lead to a wrong message. Threads decompress the next chunks in advance, because bz2 and lz4 release the GIL.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ class StoredChunk(NamedTuple):
 
     @property
     def end(self) -> int:
-        """The position after the chunk, where its index records are."""
+        """The position after the chunk, at which its index records start."""
         return self.data_position + self.chunk.compressed_size
 
 
 Found = tuple[int, int, int, int, int]
-"""A message in a chunk's data: time, rank of its connection, offset of its record, start and end of its body.
+"""A message in a chunk's data: time, rank of its connection, record offset, start and end of its body.
 
-Plain tuples, which sort as rosbag orders messages: by time, then by connection, then by offset.
+These are plain tuples, which sort as rosbag orders messages: by time, then by connection, then by offset.
 """
 
 
 class Ranks(Protocol):
-    """A mapping such as a dict: the rank of a connection among the requested ones, or None if it was not requested."""
+    """A mapping, such as a dict, from a connection to its rank among the requested ones; None if it was not requested."""
 
     def get(self, number: int, /) -> int | None:
-        """Return the rank of a connection, or None."""
+        """Return a connection's rank, or None if it was not requested."""
 
 
 class _Ahead:
@@ -60,7 +60,7 @@ class _Ahead:
         )
 
     def result(self) -> bytes:
-        """Return the data. Raise BagFormatError."""
+        """Wait for the thread and return the data. Raise BagFormatError if the data is damaged."""
         return self._future.result()
 
     def cancel(self) -> None:
@@ -70,7 +70,7 @@ class _Ahead:
 
 
 class ChunkStream:
-    """The chunks of a seekable stream, which may grow while it is read."""
+    """The chunks in a seekable stream, which may grow while it is read."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self.stream = stream
@@ -80,7 +80,7 @@ class ChunkStream:
         self._compared: set[int] = set()
 
     def header(self, position: int) -> StoredChunk:
-        """Return the header of the chunk at a position. Raise BagFormatError."""
+        """Return the header of the chunk at a position. Raise BagFormatError if there is no chunk."""
         if position not in self._headers:
             limit = size_of(self.stream)
             if position > limit:
@@ -91,16 +91,19 @@ class ChunkStream:
         return self._headers[position]
 
     def set_header(self, position: int, header: StoredChunk) -> None:
-        """Use this header for the chunk at a position, instead of the one in the file."""
+        """Use this header for the chunk at a position, instead of the header in the file."""
         self._headers[position] = header
 
     def data(self, position: int) -> bytes:
-        """Return the decompressed data of the chunk at a position. Raise BagFormatError, BagCompressionError."""
+        """Return the decompressed data of the chunk at a position.
+
+        Raise BagFormatError if the chunk is damaged, BagCompressionError if its compression is not supported.
+        """
         if ahead := self._ahead.pop(position, None):
             try:
                 return ahead.result()
             finally:
-                # After Ctrl-C the result is no longer needed.
+                # After Ctrl-C the threads' results are no longer needed.
                 ahead.cancel()
         chunk = self.header(position).chunk
         try:
@@ -111,9 +114,9 @@ class ChunkStream:
     def pick(
         self, info: ChunkInfo, ranks: Ranks, known: Mapping[int, Connection]
     ) -> tuple[bytes, list[Found]] | None:
-        """Return the bodies and locations of a few requested messages in a chunk, without reading the rest of it.
+        """Return the bodies and locations of a few requested messages in a chunk, without reading the rest of the chunk.
 
-        ``known``: see :func:`scan`. Return None if scanning is cheaper or an index is damaged: then the chunk must be scanned.
+        ``known``: see :func:`scan`. Return None if scanning is cheaper or an index is damaged: then scan the chunk.
         """
         chunk, data_position = header = self.header(info.position)
         wanted = sum(count for number, count in info.counts.items() if ranks.get(number) is not None)
@@ -129,7 +132,7 @@ class ChunkStream:
             return None
 
     def prepare(self, positions: Iterable[int]) -> None:
-        """Start to decompress the chunks at these positions; cancel others that were started."""
+        """Start to decompress the chunks at these positions; cancel the decompression of others."""
         wanted = [
             position
             for position in positions
@@ -165,7 +168,7 @@ class ChunkStream:
     def _entries(
         self, header: StoredChunk, info: ChunkInfo, ranks: Ranks
     ) -> tuple[list[tuple[int, int, int, int]], list[array[int]]]:
-        """Return offset, time, rank and connection of the requested messages, from a chunk's index records.
+        """Return offset, time, rank and connection for the requested messages, from a chunk's index records.
 
         Also return the offsets of all messages, by connection.
         """
@@ -190,7 +193,7 @@ class ChunkStream:
         all_offsets: list[array[int]],
         known: Mapping[int, Connection],
     ) -> None:
-        """Compare each connection's record, which precedes its first message, with the one in the bag's index.
+        """Compare each connection's record, which precedes its first message, with the record in the bag's index.
 
         This is done once per connection. Raise BagFormatError if they differ, or if the chunk's index is wrong.
         """
@@ -215,7 +218,7 @@ class ChunkStream:
     def _picked(
         self, start: int, size: int, entries: list[tuple[int, int, int, int]]
     ) -> tuple[bytes, list[Found]]:
-        """Return the concatenated bodies of the messages, and their locations there.
+        """Return the concatenated message bodies, and their locations in the result.
 
         Raise BagFormatError if the index is wrong.
         """
@@ -249,23 +252,23 @@ class ChunkStream:
 
 
 THREADS = max(1, min(4, (os.cpu_count() or 1) - 1))
-"""Number of threads that decompress in advance, and of chunks in advance; leaves one core for the reader's thread."""
+"""Number of threads that decompress in advance, and of chunks in advance; one core remains for the reader's thread."""
 
 
-# bytes; larger chunks are not decompressed in advance, since several would be in memory
+# bytes; larger chunks are not decompressed in advance, because several of them would be in memory
 _MAX_AHEAD = 64 * 1024 * 1024
 
-# Chunk bytes per requested message; above this, only these messages are read instead of the whole chunk
+# Chunk bytes per requested message; above this, only the requested messages are read, not the whole chunk
 PICK_SIZE = 32 * 1024
 
 
 def size_of(stream: BinaryIO) -> int:
-    """Return the size of a stream in bytes; its position changes."""
+    """Return a stream's size in bytes. Changes the stream's position."""
     return stream.seek(0, os.SEEK_END)
 
 
 class _Layout(NamedTuple):
-    """The field order of a message's header by one of the writers: 46 bytes with two constant parts."""
+    """The layout of a message's header, whose field order depends on the writer: 46 bytes with two constant parts."""
 
     form: struct.Struct
     first: bytes
@@ -282,10 +285,10 @@ _STAMP_AND_SIZE = struct.Struct("<III")
 
 
 def scan(data: bytes, ranks: Ranks, known: Mapping[int, Connection]) -> list[Found]:
-    """Return the messages in a chunk's data whose connections have ``ranks``, in the order of the data.
+    """Return the messages in a chunk's data on connections that have ``ranks``, in the order in the data.
 
-    ``known`` are all connections in the bag's index: a message of another connection means damage, and so does a connection
-    with another topic or type in the data. Raise BagFormatError.
+    ``known`` are all connections in the bag's index. Raise BagFormatError if a message has another connection, or if a
+    connection in the data has a different topic or type: the bag is then damaged.
     """
     found: list[Found] = []
     connections: dict[int, Connection] = {}
@@ -302,9 +305,9 @@ def scan_into(
     known: Container[int],
     connections: dict[int, Connection] | None = None,
 ) -> int:
-    """Add the messages of a chunk's data to ``found``, and its connections to ``connections``; return the data's size.
+    """Add the messages in a chunk's data to ``found``, and the connections to ``connections``; return the data's size.
 
-    Raise BagFormatError, with the end of the complete records as its position.
+    Raise BagFormatError if a record is damaged; the error's position is the end of the complete records.
     """
     add = found.append
     end, last_head = len(data), len(data) - _HEAD

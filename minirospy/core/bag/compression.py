@@ -1,7 +1,7 @@
-"""Compression of chunks: bytes in, bytes out, by the name in a chunk's header (none, bz2, lz4; in MCAP files zstd).
+"""Chunk compression by the name in a chunk's header (none, bz2, lz4; in MCAP files zstd): bytes in, bytes out.
 
-An LZ4 frame is written as ROS's own reader (roslz4) requires: independent blocks of at most 1 MiB, a checksum of the
-content, neither block checksums nor the content size. Every standard frame can be read. lz4 is imported when a chunk
+An LZ4 frame is written as ROS's own reader (roslz4) requires: independent blocks of at most 1 MiB, a content
+checksum, neither block checksums nor the content size. Every standard frame can be read. lz4 is imported when a chunk
 needs it. Sources: http://wiki.ros.org/Bags/Format/2.0, https://github.com/lz4/lz4/blob/dev/doc/lz4_Frame_format.md.
 """
 
@@ -33,11 +33,11 @@ LZ4 = "lz4"
 COMPRESSIONS = (NONE, BZ2, LZ4)  # in the order in which rosbag lists them
 
 MAX_CHUNK_SIZE = 1088 * 1024 * 1024
-"""Maximum bytes of a compressed chunk's data: a message of 1 GiB, the limit of a connection, and the records before it."""
+"""Maximum bytes in a compressed chunk's data: a 1 GiB message, the limit for a connection, and the records before it."""
 
-_MAX_LZ4 = 256  # maximum ratio of data to its LZ4 block
-_MAX_STREAMS = 20_000  # bz2 streams per chunk; parallel compressors write one for each 100 kB
-_PIECE = 16 * 1024 * 1024  # bytes to decompress at a time, during which Ctrl-C waits
+_MAX_LZ4 = 256  # maximum ratio of the data's size to that of its LZ4 block
+_MAX_STREAMS = 20_000  # bz2 streams per chunk; parallel compressors write one per 100 kB
+_PIECE = 16 * 1024 * 1024  # bytes to decompress at a time; Ctrl-C takes effect only in between
 _INPUT = 256 * 1024  # bytes of compressed data to pass to a library at a time
 
 Buffer = bytes | bytearray | memoryview
@@ -53,14 +53,14 @@ def check_compression(name: str) -> None:
 
 
 def compress(name: str, data: Buffer) -> bytes:
-    """Return a chunk's data compressed with ``name``. Raise BagCompressionError."""
+    """Return a chunk's data compressed with ``name``. Raise BagCompressionError if that is not possible."""
     return _choose(_COMPRESS, name)(data)
 
 
 def decompress(name: str, data: bytes, size: int, is_cancelled: Callable[[], bool] = lambda: False) -> bytes:
     """Return a chunk's data, which must have ``size`` bytes after decompression.
 
-    Never allocates more than ``size`` bytes and one piece. ``is_cancelled`` is polled between pieces, possibly by another
+    Allocates at most ``size`` bytes and one piece. ``is_cancelled`` is polled between pieces, possibly in another
     thread than the caller's. Raise BagFormatError if the data is damaged, has another size or is cancelled,
     BagCompressionError if the compression is unknown or its library is missing.
     """
@@ -68,7 +68,10 @@ def decompress(name: str, data: bytes, size: int, is_cancelled: Callable[[], boo
 
 
 def decompress_mcap(name: str, data: bytes, size: int) -> bytes:
-    """Return the data of a chunk in an MCAP file; ``name`` is zstd, lz4, or "" for none. Raise as :func:`decompress`."""
+    """Return the data of a chunk in an MCAP file; ``name`` is zstd, lz4, or "" for none.
+
+    Raise the same exceptions as :func:`decompress`.
+    """
     if not name:
         return data
     return _decompressed(_choose(_DECOMPRESS_MCAP, name), name, data, size, lambda: False)
@@ -129,10 +132,10 @@ def _compress_lz4(data: Buffer) -> bytes:
 
 
 class _Output:
-    """Collects decompressed data, of which ``size`` bytes are expected. Raise BagFormatError if there are more.
+    """Collects decompressed data; ``size`` bytes are expected. Raise BagFormatError if there are more.
 
-    Large data is decompressed in pieces: a library would need twice the memory to join its own pieces, while Ctrl-C waits
-    for it.
+    Large data is decompressed in pieces: a library would need twice the memory to join its own pieces, and Ctrl-C would not
+    take effect meanwhile.
     """
 
     def __init__(self, size: int, is_cancelled: Callable[[], bool]) -> None:
@@ -144,11 +147,11 @@ class _Output:
 
     @property
     def room(self) -> int:
-        """The bytes to request: one more than expected, so that the stream's end is reached and its checksum verified."""
+        """The number of bytes to request, one more than expected, so that the stream's checksum is reached and verified."""
         return min(self.size - self._length + 1, _PIECE)
 
     def add(self, piece: bytes) -> None:
-        """Add decompressed data. Raise BagFormatError."""
+        """Add decompressed data. Raise BagFormatError if there is more than expected."""
         self._length += len(piece)
         if self._length > self.size:
             raise BagFormatError(f"a chunk has more than {self.size} bytes")
@@ -176,7 +179,8 @@ def _decompress_bz2(data: bytes, output: _Output) -> bytes:
 
     view, streams = memoryview(data), 0
     stream: bz2.BZ2Decompressor | None = None
-    # In parts, since each stream copies the data that follows it: a million times for a million short streams.
+    # Pass the data in parts, because each stream copies the data that follows it: for a million short streams, a
+    # million times.
     for start in range(0, len(data), _INPUT):
         part: Buffer = view[start : start + _INPUT]
         while part:
@@ -201,10 +205,10 @@ def _decompress_bz2(data: bytes, output: _Output) -> bytes:
 
 def _decompress_lz4(data: bytes, output: _Output) -> bytes:
     if output.size > len(data) * _MAX_LZ4:
-        # The library allocates the expected size before it reads the data.
+        # Check this first, because the library allocates the expected size before it reads the data.
         raise BagFormatError(f"a chunk's {output.size} bytes cannot be in {len(data)} bytes of LZ4")
     stream = _lz4_frame().LZ4FrameDecompressor()
-    # In parts, since the library copies the remaining data each time.
+    # Pass the data in parts, because the library copies the remaining data each time.
     for start in range(0, len(data), _INPUT):
         part = data[start : start + _INPUT]
         while part or not (stream.eof or stream.needs_input):

@@ -1,6 +1,6 @@
-"""Serialize the records of bags: named tuples in, bytes out.
+"""Serialize bag records: named tuples in, bytes out.
 
-Fields are written in the order of rosbag's Python writer. Source: http://wiki.ros.org/Bags/Format/2.0.
+Fields are written in the same order as rosbag's Python writer does. Source: http://wiki.ros.org/Bags/Format/2.0.
 """
 
 from __future__ import annotations
@@ -47,17 +47,17 @@ _MESSAGE_HEADER = struct.Struct("<I I3sB I5sI I5sII I")
 
 
 def message_prefix(connection: int) -> bytes:
-    """Return the 34 bytes before a message's time, which are the same for each message of a connection.
+    """Return the 34 bytes before a message's time, which are the same for each message on a connection.
 
-    After the prefix come seconds, nanoseconds and the size of the body, 32 bits each, then the body.
+    The prefix is followed by seconds, nanoseconds and the body's size, 32 bits each, then the body.
     """
     return b"\x26\0\0\0\x04\0\0\0op=\x02\x09\0\0\0conn=" + _UINT32.pack(connection) + b"\x0d\0\0\0time="
 
 
 def message_prefixes(connection: int) -> tuple[bytes, bytes]:
-    """Return :func:`message_prefix` as Python's rosbag writes it, and as C++'s does, which sorts the fields.
+    """Return :func:`message_prefix` as rosbag writes it in Python, and as it does in C++, with sorted fields.
 
-    A reader recognizes nearly every message by one comparison with these; :func:`parse_record` parses the others.
+    A reader recognizes nearly every message by comparing it with these two; :func:`parse_record` parses the others.
     """
     number = _UINT32.pack(connection)
     return (
@@ -67,7 +67,7 @@ def message_prefixes(connection: int) -> tuple[bytes, bytes]:
 
 
 def encode_fields(fields: Mapping[str, bytes]) -> bytes:
-    """Return a header with its length prefix, its fields in the order of the mapping."""
+    """Return a header with its length prefix; the fields are in the order of the mapping."""
     parts = [b""]
     for name, value in fields.items():
         field = name.encode() + b"=" + value
@@ -91,7 +91,7 @@ def encode_bag_header(header: BagHeader) -> bytes:
 
 
 def encode_chunk_header(chunk: Chunk) -> bytes:
-    """Return the header of a chunk and the length of its data, which follows. Raise BagFormatError above 4 GiB."""
+    """Return a chunk's header and the length of its data, which follows. Raise BagFormatError if that is above 4 GiB."""
     if max(chunk.size, chunk.compressed_size) > MAX_UINT32:
         raise BagFormatError(f"a chunk of {chunk.size} bytes is larger than the format allows, 4 GiB")
     fields = {
@@ -103,7 +103,7 @@ def encode_chunk_header(chunk: Chunk) -> bytes:
 
 
 def encode_connection(connection: Connection) -> bytes:
-    """Return the record of a connection."""
+    """Return a connection's record."""
     fields = {
         "op": bytes((OP_CONNECTION,)),
         "topic": connection.topic.encode(),
@@ -113,7 +113,7 @@ def encode_connection(connection: Connection) -> bytes:
 
 
 def encode_message_header(connection: int, time: int, size: int) -> bytes:
-    """Return a message's header and the length of its body, which follows. Raise BagFormatError above the limits."""
+    """Return a message's header and the length of its body, which follows. Raise BagFormatError if a limit is exceeded."""
     if size > MAX_UINT32:
         raise BagFormatError(f"a message of {size} bytes is larger than the format allows, 4 GiB")
     if not 0 <= time <= _MAX_TIME:
@@ -125,7 +125,7 @@ def encode_message_header(connection: int, time: int, size: int) -> bytes:
 
 
 def encode_index_data(connection: int, entries: Sequence[tuple[int, int]]) -> bytes:
-    """Return the index record of one connection in the preceding chunk: pairs of time and offset, in the order of time."""
+    """Return the index record for one connection in the preceding chunk: pairs of time and offset, in time order."""
     fields = {
         "op": bytes((OP_INDEX_DATA,)),
         "conn": _UINT32.pack(connection),
@@ -137,7 +137,7 @@ def encode_index_data(connection: int, entries: Sequence[tuple[int, int]]) -> by
 
 
 def encode_chunk_info(info: ChunkInfo) -> bytes:
-    """Return the summary of a chunk."""
+    """Return a chunk's info record."""
     fields = {
         "op": bytes((OP_CHUNK_INFO,)),
         "ver": _UINT32.pack(1),

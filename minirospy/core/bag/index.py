@@ -1,6 +1,6 @@
-"""The index of a bag: the times and locations of each connection's messages, 16 bytes per message.
+"""A bag's index: the times and locations of each connection's messages, 16 bytes per message.
 
-It is read on demand from the index records after the chunks; reading messages in the order of time does not need it.
+It is read on demand from the index records after the chunks; reading messages in time order does not need it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Entry(NamedTuple):
 
 
 class ConnectionIndex:
-    """The entries of one connection, in the order of time."""
+    """The entries of one connection, in time order."""
 
     __slots__ = ("_chunks", "_offsets", "_places", "times")
 
@@ -57,7 +57,7 @@ class ConnectionIndex:
         return map(self.__getitem__, reversed(range(len(self.times))))
 
     def extend(self, times: Iterable[int], offsets: Iterable[int], chunk: int | None = None) -> None:
-        """Append the entries of a chunk, or of a bag without chunks."""
+        """Append the entries for a chunk, or for a bag without chunks."""
         times = list(times)
         count = len(times)
         if not count:
@@ -103,9 +103,10 @@ class ConnectionIndex:
 
 
 def read_entries(stream: BinaryIO, record: Record) -> tuple[array[int], array[int]]:
-    """Read the data of an index record of version 2.0: times, offsets; the stream is left after the record.
+    """Read the data of an index record in version 2.0: times and offsets. The stream is then after the record.
 
-    The data's size is computed from the number of entries, since ROS C Turtle wrote a wrong length. Raise BagFormatError.
+    The data's size is computed from the number of entries, because ROS C Turtle wrote a wrong length. Raise BagFormatError
+    if the record is damaged.
     """
     record.expect(records.OP_INDEX_DATA)
     if (version := record.uint32("ver")) != 1:
@@ -126,7 +127,7 @@ def read_entries(stream: BinaryIO, record: Record) -> tuple[array[int], array[in
 
 
 def merge_entries(indexes: Iterable[Iterable[Entry]], *, backwards: bool = False) -> Iterator[Entry]:
-    """Yield the entries of several connections in the order of time; entries with equal times in the order of ``indexes``."""
+    """Yield the entries of several connections in time order; entries with equal times are in the order of ``indexes``."""
     return merge(*indexes, key=_time, reverse=backwards)
 
 

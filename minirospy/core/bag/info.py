@@ -1,6 +1,6 @@
-"""The summary of a bag, as `rosbag info` prints it: a reader in, a summary out, as text or YAML.
+"""A bag's summary, as `rosbag info` prints it: a reader in, a summary out, as text or YAML.
 
-Source: http://wiki.ros.org/rosbag/Commandline#info. The texts are those of ROS, which programs parse.
+Source: http://wiki.ros.org/rosbag/Commandline#info. The wording is ROS's own, because programs parse it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 _NUMPY_PAYS = 100_000
-"""Number of times above which numpy computes the median faster than Python, including numpy's import."""
+"""Number of times above which numpy computes the median faster than Python, including the import of numpy."""
 
 _BLOCK = 1 << 16  # number of times that numpy processes together
 
@@ -47,7 +47,7 @@ class Topic(NamedTuple):
 
 
 class Stored(NamedTuple):
-    """The number of a bag's chunks with one compression, and their bytes before and after it."""
+    """The number of chunks in a bag with one compression, and their bytes before and after compression."""
 
     compression: str
     chunks: int
@@ -56,7 +56,7 @@ class Stored(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """The summary of a bag. ``start`` and ``end`` in seconds are None if it has no messages."""
+    """A bag's summary. ``start`` and ``end``, in seconds, are None if the bag has no messages."""
 
     path: str | None
     version: str
@@ -70,7 +70,10 @@ class Summary(NamedTuple):
 
 
 def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summary:
-    """Return a bag's summary; with ``frequencies``, read the whole index for the topics' rates. Raise BagFormatError."""
+    """Return a bag's summary; with ``frequencies``, read the whole index for the topics' rates.
+
+    Raise BagFormatError if the bag is damaged.
+    """
     version = reader.version_name
     connections = list(reader.connections.values())
     counts: Counter[int] = Counter()
@@ -90,7 +93,7 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
         end = seconds(max(index.times[-1] for index in indexes if index))
 
     if frequencies:
-        # ROS's Python writer also stores connections without messages; its reader omits them.
+        # Omit connections without messages, as ROS's reader does; ROS's Python writer stores them too.
         connections = [each for each in connections if counts[each.id]]
     types: dict[str, str] = {}
     by_topic: dict[str, list[Connection]] = {}
@@ -137,7 +140,7 @@ def compression_of(reader: BagReader) -> list[Stored]:
 
 
 def seconds(nanoseconds: int) -> float:
-    """Return a time in seconds, rounded like genpy's to_sec."""
+    """Return a time in seconds, rounded as genpy's to_sec does."""
     whole, rest = divmod(nanoseconds, 10**9)
     return whole + rest / 1e9
 
@@ -206,9 +209,9 @@ def as_yaml(summary: Summary) -> str:
 
 
 def value_of(text: str, key: str) -> str:
-    """Return the value of a key in the output of :func:`as_yaml`, such as ``start`` or ``topics[0].type``, as -k prints it.
+    """Return a key's value from the output of :func:`as_yaml` as -k prints it; keys are such as ``start`` or ``topics[0].type``.
 
-    Raise LookupError if it does not exist.
+    Raise LookupError if the key does not exist.
     """
     if not re.fullmatch(r"[A-Za-z_]\w*(\[-?\d+\])*(\.[A-Za-z_]\w*(\[-?\d+\])*)*", key):
         raise LookupError(key)
@@ -234,7 +237,7 @@ def _printed(value: object) -> str:
 
 
 def _frequency(times: list[array[int]]) -> float | None:
-    """Return the rate of a topic's messages in Hz: the inverse of the median of their periods, if that is positive."""
+    """Return a topic's message rate in Hz: the inverse of the median period, or None if that is not positive."""
     count = sum(map(len, times))
     if count < 2:
         return None
@@ -250,7 +253,7 @@ def _median(times: list[array[int]]) -> float:
 
 
 def _median_by_numpy(times: list[array[int]]) -> float:
-    """Return the median of the periods, computed with numpy in the memory of ``times``, which is overwritten."""
+    """Return the median period, computed with numpy in the memory of ``times``, which is overwritten."""
     import numpy as np
 
     joined = np.frombuffer(times[0], np.uint64)
@@ -316,7 +319,7 @@ def _topic_lines(topics: Sequence[Topic], widest_type: int) -> Iterable[str]:
 
 
 def _listed(name: str, lines: Iterable[str]) -> list[tuple[str, str]]:
-    """Return rows of which only the first one has the name."""
+    """Return rows; only the first one contains the name."""
     return [("" if number else name, line) for number, line in enumerate(lines)]
 
 
@@ -347,7 +350,7 @@ def _local_time(stamp: float) -> str:
     try:
         return time.strftime("%b %d %Y %H:%M:%S", time.localtime(stamp)) + fraction
     except (OSError, OverflowError, ValueError):
-        # The time is out of the system calendar's range, as in a damaged bag.
+        # The time is outside of the system calendar's range, for example in a damaged bag.
         return f"{stamp:.2f}"
 
 

@@ -1,6 +1,6 @@
-"""Read an MCAP file with messages of ROS 1: connections and messages in the order of time.
+"""Read an MCAP file with ROS 1 messages: connections, and messages in time order.
 
-Opening reads the summary at the file's end. Needs the extra ``minirospy[mcap]``. Source: https://mcap.dev/spec.
+Opening reads the summary at the end of the file. Needs the extra ``minirospy[mcap]``. Source: https://mcap.dev/spec.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ if TYPE_CHECKING:
 __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 _END_OF_TIME = 1 << 64
-_MAX_NAME = 32  # bytes of a compression's name
+_MAX_NAME = 32  # maximum bytes in the name of a compression
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequence, log time and publish time
 _CHUNK_HEAD = struct.Struct("<BQQQQII")
-"""The head of a chunk record: record head; first and last time, uncompressed size, CRC, length of the compression's name."""
+"""The start of a chunk record: record prefix; first and last time, uncompressed size, CRC, length of the compression's name."""
 _LENGTH = struct.Struct("<Q")
-# a footer with its record head: the positions of the summary and of its offsets, the CRC
+# A footer including the record prefix: the positions of the summary and of its offsets, and the CRC
 _FOOTER = struct.Struct("<BQQQI")
 
 
 def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
-    """Return a reader of the bag or MCAP file that starts at the stream's position. Raise the exceptions of either reader."""
+    """Return a reader for the bag or MCAP file that starts at the stream's position. Raise the same exceptions as the reader."""
     start = stream.tell()
     magic = stream.read(len(MAGIC))
     stream.seek(start)
@@ -48,7 +48,7 @@ def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
 
 
 class McapReader(BagReader):
-    """An MCAP file of profile ``ros1``; its channels are the connections.
+    """An MCAP file with the profile ``ros1``; its channels are the connections.
 
     Channels with other encodings are not read; ``foreign`` contains their topics. Raise BagFormatError if the file is
     damaged, McapUnindexedError if its summary is missing or damaged, BagError if the extra is missing.
@@ -92,7 +92,7 @@ class McapReader(BagReader):
 
     @property
     def version_name(self) -> str:
-        """The name of the format, in place of a bag's version."""
+        """The name of the format, instead of a bag version."""
         return "MCAP 0"
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
@@ -102,15 +102,14 @@ class McapReader(BagReader):
     def messages(
         self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
     ) -> Iterator[StoredMessage]:
-        """See :meth:`BagReader.messages`. Raise BagFormatError for damage, after the messages before it."""
+        """See :meth:`BagReader.messages`. If the file is damaged, raise BagFormatError after the messages before the damage."""
         chosen = self.connections if connections is None else connections
         wanted = {number: self.connections[number] for number in chosen}
         first = 0 if start is None else start
         last = _END_OF_TIME if end is None else end
         selection = _Selection(self._summary.channels.keys(), wanted.keys(), first, last)
-        # A chunk is read when its first message may be the next one; its data is in memory once, and so are those of others
-        # only as far as they overlap with it in time.
-        # No two have one position.
+        # Read a chunk when its first message may be the next one, so that each chunk's data is loaded once, and
+        # several chunks are in memory only if they overlap in time. Positions are unique, so runs are never compared.
         heap = [(run.start, run.position, -1, run) for run in self._runs(wanted.keys(), first, last)]
         heapify(heap)
         while heap:
@@ -126,7 +125,7 @@ class McapReader(BagReader):
                 heappop(heap)
 
     def _runs(self, wanted: Collection[int], first: int, last: int) -> list[_Run]:
-        """Return the runs to read for these channels and times. Raise BagFormatError."""
+        """Return the runs to read for these channels and times. Raise BagFormatError if the file is damaged."""
         indexes = self._summary.chunk_indexes
         if not indexes:
             return self._unindexed_runs()
@@ -135,12 +134,15 @@ class McapReader(BagReader):
             for index in indexes
             if index.message_end_time >= first
             and index.message_start_time <= last
-            # Without message indexes, a chunk may contain any channel.
+            # A chunk without message indexes may contain any channel.
             and not (index.message_index_offsets and index.message_index_offsets.keys().isdisjoint(wanted))
         ]
 
     def _unindexed_runs(self) -> list[_Run]:
-        """Return the chunks, or the messages outside of chunks, of a file without chunk indexes. Raise BagFormatError."""
+        """Return the chunks, or the messages outside of chunks, in a file without chunk indexes.
+
+        Raise BagFormatError if the file is damaged.
+        """
         from mcap.opcode import Opcode
 
         runs: list[_Run] = []
@@ -173,11 +175,11 @@ class McapReader(BagReader):
             yield Block(0, message.body, [(message.time, rank, 0, 0, len(message.body))])
 
     def message_at(self, position: Position) -> StoredMessage:
-        """Raise BagFormatError: messages can only be read in order."""
+        """Raise BagFormatError, because messages can only be read in order."""
         raise BagFormatError("messages of MCAP files are read in order only")
 
     def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
-        """See :meth:`BagReader.index`; reads the whole file."""
+        """See :meth:`BagReader.index`. Reads the whole file."""
         indexes = {number: ConnectionIndex() for number in connections}
         for message in self.messages(list(indexes)):
             indexes[message.connection.id].extend([message.time], [0], 0)
@@ -185,7 +187,7 @@ class McapReader(BagReader):
 
 
 class _ChunkHeader(NamedTuple):
-    """The fields before a chunk's data, and the position of the data."""
+    """The fields before a chunk's data, and the data's position."""
 
     start: int
     compression: str
@@ -195,10 +197,10 @@ class _ChunkHeader(NamedTuple):
 
 
 class _Selection(NamedTuple):
-    """The messages that are asked for."""
+    """The messages that a caller requests."""
 
     known: Collection[int]
-    """The channels in the summary; one of another channel is damage."""
+    """The channels in the summary; a message on another channel means that the file is damaged."""
     wanted: Collection[int]
     first: int
     last: int
@@ -206,7 +208,7 @@ class _Selection(NamedTuple):
 
 
 class _Run:
-    """The messages of a chunk, in the order of time: time, index in the chunk, channel, start and end of the body."""
+    """The messages in a chunk, in time order: time, index in the chunk, channel, start and end of the body."""
 
     def __init__(self, position: int, start: int) -> None:
         self.position = position
@@ -215,7 +217,7 @@ class _Run:
         self._data = b""
 
     def load(self, stream: BinaryIO, limit: int, selection: _Selection) -> None:
-        """Read the chunk, and find the messages of these channels and times. Raise BagFormatError."""
+        """Read the chunk, and find the selected messages. Raise BagFormatError if the chunk is damaged."""
         from mcap.opcode import Opcode
 
         with mcap_faults():
@@ -238,7 +240,7 @@ class _Run:
         self.messages.sort()
 
     def body(self, stream: BinaryIO, start: int, end: int) -> bytes:
-        """Return the bytes of a message."""
+        """Return a message's bytes."""
         return self._data[start:end]
 
     def _add(self, data: bytes, start: int, end: int, place: int, selection: _Selection) -> None:
@@ -281,7 +283,7 @@ class _Loose(_Run):
 
 
 class _Bounded:
-    """A stream for the library, which may request any length: returns available data without allocating the full length."""
+    """A stream for the library, which may request any length: returns the available data without allocating that length."""
 
     def __init__(self, data: bytes) -> None:
         self._stream = BytesIO(data)
@@ -292,7 +294,10 @@ class _Bounded:
 
 
 def _read_summary(stream: BinaryIO, size: int) -> Summary | None:
-    """Return the summary at the file's end; None if there is none. Raise BagFormatError, and the library's exceptions."""
+    """Return the summary at the end of the file, or None if there is none.
+
+    Raise BagFormatError, or one of the library's exceptions, if it is damaged.
+    """
     from mcap import records
     from mcap.opcode import Opcode
     from mcap.stream_reader import StreamReader
@@ -311,7 +316,7 @@ def _read_summary(stream: BinaryIO, size: int) -> Summary | None:
     stream.seek(start)
     found = Summary()
     summary = _Bounded(stream.read(size - start))
-    # A summary contains no chunks; do not decompress any.
+    # A summary contains no chunks, so do not decompress any.
     for record in StreamReader(summary, skip_magic=True, emit_chunks=True).records:  # type: ignore[arg-type]
         match record:
             case records.Statistics():
@@ -326,7 +331,7 @@ def _read_summary(stream: BinaryIO, size: int) -> Summary | None:
 
 
 def _read_chunk_header(stream: BinaryIO, position: int, limit: int) -> _ChunkHeader:
-    """Return the header of the chunk at a position. Raise BagFormatError."""
+    """Return the header of the chunk at a position. Raise BagFormatError if there is no valid chunk."""
     from mcap.opcode import Opcode
 
     at = position + _CHUNK_HEAD.size
@@ -354,7 +359,7 @@ def _connection(channel: Channel, schema: Schema) -> Connection:
 
 
 def _chunk_infos(summary: Summary) -> list[ChunkInfo]:
-    """Return the chunks; each one has the counts of the whole file, since the summary has none per chunk."""
+    """Return the chunks; each has the counts for the whole file, because the summary has none per chunk."""
     assert summary.statistics is not None
     counts = dict(summary.statistics.channel_message_counts)
     infos = []

@@ -1,6 +1,6 @@
 """Repair an MCAP file whose end is missing or damaged: rebuild its summary from its chunks.
 
-Every complete chunk is recovered; a chunk with damaged data is left out of the index. Source: https://mcap.dev/spec.
+Every complete chunk is recovered; a chunk with damaged data is omitted from the index. Source: https://mcap.dev/spec.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _Entries = dict[int, list[tuple[int, int]]]  # channel -> times and offsets of a
 
 @contextlib.contextmanager
 def mcap_faults() -> Iterator[None]:
-    """Convert the library's exceptions on damaged files into BagFormatError."""
+    """Convert the exceptions that the library raises on damaged files into BagFormatError."""
     from mcap.exceptions import McapError
     from zstandard import ZstdError
 
@@ -50,13 +50,16 @@ def mcap_faults() -> Iterator[None]:
     except (McapError, ZstdError, struct.error, LookupError, StopIteration, UnicodeDecodeError) as error:
         raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
     except (EOFError, OSError, ValueError, RuntimeError, ArithmeticError, MemoryError, TypeError) as error:
-        # From the decompressors, from lengths that exceed the memory, and from seeking before the start of a short
-        # file.
+        # These are raised by decompressors, for lengths that exceed the memory, and for a seek before the start of a
+        # short file.
         raise BagFormatError(f"not a whole MCAP file: {error}") from error
 
 
 def chunk_data(name: str, data: bytes, size: int) -> bytes:
-    """Return a chunk's data, decompressed. Raise BagFormatError, BagCompressionError."""
+    """Return a chunk's data, decompressed.
+
+    Raise BagFormatError if the data is damaged, BagCompressionError if the compression is not supported.
+    """
     try:
         return compression.decompress_mcap(name, data, size)
     except BagFormatError as error:
@@ -64,7 +67,7 @@ def chunk_data(name: str, data: bytes, size: int) -> bytes:
 
 
 class _Recovered(NamedTuple):
-    """A chunk, the messages of each of its channels, and its end including its message indexes."""
+    """A chunk, the messages on each of its channels, and its end including its message indexes."""
 
     info: ChunkIndex
     counts: Counter[int]
@@ -72,10 +75,10 @@ class _Recovered(NamedTuple):
 
 
 class McapRepair:
-    """Rebuilds the summary of an MCAP file, in place. The library must be installed.
+    """Rebuilds an MCAP file's summary, in place. The library must be installed.
 
-    ``limit``: bytes of the stream that are known to be written, if not all are. After :meth:`run`, ``problems`` are lines
-    about data that could not be recovered.
+    ``limit``: bytes in the stream that are known to be written, if not all are. After :meth:`run`, ``problems`` contains
+    lines about data that could not be recovered.
     """
 
     def __init__(self, stream: BinaryIO, limit: int | None = None) -> None:
@@ -89,10 +92,10 @@ class McapRepair:
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
         self._has_loose = False
-        self._entries: _Entries = {}  # entries of the last chunk, until its message indexes have been read
+        self._entries: _Entries = {}  # entries for the last chunk, until its message indexes have been read
 
     def run(self) -> Iterator[int]:
-        """Read the records; yield the position of each. Raise BagFormatError if even the header is incomplete."""
+        """Read the records; yield the position of each. Raise BagFormatError if not even the header is complete."""
         from mcap.opcode import Opcode
 
         self._stream.seek(0)
@@ -118,7 +121,11 @@ class McapRepair:
             raise BagFormatError("the header of the MCAP file is not whole")
 
     def apply(self) -> int:
-        """Write the summary after the last chunk that leaves disk space for it; return the message count. Raise OSError."""
+        """Write the summary after the chunks and return the message count.
+
+        On a full disk, remove chunks from the end until the summary fits. Raise OSError if it does not fit without chunks
+        either.
+        """
         tail = self._message_indexes() if self._entries else b""
         while True:
             self._stream.seek(self._end)
@@ -134,7 +141,7 @@ class McapRepair:
             return sum(chunk.counts.total() for chunk in self._chunks)
 
     def _content(self, position: int) -> tuple[int, bytes] | None:
-        """Return opcode and content of the record at a position; None if it is incomplete."""
+        """Return the opcode and content of the record at a position, or None if it is incomplete."""
         if position + _HEAD.size > self._limit:
             return None
         self._stream.seek(position)
@@ -155,7 +162,7 @@ class McapRepair:
             self._add_message_index(records.MessageIndex.read(stream), position, length)
             return
         if self._entries:
-            # The message indexes of the last chunk are incomplete: discard them, since a chunk has all or none.
+            # The last chunk's message indexes are incomplete: discard them, because a chunk must have all or none.
             self._chunks[-1].info.message_index_offsets.clear()
             self._chunks[-1].info.message_index_length = 0
             self._entries = {}
@@ -247,7 +254,7 @@ class McapRepair:
             self._entries = {}
 
     def _message_indexes(self) -> bytes:
-        """Return the message indexes of a last chunk whose own are incomplete, and add them to its chunk index."""
+        """Return message indexes for a last chunk whose own are incomplete, and add them to its chunk index."""
         from mcap.data_stream import RecordBuilder
         from mcap.records import MessageIndex
 
@@ -261,7 +268,7 @@ class McapRepair:
         return bytes(builder.end())  # type: ignore[no-untyped-call]
 
     def _write(self, tail: bytes) -> None:
-        """Write the file's end at the stream's position: ``tail``, the summary, and the footer."""
+        """Write the end of the file at the stream's position: ``tail``, the summary, and the footer."""
         from mcap.data_stream import RecordBuilder
         from mcap.opcode import Opcode
         from mcap.records import DataEnd, Footer, SummaryOffset

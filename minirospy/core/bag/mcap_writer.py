@@ -1,7 +1,7 @@
-"""Write an MCAP file from messages with their times, in the layout of the MCAP tools' bag conversion: profile ``ros1``.
+"""Write an MCAP file from messages with their times, with the layout and profile (``ros1``) of the MCAP tools' bag conversion.
 
-A connection becomes a channel. The connection header's fields except the type and the definition (md5sum, callerid,
-latching, ...) become the channel's metadata, the definition a schema of encoding ``ros1msg``. Needs the extra
+A connection becomes a channel. The definition becomes a schema with the encoding ``ros1msg``; the connection header's
+other fields except the type (md5sum, callerid, latching, ...) become the channel's metadata. Needs the extra
 ``minirospy[mcap]``. Sources: https://mcap.dev/spec, https://mcap.dev/spec/registry.
 """
 
@@ -27,19 +27,19 @@ __all__ = [
 ]
 
 CHUNK_SIZE = 4 * 1024 * 1024
-"""Bytes per chunk before compression, like the MCAP tools; the summary that `rosbag info` reads has a record per chunk."""
+"""Bytes per chunk before compression, as in the MCAP tools; the summary that `rosbag info` reads has one record per chunk."""
 
 # Name of a chunk compression -> the library's name
 COMPRESSIONS = {"none": "NONE", "lz4": "LZ4", "zstd": "ZSTD"}
 
 SCHEMA_FIELDS = ("type", "message_definition")
-"""The fields of a connection header that form the channel's schema; the others are its metadata."""
+"""The connection header's fields that form the channel's schema; the others are its metadata."""
 
 _NEEDED = (*SCHEMA_FIELDS, "md5sum")
 
 
 def check_mcap() -> None:
-    """Raise BagError, which names the extra to install, unless the library for MCAP files is available."""
+    """Raise BagError, which names the extra to install, if the library for MCAP files is missing."""
     try:
         import mcap.records  # noqa: F401 - the rest is imported where it is needed
         import zstandard  # noqa: F401
@@ -50,15 +50,15 @@ def check_mcap() -> None:
 
 
 def check_mcap_compression(name: str) -> None:
-    """Raise BagCompressionError unless chunks of MCAP files can be compressed with ``name``."""
+    """Raise BagCompressionError unless chunks in MCAP files can be compressed with ``name``."""
     if name not in COMPRESSIONS:
         raise BagCompressionError(name, f"MCAP files have one of: {', '.join(COMPRESSIONS)}")
 
 
 class McapWriter:
-    """Writes an MCAP file into a binary stream, which it does not close; like :class:`minirospy.core.bag.writer.BagWriter`.
+    """Writes an MCAP file to a binary stream, which it does not close; like :class:`minirospy.core.bag.writer.BagWriter`.
 
-    ``compression``: none, lz4 or zstd. Raise BagCompressionError for another, BagError if the extra is missing.
+    ``compression``: none, lz4 or zstd. Raise BagCompressionError if it is another, BagError if the extra is missing.
     """
 
     def __init__(self, stream: BinaryIO, *, compression: str = "none", chunk_size: int = CHUNK_SIZE) -> None:
@@ -81,12 +81,12 @@ class McapWriter:
 
     @property
     def size(self) -> int:
-        """The bytes of the file so far, except those still to be compressed."""
+        """The file's size so far in bytes, without data that is not compressed yet."""
         return self._stream.tell() + (self._gathered if self._is_plain else 0)
 
     @property
     def gathered(self) -> int:
-        """The bytes in memory that are not written to the stream yet."""
+        """The number of bytes in memory that are not written to the stream yet."""
         return self._gathered
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
@@ -104,25 +104,28 @@ class McapWriter:
         return self._writer.register_channel(topic, "ros1", self._schemas[key], fields)
 
     def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
-        """Write a message received at ``time``, in nanoseconds. Raise BagFormatError, OSError."""
+        """Write a message received at ``time``, in nanoseconds.
+
+        Raise BagFormatError if the message exceeds a limit, OSError if the stream fails.
+        """
         if time < 0:
             raise BagFormatError(f"the time {time} ns is before 1970")
         whole = b"".join((body, tail)) if tail else body
 
-        # Counted over all connections, like the MCAP tools' converter.
+        # Count over all connections, as the MCAP tools' converter does.
         sequence = self._count % 2**32
         self._gathered += len(whole)
         self._count += 1
-        # The library copies a memoryview into the chunk.
+        # A memoryview is allowed, because the library copies it into the chunk.
         self._writer.add_message(connection, time, whole, time, sequence)  # type: ignore[arg-type]
         if self._gathered > self._chunk_size:
             self._gathered = 0
 
     def write_ready(self) -> None:
-        """Do nothing: complete chunks are compressed and written immediately."""
+        """Do nothing, because complete chunks are compressed and written immediately."""
 
     def close(self) -> None:
-        """Complete the file: write its summary. Idempotent. Raise OSError."""
+        """Complete the file by writing its summary. Idempotent. Raise OSError if the stream fails."""
         if not self._closed:
             self._closed = True
             self._writer.finish()  # type: ignore[no-untyped-call]
@@ -131,7 +134,7 @@ class McapWriter:
     def salvage(self, written: int | None = None) -> int:
         """Complete a file after its stream has failed; return the number of lost messages.
 
-        The chunks written before are read back and kept. Like :meth:`minirospy.core.bag.writer.BagWriter.salvage`. Raise
+        The chunks already written are read back and kept, as in :meth:`minirospy.core.bag.writer.BagWriter.salvage`. Raise
         BagFormatError or OSError if even an empty file does not fit.
         """
         from minirospy.core.bag.mcap_repair import McapRepair

@@ -1,4 +1,4 @@
-"""Read bags: a seekable binary stream in, connections and messages in the order of time out.
+"""Read bags: a seekable binary stream in, connections and messages in time order out.
 
 Opening a bag of version 2.0 reads its first record, and its connections and chunk infos at the end. Messages are read chunk
 by chunk; where chunks overlap in time they are merged. Memory: the chunk infos, and a few chunks.
@@ -25,17 +25,17 @@ from minirospy.core.bag.records import ChunkInfo, Connection
 
 __all__ = ["ChunkedReader", "open_bag"]
 
-# Bytes of overlapping chunks that are kept decompressed; beyond that, some are read again
+# Maximum bytes of overlapping chunks that stay decompressed in memory; beyond that, some chunks are read again
 _CACHE_SIZE = 64 * 1024 * 1024
 
 _END_OF_TIME = 1 << 64
 
 
 def open_bag(stream: BinaryIO) -> BagReader:
-    """Return a reader of the bag that starts at the stream's position.
+    """Return a reader for the bag that starts at the stream's position.
 
-    Raise BagFormatError if it is not a bag, BagVersionError for an unsupported version, BagUnindexedError for
-    a bag that was not closed or whose index is damaged, BagEncryptedError.
+    Raise BagFormatError if it is not a bag, BagVersionError if its version is not supported, BagUnindexedError if
+    it was not closed or its index is damaged, BagEncryptedError if it is encrypted.
     """
     version = records.read_version(stream)
     if version // 100 == 2:
@@ -48,7 +48,7 @@ def open_bag(stream: BinaryIO) -> BagReader:
 
 
 class ChunkedReader(BagReader):
-    """A bag of version 2.0. ``connections`` and ``chunks`` may grow: a bag can be read while it is written.
+    """A bag of version 2.0. ``connections`` and ``chunks`` may grow, because a bag can be read while it is written.
 
     ``headers``: chunk position -> header, for chunks whose header in the file is incomplete.
     """
@@ -147,14 +147,17 @@ class ChunkedReader(BagReader):
         return [self._indexes[number] for number in wanted]
 
     def times(self, connections: Iterable[int]) -> list[array[int]]:
-        """See :meth:`BagReader.times`. The times are not cached."""
+        """See :meth:`BagReader.times`. Does not cache the times."""
         found = {number: array("Q") for number in connections}
         for number, _, times, _ in self._index_records(set(found)):
             found[number].extend(times)
         return list(found.values())
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
-        """See :meth:`BagReader.chunk_headers`. Raise BagUnindexedError if one is damaged, since the index is then wrong."""
+        """See :meth:`BagReader.chunk_headers`.
+
+        Raise BagUnindexedError if a header is damaged, because the index is then wrong.
+        """
         try:
             return {chunk.position: self._chunks.header(chunk.position) for chunk in self.chunks}
         except BagFormatError as error:
@@ -171,7 +174,10 @@ class ChunkedReader(BagReader):
         return indexes
 
     def _index_records(self, wanted: set[int]) -> Iterator[tuple[int, int, array[int], array[int]]]:
-        """Yield connection, chunk, times and offsets of the index records after the chunks. Raise BagUnindexedError."""
+        """Yield connection, chunk, times and offsets for each index record after the chunks.
+
+        Raise BagUnindexedError if one is damaged.
+        """
         limit = self.size()
         try:
             for chunk in self.chunks:
@@ -188,7 +194,7 @@ class ChunkedReader(BagReader):
 
 
 class _Run:
-    """A chunk whose messages are being yielded; ``done`` is the number of those already yielded."""
+    """A chunk whose messages are being yielded; ``done`` is the number of messages already yielded."""
 
     __slots__ = ("done", "number", "position")
 
@@ -199,10 +205,10 @@ class _Run:
 
 
 class _Merge:
-    """Merges chunks that may overlap into blocks of messages in the order of time.
+    """Merges chunks that may overlap into blocks of messages in time order.
 
-    Each chunk is a run of sorted messages. Waiting runs stay in memory up to _CACHE_SIZE; a run that was
-    dropped is read again, so even a bag whose chunks all overlap needs no more memory.
+    Each chunk is a run of sorted messages. The data of pending runs stays in memory up to _CACHE_SIZE; beyond that it is
+    discarded and read again later, so that even a bag whose chunks all overlap needs no more memory.
     """
 
     def __init__(
@@ -223,11 +229,11 @@ class _Merge:
 
     def blocks(self) -> Iterator[Block]:
         """Yield the blocks in order."""
-        # The run's number breaks ties between runs whose next messages have equal time, connection and offset.
+        # The run's number decides between runs whose next messages have equal time, connection and offset.
         heap: list[tuple[int, int, int, int, _Run]] = []
         number, count = 0, len(self._chunks)
         while heap or number < count:
-            # A chunk is opened when its first message may be the next one.
+            # Open a chunk when its first message may be the next one.
             while number < count and (not heap or self._chunks[number].start_time <= heap[0][0]):
                 self._push(heap, _Run(number, self._chunks[number].position))
                 number += 1
@@ -242,7 +248,7 @@ class _Merge:
                 stop = bisect_left(found, heap[0][:2], run.done)
             if number < count:
                 stop = min(stop, bisect_left(found, (self._chunks[number].start_time,), run.done))
-            # Of two messages with equal time and connection, the one in the earlier chunk comes first.
+            # Of two messages with equal time and connection, yield the one in the earlier chunk first.
             stop = max(stop, run.done + 1)
 
             yield Block(
@@ -301,7 +307,7 @@ def _start_time(chunk: ChunkInfo) -> int:
 def _check_index(
     stream: BinaryIO, limit: int, connections: Mapping[int, Connection], chunks: Sequence[ChunkInfo]
 ) -> None:
-    """Raise BagFormatError if the index contradicts its header, in which case messages would be missing silently."""
+    """Raise BagFormatError if the index does not match the bag header, because messages would be missing silently."""
     positions: set[int] = set()
     for chunk in chunks:
         if chunk.position in positions:
@@ -317,7 +323,7 @@ def _check_index(
     try:
         more = records.read_record(stream, limit)
     except BagFormatError:
-        return  # data appended by other programs is ignored
+        return  # ignore data that other programs have appended
     if more.op in (records.OP_CHUNK_INFO, records.OP_CONNECTION):
         raise BagFormatError("the index has more records than the bag header counts", position)
 

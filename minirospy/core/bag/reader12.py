@@ -1,7 +1,7 @@
-"""Read bags of version 1.2, which have no chunks: definitions and messages follow each other in the file.
+"""Read bags of version 1.2, which have no chunks: definitions and messages alternate in the file.
 
-Such a bag has an index at its end, or none if it has no bag header. The results are those of `minirospy.core.bag.reader`.
-Source: http://wiki.ros.org/Bags/Format/1.2.
+Such a bag has an index at its end, or none if it has no bag header. The results are the same as those of
+`minirospy.core.bag.reader`. Source: http://wiki.ros.org/Bags/Format/1.2.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _ENTRY = struct.Struct("<IIQ")
 
 
 class Reader12(ScannedReader):
-    """A bag of version 1.2: a connection for each topic.
+    """A bag of version 1.2, with one connection per topic.
 
-    ``start``: the position of the first record. It is not ``indexed`` until :meth:`read_index` or :meth:`scan`.
+    ``start``: the position of the first record. ``indexed`` is false until :meth:`read_index` or :meth:`scan` is called.
     """
 
     def __init__(self, stream: BinaryIO, version: int, start: int) -> None:
@@ -39,7 +39,7 @@ class Reader12(ScannedReader):
         self._indexes: dict[int, ConnectionIndex] = {}
 
     def read_index(self) -> None:
-        """Read the index at the bag's end. Raise BagUnindexedError if it is missing or damaged."""
+        """Read the index at the end of the bag. Raise BagUnindexedError if it is missing or damaged."""
         try:
             limit = size_of(self.stream)
             self.stream.seek(self.start)
@@ -63,7 +63,7 @@ class Reader12(ScannedReader):
             raise BagUnindexedError(str(error)) from error
 
     def scan(self) -> Iterator[int]:
-        """Build the index from the messages; yield the position of each record. Stops at the first damaged one."""
+        """Build the index from the messages; yield the position of each record. Stops at the first damaged record."""
         self.connections.clear()
         self._by_topic.clear()
         self._indexes.clear()
@@ -129,7 +129,7 @@ class Reader12(ScannedReader):
         return [self._indexes[number] for number in connections]
 
     def _seek(self, position: int, limit: int) -> None:
-        """Seek to a position from the index. Raise BagFormatError if it is beyond the file's end."""
+        """Seek to a position from the index. Raise BagFormatError if it is beyond the end of the file."""
         if position > limit:
             raise BagFormatError("an index entry is behind the file's end", position)
         self.stream.seek(position)
@@ -143,7 +143,7 @@ class Reader12(ScannedReader):
             raise BagFormatError(f"an index of {count} messages has only {record.data_size} bytes")
         entries = list(_ENTRY.iter_unpack(self.stream.read(count * _ENTRY.size)))
 
-        # The first message of a topic is preceded by its definition, and the index points there.
+        # A topic's first message is preceded by its definition, and the index entry refers to the definition.
         self._seek(entries[0][2], limit)
         definition = records.read_record(self.stream, limit)
         definition.expect(records.OP_MESSAGE_DEFINITION)
@@ -168,7 +168,7 @@ class Reader12(ScannedReader):
     def _connection_of(self, record: Record) -> int:
         topic = record.text("topic")
         if topic not in self._by_topic:
-            # A definition is stored once per type; other topics of the type refer to it.
+            # A definition is stored once per type; other topics with that type refer to it.
             type_ = record.text("type")
             like = next((each for each in self.connections.values() if each.type == type_), None)
             if like is None:
@@ -186,10 +186,10 @@ class Reader12(ScannedReader):
 
 
 def open_bag12(stream: BinaryIO, version: int) -> Reader12:
-    """Return a reader of the bag whose first line has been read.
+    """Return a reader for the bag; its first line must have been read.
 
-    A bag without a bag header has no index, and is scanned when it is read. Raise BagUnindexedError if a bag header is
-    present but the index is missing.
+    A bag without a bag header has no index, and is scanned when it is read. Raise BagUnindexedError if there is a bag
+    header but no index.
     """
     start = stream.tell()
     limit = size_of(stream)
@@ -201,7 +201,10 @@ def open_bag12(stream: BinaryIO, version: int) -> Reader12:
 
 
 def unindexed_bag12(stream: BinaryIO) -> Reader12:
-    """Return a reader of the bag at the stream's position, which must then be scanned. Raise BagFormatError."""
+    """Return a reader for the bag at the stream's position, which must then be scanned.
+
+    Raise BagFormatError if it is not a bag of this version.
+    """
     version = records.read_version(stream)
     return Reader12(stream, version, stream.tell())
 

@@ -1,8 +1,8 @@
-"""Parse the records of bags: bytes in, named tuples out.
+"""Parse bag records: bytes in, named tuples out.
 
 A record is a header (its length, then fields ``name=value``, each with a length prefix) and data (its length, then
 bytes). The field ``op`` specifies the kind of record. All numbers are little-endian; times are nanoseconds since 1970
-here, and seconds and nanoseconds of 32 bits each in the file. Source: http://wiki.ros.org/Bags/Format/2.0.
+here, and 32-bit seconds and nanoseconds in the file. Source: http://wiki.ros.org/Bags/Format/2.0.
 
 Fields may be in any order, and unknown fields and records are skipped. The inverse: `minirospy.core.bag.encoding`.
 """
@@ -62,12 +62,13 @@ OP_CHUNK_INFO = 6
 OP_CONNECTION = 7
 
 BAG_HEADER_SIZE = 4096
-"""Bytes of the bag header's fields and padding together, constant since it is overwritten when the bag is closed."""
+"""Bytes of the bag header's fields and padding together; constant, because the header is overwritten when the bag is closed."""
 
-MAX_HEADER = 16 * 1024 * 1024  # bytes of a record's header, which contains definitions in bags of version 1.2
+# maximum bytes in a record's header, which contains definitions in bags of version 1.2
+MAX_HEADER = 16 * 1024 * 1024
 
 MAX_UINT32 = 0xFFFFFFFF
-"""The maximum of sizes and times of 32 bits, such as a record's data size or a chunk's uncompressed size."""
+"""The maximum 32-bit size or time, such as a record's data size or a chunk's uncompressed size."""
 
 _BILLION = 10**9
 _OPS = {
@@ -87,11 +88,11 @@ _PAIR = struct.Struct("<II")
 _ENTRY = struct.Struct("<III")
 
 Fields = dict[str, bytes]
-"""The fields of a header; the values are bytes, since definitions are not always UTF-8."""
+"""A header's fields; the values are bytes, because definitions are not always UTF-8."""
 
 
 class BagHeader(NamedTuple):
-    """The first record: the position of the index (0: the bag was not closed), and its numbers of records."""
+    """The first record: the position of the index (0: the bag was not closed), and the numbers of records in it."""
 
     index_pos: int
     connection_count: int
@@ -99,7 +100,7 @@ class BagHeader(NamedTuple):
 
 
 class Connection(NamedTuple):
-    """A topic of one publisher: ``id`` in the bag, ``topic``, and the publisher's connection header."""
+    """One publisher's topic: ``id`` in the bag, ``topic``, and the publisher's connection header."""
 
     id: int
     topic: str
@@ -107,22 +108,22 @@ class Connection(NamedTuple):
 
     @property
     def type(self) -> str:
-        """The type of the connection's messages, such as ``std_msgs/String``."""
+        """The message type, such as ``std_msgs/String``."""
         return self._text("type")
 
     @property
     def md5sum(self) -> str:
-        """The md5sum of the type."""
+        """The type's md5sum."""
         return self._text("md5sum")
 
     @property
     def definition(self) -> str:
-        """The full text of the type: its definition, and those of all types that it uses."""
+        """The type's full text: its definition, and the definitions of all types that it uses."""
         return self._text("message_definition")
 
     @property
     def callerid(self) -> str:
-        """The name of the publisher's node, "" if it is not stored."""
+        """The name of the publisher's node, or "" if it is not stored."""
         return self._text("callerid")
 
     @property
@@ -135,7 +136,7 @@ class Connection(NamedTuple):
 
 
 class MessageData(NamedTuple):
-    """A message: the id of its connection, its receive time, its bytes."""
+    """A message: its connection's id, its receive time, its bytes."""
 
     connection: int
     time: int
@@ -143,21 +144,21 @@ class MessageData(NamedTuple):
 
 
 class IndexEntry(NamedTuple):
-    """The location of a message: its time, and its record's offset in the chunk's decompressed data."""
+    """A message's location: its time, and its record's offset in the chunk's decompressed data."""
 
     time: int
     offset: int
 
 
 class IndexData(NamedTuple):
-    """The entries of one connection in the chunk that precedes this record."""
+    """The entries for one connection in the chunk that precedes this record."""
 
     connection: int
     entries: list[IndexEntry]
 
 
 class Chunk(NamedTuple):
-    """The header of a chunk: its compression, and the sizes of its data in memory and in the file."""
+    """A chunk's header: its compression, and the sizes of its data in memory and in the file."""
 
     compression: str
     size: int
@@ -165,7 +166,7 @@ class Chunk(NamedTuple):
 
 
 class ChunkInfo(NamedTuple):
-    """The summary of a chunk: its position, the times of its first and last message, and the messages per connection."""
+    """A chunk's info: its position, the times of its first and last message, and the number of messages per connection."""
 
     position: int
     start_time: int
@@ -174,7 +175,7 @@ class ChunkInfo(NamedTuple):
 
 
 class Record(NamedTuple):
-    """A record's header, and the position of its data in the stream or buffer."""
+    """A record's header, and its data's position in the stream or buffer."""
 
     position: int
     op: int
@@ -203,7 +204,7 @@ class Record(NamedTuple):
         return to_nanoseconds(*_TIME.unpack(value))
 
     def text(self, name: str) -> str:
-        """Return a field's text. Raise BagFormatError if it is missing."""
+        """Return a field as a string. Raise BagFormatError if it is missing."""
         return self.field(name).decode("utf-8", "replace")
 
     def field(self, name: str) -> bytes:
@@ -228,12 +229,12 @@ class Record(NamedTuple):
 
 
 def to_nanoseconds(seconds: int, nanoseconds: int) -> int:
-    """Return a record's time in nanoseconds."""
+    """Convert a record's time to nanoseconds."""
     return seconds * _BILLION + nanoseconds
 
 
 def read_version(stream: BinaryIO) -> int:
-    """Read a bag's first line; return its version, 200 for 2.0. Raise NoBagError."""
+    """Read a bag's first line; return its version, 200 for 2.0. Raise NoBagError if it is not a bag."""
     line = stream.readline(100)
     if not line.strip():
         raise NoBagError("empty file")
@@ -249,7 +250,7 @@ def read_version(stream: BinaryIO) -> int:
 def read_record(stream: BinaryIO, limit: int) -> Record:
     """Read the header of the record at the stream's position, and the length of its data, which follows.
 
-    ``limit`` is the stream's size: a length that goes beyond it means damage. Raise BagFormatError.
+    ``limit`` is the stream's size. Raise BagFormatError if the record is damaged, or a length goes beyond ``limit``.
     """
     position = stream.tell()
     header_size = _read_length(stream, position)
@@ -270,7 +271,7 @@ def read_record(stream: BinaryIO, limit: int) -> Record:
 
 
 def parse_record(buffer: bytes, position: int) -> Record:
-    """Return the record at a position of a buffer, such as a chunk's data. Raise BagFormatError."""
+    """Return the record at a position in a buffer, such as a chunk's data. Raise BagFormatError if it is damaged."""
     limit = len(buffer)
     if position + 8 > limit or position < 0:
         raise BagFormatError("a record's header does not fit into its chunk", position)
@@ -290,7 +291,7 @@ def parse_record(buffer: bytes, position: int) -> Record:
 
 
 def parse_records(buffer: bytes, position: int = 0) -> Iterator[Record]:
-    """Yield the records of a buffer. Raise BagFormatError at the first incomplete one."""
+    """Yield the records in a buffer. Raise BagFormatError at the first incomplete one."""
     while position < len(buffer):
         record = parse_record(buffer, position)
         yield record
@@ -298,7 +299,10 @@ def parse_records(buffer: bytes, position: int = 0) -> Iterator[Record]:
 
 
 def parse_fields(header: bytes, position: int | None = None) -> Fields:
-    """Return the fields of a header without its length prefix. Raise BagFormatError, which names ``position``."""
+    """Return the fields of a header without its length prefix.
+
+    Raise BagFormatError, which contains ``position``, if a field is damaged.
+    """
     fields: Fields = {}
     at, end = 0, len(header)
     while at < end:
@@ -319,7 +323,10 @@ def parse_fields(header: bytes, position: int | None = None) -> Fields:
 
 
 def parse_bag_header(record: Record) -> BagHeader:
-    """Return the bag header of a record. Raise BagFormatError, and BagEncryptedError if it names an encryptor."""
+    """Return the bag header in a record.
+
+    Raise BagFormatError if the record is invalid, BagEncryptedError if it names an encryptor.
+    """
     record.expect(OP_BAG_HEADER)
     if encryptor := record.fields.get("encryptor"):
         raise BagEncryptedError(encryptor.decode("utf-8", "replace"))
@@ -327,7 +334,7 @@ def parse_bag_header(record: Record) -> BagHeader:
 
 
 def parse_connection(record: Record, data: bytes) -> Connection:
-    """Return the connection of a record. Raise BagFormatError, also if the type is missing."""
+    """Return the connection in a record. Raise BagFormatError if the record is invalid or lacks the type."""
     record.expect(OP_CONNECTION)
     header = parse_fields(data, record.position)
     for name in ("type", "md5sum", "message_definition"):
@@ -337,13 +344,13 @@ def parse_connection(record: Record, data: bytes) -> Connection:
 
 
 def parse_message_data(record: Record, body: bytes) -> MessageData:
-    """Return the message of a record. Raise BagFormatError."""
+    """Return the message in a record. Raise BagFormatError if the record is invalid."""
     record.expect(OP_MESSAGE_DATA)
     return MessageData(record.uint32("conn"), record.time("time"), body)
 
 
 def parse_index_data(record: Record, data: bytes) -> IndexData:
-    """Return the entries of a record of version 2.0. Raise BagFormatError."""
+    """Return the entries in a record of version 2.0. Raise BagFormatError if the record is invalid."""
     record.expect(OP_INDEX_DATA)
     version, count = record.uint32("ver"), record.uint32("count")
     if version != 1:
@@ -359,13 +366,13 @@ def parse_index_data(record: Record, data: bytes) -> IndexData:
 
 
 def parse_chunk_header(record: Record) -> Chunk:
-    """Return the header of a chunk. Raise BagFormatError."""
+    """Return the chunk header in a record. Raise BagFormatError if the record is invalid."""
     record.expect(OP_CHUNK)
     return Chunk(record.text("compression"), record.uint32("size"), record.data_size)
 
 
 def parse_chunk_info(record: Record, data: bytes) -> ChunkInfo:
-    """Return the summary of a chunk. Raise BagFormatError."""
+    """Return the chunk info in a record. Raise BagFormatError if the record is invalid."""
     record.expect(OP_CHUNK_INFO)
     version, count = record.uint32("ver"), record.uint32("count")
     if version != 1:

@@ -1,7 +1,7 @@
 """Repair a bag that was not closed, whose end is missing, or that is damaged: rebuild its index from its chunks.
 
-Every complete chunk is recovered, and every complete message of an incomplete, uncompressed last chunk. A chunk with
-damaged data is left out of the index; after damage between records, the next chunk is searched.
+Every complete chunk is recovered, and every complete message in an incomplete, uncompressed last chunk. A chunk with
+damaged data is omitted from the index; after damage between records, the next chunk is searched for.
 Source: http://wiki.ros.org/rosbag/Commandline#reindex.
 """
 
@@ -22,11 +22,11 @@ __all__ = ["Repair"]
 
 _END_OF_TIME = (records.MAX_UINT32 + 1) * 10**9
 _Entry = tuple[int, int, int]
-"""A message in a chunk's index: time, connection, offset of its record."""
+"""A message in a chunk's index: time, connection, record offset."""
 
 
 class _Content(NamedTuple):
-    """The contents of a chunk's data; ``end``: the length of the complete records."""
+    """The contents of a chunk's data; ``end`` is the length of the complete records."""
 
     connections: dict[int, Connection]
     messages: list[Found]
@@ -43,7 +43,7 @@ class _Content(NamedTuple):
         return any(each[0] >= _END_OF_TIME for each in self.messages)
 
     def info(self, position: int) -> ChunkInfo:
-        """Return the chunk's summary."""
+        """Return the chunk's info."""
         times = _times(self.entries)
         return ChunkInfo(position, times[0], times[-1], dict(Counter(each[1] for each in self.messages)))
 
@@ -57,7 +57,7 @@ class _Content(NamedTuple):
 
 
 class _Edit(NamedTuple):
-    """A range of bytes in the file and its replacement."""
+    """A range of bytes in the file, and its replacement."""
 
     start: int
     end: int
@@ -65,7 +65,7 @@ class _Edit(NamedTuple):
 
 
 class _Rewriting:
-    """Applies edits to a file, in order and in place: output that would overwrite unread bytes is buffered."""
+    """Applies edits to a file, in order and in place; buffers output that would overwrite bytes that are not read yet."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
@@ -78,7 +78,7 @@ class _Rewriting:
         return self._written + len(self._waiting) - self._read
 
     def copy_until(self, position: int) -> None:
-        """Keep the file's bytes up to a position, moving them if necessary."""
+        """Copy the file's bytes up to a position, moving them if necessary."""
         if not self.shift and not self._waiting:
             self._read = self._written = position
         while self._read < position:
@@ -88,7 +88,7 @@ class _Rewriting:
             self._put(block)
 
     def replace(self, edit: _Edit) -> None:
-        """Write the edit's bytes in place of those at its position."""
+        """Write the edit's bytes instead of those at its position."""
         self._read = edit.end
         self._put(edit.data)
 
@@ -112,9 +112,9 @@ class _Rewriting:
 class Repair:
     """Rebuilds the index of a bag of version 2.0, in place if the stream is writable.
 
-    After :meth:`run`: ``connections``, ``chunks``, ``end`` is the position for the index, ``headers`` are those of chunks
-    whose header in the file is incomplete, and ``problems`` are lines about data that could not be recovered. :meth:`apply`
-    removes the damaged ranges, which changes the chunks' positions.
+    :meth:`run` sets ``connections``, ``chunks``, ``end`` (the position for the index), ``headers`` (of chunks whose header in
+    the file is incomplete), and ``problems`` (lines about data that could not be recovered). :meth:`apply` removes the damaged
+    ranges, which changes the chunks' positions.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -125,11 +125,15 @@ class Repair:
         self.problems: list[str] = []
         self._stream = stream
         self._edits: list[_Edit] = []
-        self._infos_left = 0  # chunk infos that the bag header counts and that have not been read yet
-        self._total = 0  # messages counted by the chunk infos read so far
+        # chunk infos that are included in the bag header's count and have not been read yet
+        self._infos_left = 0
+        self._total = 0  # total of the message counts in the chunk infos read so far
 
     def run(self) -> Iterator[int]:
-        """Read the chunks; yield the position of each. Raise BagFormatError if it is not a bag, BagEncryptedError."""
+        """Read the chunks; yield the position of each.
+
+        Raise BagFormatError if it is not a bag, BagEncryptedError if it is encrypted.
+        """
         stream = self._stream
         stream.seek(0)
         records.read_version(stream)
@@ -151,7 +155,10 @@ class Repair:
         self._report_lost()
 
     def apply(self) -> None:
-        """Truncate the file after the last recovered chunk, and remove the damaged ranges before it. Raise OSError."""
+        """Truncate the file after the last recovered chunk, and remove the damaged ranges before it.
+
+        Raise OSError if the stream fails.
+        """
         chunks = iter(self.chunks)
         moved: list[ChunkInfo] = []
         chunk = next(chunks, None)
@@ -169,7 +176,7 @@ class Repair:
         self._edits, self.headers = [], {}
 
     def _read_header(self, limit: int) -> int:
-        """Return the position of the first chunk; a damaged bag header is assumed to have the usual size."""
+        """Return the position of the first chunk; assume the usual size if the bag header is damaged."""
         start = len(records.MAGIC)
         self._stream.seek(start)
         try:
@@ -182,7 +189,10 @@ class Repair:
         return record.end
 
     def _read(self, position: int, limit: int) -> int:
-        """Read the record at a position, and a chunk's index records; return the position after them. Raise BagFormatError."""
+        """Read the record at a position and, after a chunk, its index records; return the position after them.
+
+        Raise BagFormatError if a record is damaged.
+        """
         self._stream.seek(position)
         record = records.read_record(self._stream, limit)
         if record.op == records.OP_CONNECTION:
@@ -196,7 +206,7 @@ class Repair:
         if record.op != records.OP_CHUNK:
             return record.end
         if not record.data_size:
-            # A chunk's header is completed together with the chunk, so its writer was killed.
+            # A chunk's header is completed together with the chunk, so its writer was killed before that.
             raise BagFormatError("unterminated chunk")
 
         chunk = records.parse_chunk_header(record)
@@ -209,7 +219,7 @@ class Repair:
                 raise BagFormatError("a record of the chunk is damaged")
             self._check_connections(content)
             if content.has_wrong_time:
-                # Later chunks may need the connections in this one.
+                # Add the connections although the chunk is omitted, because later chunks may need them.
                 self._add_connections(content)
                 raise BagFormatError("a message of the chunk has a time that no index can hold")
         except (BagFormatError, BagCompressionError) as error:
@@ -220,7 +230,7 @@ class Repair:
         return self._add(record, content, limit)
 
     def _check_connections(self, content: _Content) -> None:
-        """Raise BagFormatError if a connection differs from that in previous chunks, so the chunk cannot be trusted."""
+        """Raise BagFormatError if a connection differs from the one in previous chunks, so that this chunk cannot be trusted."""
         for number, connection in content.connections.items():
             known = self.connections.get(number, connection)
             if (known.topic, known.type, known.md5sum) != (
@@ -233,7 +243,7 @@ class Repair:
                 )
 
     def _add_connections(self, content: _Content) -> None:
-        # In file order, as ROS writes them into the index.
+        # Add them in file order, which is the order in which ROS writes them to the index.
         for number, connection in content.connections.items():
             self.connections.setdefault(number, connection)
 
@@ -267,7 +277,7 @@ class Repair:
         return following
 
     def _go_on(self, position: int, error: BagFormatError, limit: int) -> int:
-        """Return the position of the next chunk after damage; ``limit`` if there is none."""
+        """Return the position of the next chunk after damage, or ``limit`` if there is none."""
         following = next_chunk(self._stream, position + 1, limit)
         end = limit if following is None else following
         is_saved = self._read_partial(position, end, limit)
@@ -281,9 +291,10 @@ class Repair:
         return end
 
     def _read_partial(self, position: int, end: int, limit: int) -> bool:
-        """Recover the messages of an uncompressed chunk whose size is wrong; return whether there are any.
+        """Recover the messages in an uncompressed chunk whose size is wrong; return whether there are any.
 
-        At the end of the file recover every complete message; before it only all messages or none, checked against the chunk's
+        At the end of the file recover every complete message; elsewhere recover all messages or none, checked against the
+        chunk's
         index records.
         """
         record = _partial_chunk(self._stream, position, limit)
@@ -298,7 +309,7 @@ class Repair:
         data_end = record.data_position + content.end
         _, entries = _read_index(self._stream, data_end, limit)
         if end < limit and _times(entries) != _times(content.entries):
-            return False  # wrong offsets alone do no harm, since the index is rewritten
+            return False  # if only the offsets are wrong, accept the entries: the index is rewritten
         self._add_connections(content)
         self.chunks.append(content.info(position))
         self.end = end
@@ -314,7 +325,7 @@ class Repair:
         return True
 
     def _report_lost(self) -> None:
-        """Add a line with the number of missing messages, if the bag's own index still contains the total."""
+        """Report the number of missing messages if the bag's own index still contains the total."""
         lost = self._total - sum(sum(chunk.counts.values()) for chunk in self.chunks)
         if self._infos_left == 0 and lost > 0:
             self.problems.append(f"{lost} of {self._total} messages are lost")
@@ -327,7 +338,7 @@ _BLOCK = 4 * 1024 * 1024
 
 
 def _read_index(stream: BinaryIO, position: int, limit: int) -> tuple[int, list[_Entry]]:
-    """Return the position after the index records at a position, and their sorted entries."""
+    """Return the position after the index records at ``position``, and the sorted entries in them."""
     found: list[_Entry] = []
     try:
         while position < limit:
@@ -348,7 +359,7 @@ def _times(entries: list[_Entry]) -> list[int]:
 
 
 def _whole_records(data: bytes) -> int:
-    """Return the length of the complete message and connection records at the start of the data."""
+    """Return the total length of the complete message and connection records at the start of the data."""
     at = 0
     try:
         for record in records.parse_records(data):
@@ -371,15 +382,15 @@ def _content(data: bytes) -> _Content:
 
 
 class _Any:
-    """The ranks of all connections: their ids."""
+    """Used as ranks if all connections are requested: a connection's rank is its id."""
 
     def get(self, number: int, /) -> int | None:
-        """Return the rank of a connection."""
+        """Return a connection's rank."""
         return number
 
 
 def _partial_chunk(stream: BinaryIO, position: int, limit: int) -> Record | None:
-    """Return the record of an uncompressed chunk whose data is cut off; None if it is something else."""
+    """Return the record of an uncompressed chunk whose data is truncated, or None if the record is something else."""
     try:
         stream.seek(position)
         head = stream.read(min(4096, limit - position))

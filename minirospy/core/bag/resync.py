@@ -1,4 +1,4 @@
-"""Find the next chunk of a damaged bag of version 2.0: a stream in, the chunk's position out."""
+"""Find the next chunk in a damaged bag of version 2.0: a stream in, the chunk's position out."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from minirospy.core.bag import compression, records
 __all__ = ["is_record", "next_chunk"]
 
 _BLOCK = 1024 * 1024
-_MARK = b"\x04\0\0\0op=\x05"  # the field op of a chunk's header
+_MARK = b"\x04\0\0\0op=\x05"  # the field ``op`` in a chunk's header
 
-# Possible lengths of the fields that a writer may have put before it: size, compression, or both
+# Possible lengths of the fields that a writer may have put before ``op``: size, compression, or both
 _BEFORE = (0, 13, 19, 20, 32, 33)
 
 
 def is_record(stream: BinaryIO, position: int, limit: int) -> bool:
-    """Return whether there is a record at a position, or the position is the stream's end ``limit``."""
+    """Return whether there is a record at a position, or whether the position is the stream's end ``limit``."""
     return position == limit or _op(stream, position, limit) in _OPS
 
 
 def next_chunk(stream: BinaryIO, start: int, limit: int) -> int | None:
     """Return the position of the first complete chunk from ``start`` that is followed by its index records, or None.
 
-    A chunk inside a message, such as that of a bag sent as bytes, cannot be distinguished.
+    A chunk inside a message, for example in a bag that was sent as bytes, cannot be distinguished from the bag's own chunks.
     """
     position = start
     while position < limit:
@@ -39,7 +39,7 @@ def next_chunk(stream: BinaryIO, start: int, limit: int) -> int | None:
             at = block.find(_MARK, at + 1)
         if position + len(block) >= limit:
             return None
-        # The mark may cross the block's end, and the header starts before the mark.
+        # Let the blocks overlap: the mark may cross the block's end, and the header starts before the mark.
         position += max(len(block) - len(_MARK) - 4 - _BEFORE[-1], 1)
     return None
 

@@ -1,4 +1,4 @@
-"""A bag by time: message counts per interval, and the message at a given time, for display rather than playback."""
+"""A bag over time: message counts per interval, and the message at a given time, for display and not for playback."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Timeline", "TopicTimes"]
 
 
 class TopicTimes(NamedTuple):
-    """A topic: its connections in the bag, and the sorted times of each one's messages, in nanoseconds."""
+    """A topic: its connections in the bag, and for each connection the sorted message times in nanoseconds."""
 
     name: str
     connections: list[Connection]
@@ -31,7 +31,7 @@ class TopicTimes(NamedTuple):
 
 
 class Timeline:
-    """The index of a bag by topic. ``topics``: name -> the topics that have messages. Raise BagFormatError."""
+    """A bag's index by topic. ``topics``: name -> topics that have messages. Raise BagFormatError if the index is damaged."""
 
     def __init__(self, reader: BagReader) -> None:
         self._reader = reader
@@ -47,12 +47,12 @@ class Timeline:
 
     @property
     def span(self) -> tuple[int, int] | None:
-        """Return the times of the first and the last message; None if there are no messages."""
+        """Return the times of the first and the last message, or None if there are no messages."""
         every = [times for topic in self.topics.values() for times in topic.times]
         return (min(times[0] for times in every), max(times[-1] for times in every)) if every else None
 
     def density(self, topic: str, start: int, end: int, bins: int) -> list[int]:
-        """Return the number of a topic's messages in each of ``bins`` equal parts from ``start`` to ``end``, both included."""
+        """Return how many messages a topic has in each of ``bins`` equal parts from ``start`` to ``end``, both included."""
         counts = [0] * bins
         borders = [start + (end + 1 - start) * number // bins for number in range(bins + 1)]
         for times in self.topics[topic].times:
@@ -62,7 +62,7 @@ class Timeline:
         return counts
 
     def message_at(self, topic: str, time: int) -> StoredMessage | None:
-        """Return the last message of a topic at or before ``time``. Raise BagFormatError."""
+        """Return a topic's last message at or before ``time``. Raise BagFormatError if the bag is damaged."""
         newest: tuple[int, Connection] | None = None
         known = self.topics[topic]
         for connection, times in zip(known.connections, known.times, strict=True):
@@ -79,7 +79,7 @@ class Timeline:
         return last
 
     def time_at(self, topic: str, time: int) -> int | None:
-        """Return the time of the last message of a topic at or before ``time``."""
+        """Return the time of a topic's last message at or before ``time``."""
         found = [times[at - 1] for times in self.topics[topic].times if (at := bisect_right(times, time))]
         return max(found, default=None)
 
@@ -92,7 +92,7 @@ class Timeline:
         )
 
     def time_after(self, time: int) -> int | None:
-        """Return the time of the first message after ``time``; None if there is none."""
+        """Return the time of the first message after ``time``, or None if there is none."""
         found = [
             times[at]
             for topic in self.topics.values()
@@ -102,7 +102,7 @@ class Timeline:
         return min(found, default=None)
 
     def time_before(self, time: int) -> int | None:
-        """Return the time of the last message before ``time``; None if there is none."""
+        """Return the time of the last message before ``time``, or None if there is none."""
         found = [
             times[at - 1]
             for topic in self.topics.values()

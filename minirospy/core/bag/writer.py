@@ -1,9 +1,9 @@
-"""Write bags: messages with their times in, the bytes of a bag out.
+"""Write bags: messages with their times in, a bag's bytes out.
 
-A chunk is collected in memory and written at once, followed by its index: if the writer is killed, at most the last
-chunk is incomplete, and :mod:`minirospy.core.bag.repair` recovers all before it. A small message is copied once, into
-the chunk; a large one passed as ``bytes`` is written without a copy. Memory use: the chunk, and some 200 bytes for
-each connection of each written chunk. Source: http://wiki.ros.org/Bags/Format/2.0.
+A chunk is collected in memory and then written in one piece, followed by its index: if the writer is killed, at most the
+last chunk is incomplete, and :mod:`minirospy.core.bag.repair` recovers all chunks before it. A small message is copied
+once, into the chunk; a large one passed as ``bytes`` is written without a copy. Memory use: the chunk, and some 200 bytes
+for each connection in each written chunk. Source: http://wiki.ros.org/Bags/Format/2.0.
 """
 
 from __future__ import annotations
@@ -42,31 +42,31 @@ __all__ = ["CHUNK_THRESHOLD", "BagWriter", "Buffer", "Continued"]
 
 Buffer = bytes | bytearray | memoryview
 
-CHUNK_THRESHOLD = 768 * 1024  # bytes of data before compression; a larger chunk is complete. ROS's default
+CHUNK_THRESHOLD = 768 * 1024  # bytes before compression at which a chunk is complete; ROS's default
 
 _LARGE = 64 * 1024  # bytes; a message of at least this size is not copied into the chunk
 
 _BILLION = 10**9
-_OVERHEAD = 46  # bytes of a message's record in addition to its body
+_OVERHEAD = 46  # bytes in a message's record in addition to its body
 _ENTRY = struct.Struct("<III")
 _TIME = struct.Struct("<II")
 _UINT32 = struct.Struct("<I")
 
 
 class _Stream:
-    """The messages of one connection: the prefix of each, and their index in the current chunk."""
+    """The messages on one connection: their prefix, and their index in the current chunk."""
 
     __slots__ = ("connection", "entries", "in_order", "last", "prefix", "record")
 
     def __init__(self, connection: Connection, *, is_stored: bool) -> None:
         self.connection = connection
         self.prefix = message_prefixes(connection.id)[0]
-        # The connection's record, until it is in a chunk
+        # The connection's record, empty once a chunk contains it
         self.record = b"" if is_stored else encode_connection(connection)
         self.clear()
 
     def clear(self) -> None:
-        """Start the index of the next chunk."""
+        """Start the index for the next chunk."""
         self.entries = bytearray()
         self.last = 0
         self.in_order = True
@@ -91,7 +91,7 @@ class _Stream:
 
 
 class _Complete(NamedTuple):
-    """A chunk that waits to be written: functions that return its data, its size, and the contents of its index."""
+    """A complete chunk to be written: functions that return its data, its size, and the contents of its index."""
 
     is_ready: Callable[[], bool]
     data: Callable[[], list[Buffer]]
@@ -103,7 +103,7 @@ class _Complete(NamedTuple):
 
 
 class Continued(NamedTuple):
-    """The index of a bag to be continued, and its position."""
+    """The index of a bag to which messages will be appended, and the index's position."""
 
     connections: Iterable[Connection]
     chunks: Iterable[ChunkInfo]
@@ -111,15 +111,15 @@ class Continued(NamedTuple):
 
 
 class BagWriter:
-    """Writes a bag of version 2.0 into a binary stream, which it does not close. For one thread at a time.
+    """Writes a bag of version 2.0 to a binary stream, which it does not close. Use it in one thread at a time.
 
-    ``chunk_threshold`` in bytes may be changed at any time. ``executor`` compresses chunks in parallel; without
-    one, the calling thread does. ``most_waiting``: if more chunks than this wait for compression, :meth:`write` waits, too.
+    ``chunk_threshold``, in bytes, may be changed at any time. ``executor`` compresses chunks in parallel; without
+    one, the calling thread does. If more than ``most_waiting`` chunks are queued for compression, :meth:`write` blocks.
     ``continued``: append to the bag in the stream, overwriting its index. Raise BagCompressionError if the compression
     is unknown or its library is missing.
 
-    After an OSError of the stream, such as a full disk, :meth:`salvage` makes the written part a readable bag;
-    this requires an unbuffered stream. Buffering gains nothing here, since each chunk is written at once.
+    After the stream has raised OSError, for example on a full disk, :meth:`salvage` turns the written part into a readable
+    bag; this requires an unbuffered stream. Buffering gains nothing here, because each chunk is written in one piece.
     """
 
     def __init__(
@@ -140,7 +140,7 @@ class BagWriter:
         self._streams: dict[int, _Stream] = {}
         self._next_id = 0
         self._complete: deque[_Complete] = deque()
-        self._waiting = 0  # bytes of the complete chunks, before compression
+        self._waiting = 0  # bytes in the complete chunks that are not written yet, before compression
         self._written = (0, 0)  # bytes of data in the written chunks: before compression, and as stored
         self._closed = False
         self._small = bytearray()
@@ -159,7 +159,10 @@ class BagWriter:
 
     @property
     def compression(self) -> str:
-        """Return the compression of chunks; a change completes the current one. Raise BagCompressionError."""
+        """Return the chunk compression; setting another one completes the current chunk.
+
+        Raise BagCompressionError if it is unknown or its library is missing.
+        """
         return self._compression
 
     @compression.setter
@@ -177,9 +180,9 @@ class BagWriter:
 
     @property
     def size(self) -> int:
-        """The bytes of the bag so far; uncompressed data is counted with the compression ratio of the previous chunks.
+        """The bag's size so far in bytes; uncompressed data is counted with the compression ratio of the previous chunks.
 
-        Before the first chunk is written, the data in memory counts as 0, since the ratio is unknown.
+        Before the first chunk is written, the data in memory counts as 0, because the ratio is unknown.
         """
         if self._compression == NONE:
             return self._position + self.gathered
@@ -188,13 +191,13 @@ class BagWriter:
 
     @property
     def gathered(self) -> int:
-        """The bytes in memory that are not written to the stream yet."""
+        """The number of bytes in memory that are not written to the stream yet."""
         return self._size + self._waiting
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
         """Return the number of a new connection for :meth:`write`; ``header`` is the publisher's connection header.
 
-        It needs the fields type, md5sum and message_definition. Raise BagFormatError.
+        Raise BagFormatError if the header lacks type, md5sum or message_definition.
         """
         for name in ("type", "md5sum", "message_definition"):
             if name not in header:
@@ -209,11 +212,11 @@ class BagWriter:
         return number
 
     def write(self, connection: int, time: int, body: Buffer, tail: Buffer = b"") -> None:
-        """Write a message received at ``time``, in nanoseconds; its bytes are those of ``body``, then of ``tail``.
+        """Write a message received at ``time``, in nanoseconds; its bytes are ``body`` followed by ``tail``.
 
-        ``bytes`` are kept until the chunk is written, other buffers are copied. Raise BagFormatError if the message or
-        its time
-        exceeds a limit, OSError if the stream fails.
+        ``bytes`` are referenced until the chunk is written, other buffers are copied. Raise BagFormatError if the message
+        or its
+        time exceeds a limit, OSError if the stream fails.
         """
         stream = self._streams[connection]
         length = len(body) + len(tail)
@@ -255,7 +258,7 @@ class BagWriter:
             self.finish_chunk()
 
     def finish_chunk(self) -> None:
-        """Complete the current chunk, if it has a message. Raise OSError."""
+        """Complete the current chunk, if it has a message. Raise OSError if the stream fails."""
         if not self._size:
             return
         counts: dict[int, int] = {}
@@ -276,17 +279,17 @@ class BagWriter:
         self._write_complete(self._most_waiting)
 
     def write_ready(self) -> None:
-        """Write the complete chunks whose compression is done. Raise OSError."""
+        """Write the complete chunks that are already compressed. Raise OSError if the stream fails."""
         self._write_complete(len(self._complete))
 
     def flush(self) -> None:
-        """Write all messages to the stream, and flush it. Raise OSError."""
+        """Write all messages to the stream, and flush it. Raise OSError if the stream fails."""
         self.finish_chunk()
         self._write_complete(0)
         self._stream.flush()
 
     def close(self) -> None:
-        """Complete the bag: write its index. The stream stays open. Idempotent. Raise OSError."""
+        """Complete the bag by writing its index. The stream stays open. Idempotent. Raise OSError if the stream fails."""
         if self._closed:
             return
         self.finish_chunk()
@@ -297,9 +300,9 @@ class BagWriter:
     def salvage(self, written: int | None = None) -> int:
         """Close a bag whose stream has failed; return the number of lost messages.
 
-        Removes incomplete chunks, and as many before them as necessary to make room for the index. ``written``: bytes of the
-        bag that are known to have reached the disk, if not all before the fault have. Raise OSError if even an empty bag does
-        not fit.
+        Removes incomplete chunks, and as many before them as necessary to free space for the index. ``written``: bytes of the
+        bag that are known to have reached the disk, if not everything written before the error has. Raise OSError if even an
+        empty bag does not fit.
         """
         lost = sum(len(one.entries) // _ENTRY.size for one in self._used)
         lost += sum(sum(one.counts.values()) for one in self._complete)
@@ -332,7 +335,7 @@ class BagWriter:
     def _set_compression(self, name: str) -> None:
         check_compression(name)
         self._compression = name
-        # Random data grows when compressed, and minirospy's readers accept no larger chunks.
+        # Random data grows when compressed, and minirospy's readers reject larger chunks.
         self._limit = MAX_UINT32 if name == NONE else MAX_CHUNK_SIZE
 
     def _continue(self, connections: Iterable[Connection], chunks: Iterable[ChunkInfo], end: int) -> None:
@@ -340,7 +343,7 @@ class BagWriter:
         self._next_id = max(self._streams, default=-1) + 1
         self.chunks.extend(chunks)
 
-        # Write the header first: if the program is killed now, the bag is marked as not closed.
+        # Write the header first, so that the bag is marked as not closed if the program is killed now.
         self._header_position = len(MAGIC)
         self._stream.seek(self._header_position)
         self._put([encode_bag_header(BagHeader(0, 0, 0))])
@@ -355,7 +358,10 @@ class BagWriter:
         self._used = []
 
     def _make_room(self, stream: _Stream, length: int) -> None:
-        """Start a new chunk for the message, since the format has 32 bits for a chunk's size. Raise BagFormatError."""
+        """Start a new chunk if the message would exceed the format's 32-bit chunk size.
+
+        Raise BagFormatError if the message does not fit into an empty chunk either.
+        """
         if len(stream.record) + _OVERHEAD + length > self._limit:
             raise BagFormatError(
                 f"a message of {length} bytes on {stream.connection.topic} is too large: "
@@ -370,11 +376,11 @@ class BagWriter:
         if self._small:
             self._pieces.append(self._small)
             self._small = bytearray()
-        # Copy other types than bytes, since the caller may change them before they are written.
+        # Copy types other than bytes, because the caller may change them before they are written.
         self._pieces.append(body if type(body) is bytes else bytes(body))
 
     def _data(self, pieces: list[Buffer]) -> tuple[Callable[[], bool], Callable[[], list[Buffer]]]:
-        """Return two functions: whether the chunk's data is ready to be written, and one that waits for it and returns it."""
+        """Return a function that returns whether the chunk's data is ready, and one that waits for the data and returns it."""
         name = self._compression
         if name == NONE:
             return (lambda: True), (lambda: pieces)
@@ -417,6 +423,6 @@ class BagWriter:
         write = self._stream.write
         for piece in pieces:
             count = write(piece)
-            # An unbuffered stream may write only a part.
+            # An unbuffered stream may write only a part of the data.
             while count is not None and count < len(piece):
                 count += write(memoryview(piece)[count:])

@@ -1,1 +1,1 @@
-"""Pure tables of the computation graph: calls in, (answer, actions) out."""
+"""Pure tables of the computation graph: calls in, (response, actions) out."""

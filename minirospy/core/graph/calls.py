@@ -1,7 +1,8 @@
-"""Calls of the Master API and the Slave API: tables of methods and their parameters, and the dispatcher that checks them.
+"""Calls to the Master API and the Slave API: tables of methods and their parameters, and the dispatcher that checks them.
 
-Pure: a method's name and arguments in, ``[status code, text, value]`` out. Source: http://wiki.ros.org/ROS/Master_API,
-http://wiki.ros.org/ROS/Slave_API; the texts that refuse an argument are those of real rosmaster.
+Pure: a method's name and arguments in, ``[status code, message, value]`` out. Source:
+http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Slave_API; the error messages for invalid arguments are
+rosmaster's.
 """
 
 from __future__ import annotations
@@ -38,29 +39,29 @@ __all__ = [
     "uris",
 ]
 
-SUCCESS, FAILURE, ERROR = 1, 0, -1  # status codes of an answer
+SUCCESS, FAILURE, ERROR = 1, 0, -1  # status codes in a response
 
-Answer = list[object]  # ``[status code, text, value]``
+Answer = list[object]  # ``[status code, message, value]``
 
 _MAX_CHARACTERS = 4096  # maximum length of a name, a type or a URI
 
 _MAX_URIS = 20_000
-"""URIs per list; checking them takes some milliseconds, which block the node. No master has as many for a topic."""
+"""Maximum URIs per list; checking them takes some milliseconds, which block the node. No master has as many for a topic."""
 
 
 class CallRefused(MinirospyError):
-    """An argument is not acceptable; ``str()`` is the text of the answer."""
+    """An argument is not acceptable; ``str()`` is the message in the response."""
 
 
 class Parameter(NamedTuple):
-    """A parameter of a method: ``read(value, name, caller_id)`` returns the argument or raises CallRefused."""
+    """A method's parameter: ``read(value, name, caller_id)`` returns the argument or raises CallRefused."""
 
     name: str
     read: Callable[[object, str, str], object]
 
 
 class Method(NamedTuple):
-    """A method: the function to call with the caller_id and the arguments, and the value of an answer that refuses."""
+    """A method: the function to call with the caller_id and the arguments, and the value in a response that refuses the call."""
 
     function: Callable[..., Answer | Steps[Answer]]
     refused: object
@@ -69,7 +70,7 @@ class Method(NamedTuple):
 
 
 class Dispatcher:
-    """Checks the arguments of calls and calls the methods. An answer may be computed in steps."""
+    """Checks the arguments of calls and calls the methods. A response may be computed in steps."""
 
     def __init__(
         self,
@@ -77,12 +78,12 @@ class Dispatcher:
         *,
         refusals: tuple[type[Exception], ...] = (),
     ) -> None:
-        """Take ``refusals``, the exceptions that methods raise in addition to CallRefused."""
+        """Treat the exceptions in ``refusals`` like CallRefused if a method raises them."""
         self.methods = methods
         self._refusals: tuple[type[Exception], ...] = (CallRefused, *refusals)
 
     def dispatch(self, name: str, args: Sequence[object]) -> object:
-        """Return the answer to one call, or the steps that compute it. Raise RpcFault on an unknown method."""
+        """Return the response to one call, or the steps that compute it. Raise RpcFault if the method is unknown."""
         method = self.methods.get(name)
         if method is None:
             return self._dispatch_system(name, args)
@@ -120,7 +121,7 @@ class Dispatcher:
             return [ERROR, str(refusal), refused]
 
     def _dispatch_system(self, name: str, args: Sequence[object]) -> object:
-        """Call a standard method of XML-RPC servers: http://xmlrpc-c.sourceforge.net/introspection.html and multicall."""
+        """Call a standard XML-RPC server method: http://xmlrpc-c.sourceforge.net/introspection.html and multicall."""
         if name == "system.listMethods":
             return sorted(self.methods)
         if name == "system.multicall":
@@ -177,7 +178,7 @@ def text(value: object, name: str, caller_id: str) -> str:
 
 
 def global_name(value: object, name: str, caller_id: str) -> str:
-    """Return the name of a topic or a service, resolved for the caller."""
+    """Return a topic or service name, resolved relative to the caller."""
     resolved = node_name(value, name, caller_id)
     if resolved == "/":
         raise CallRefused(f"ERROR: parameter [{name}] cannot be the global namespace")
@@ -185,21 +186,21 @@ def global_name(value: object, name: str, caller_id: str) -> str:
 
 
 def node_name(value: object, name: str, caller_id: str) -> str:
-    """Return the name of a node, resolved for the caller."""
+    """Return a node name, resolved relative to the caller."""
     found = _short_text(value, name)
-    # rosmaster accepts many illegal names: many robots have topics with a dash.
+    # Accept most illegal names, as rosmaster does: many robots have topics with a dash.
     if ":" in found or " " in found or has_controls(found):
         raise CallRefused(f"ERROR: parameter [{name}] contains illegal chars")
     return _resolve(found, caller_id)
 
 
 def parameter_key(value: object, name: str, caller_id: str) -> str:
-    """Return the name of a parameter, resolved for the caller; rosmaster allows any characters."""
+    """Return a parameter name, resolved relative to the caller; like rosmaster, allow any characters."""
     return _resolve(plain_key(value, name, caller_id), caller_id)
 
 
 def plain_key(value: object, name: str, caller_id: str) -> str:
-    """Return the name of a parameter without resolving it."""
+    """Return a parameter name without resolving it."""
     if not isinstance(some(value, name, caller_id), str):
         raise CallRefused(f"ERROR: parameter [{name}] must be a string")
     return _short_text(value, name)
@@ -214,27 +215,27 @@ def type_name(value: object, name: str, caller_id: str) -> str:
 
 
 def api_uri(value: object, name: str, caller_id: str) -> str:
-    """Return the URI of a node's API or of a service."""
+    """Return the URI of a node's API or a service."""
     if not isinstance(value, str) or not value:
         raise CallRefused(f"ERROR: parameter [{name}] is not an XMLRPC URI")
     found = _short_text(value, name)
     if not found.startswith(("http://", "rosrpc://")):
         raise CallRefused(f"ERROR: parameter [{name}] is not an RPC URI")
     if " " in found or has_controls(found):
-        # It is used in requests to the node, and in log lines.
+        # Reject them, because the URI is used in requests to the node, and in log lines.
         raise CallRefused(f"ERROR: parameter [{name}] contains illegal chars")
     return found
 
 
 def subgraph(value: object, name: str, caller_id: str) -> str:
-    """Return a namespace, resolved for the caller; "" is the whole graph."""
+    """Return a namespace, resolved relative to the caller; "" is the whole graph."""
     if not isinstance(value, str):
         raise CallRefused(f"ERROR: parameter [{name}] must be a string")
     return names.resolve(_short_text(value, name), caller_id) if value else ""
 
 
 def global_key(value: object, name: str, caller_id: str) -> str:
-    """Return the global name of a parameter."""
+    """Return a parameter's global name."""
     found = text(value, name, caller_id)
     if found[0] != "/":
         raise CallRefused(f"ERROR: parameter [{name}] must be a globally referenced name")
@@ -271,5 +272,5 @@ def _resolve(name: str, caller_id: str) -> str:
 
 
 def parameters(**readers: Callable[[object, str, str], object]) -> tuple[Parameter, ...]:
-    """Return the parameters of a method, from names and their readers."""
+    """Return a method's parameters, from their names and readers."""
     return tuple(Parameter(name, read) for name, read in readers.items())

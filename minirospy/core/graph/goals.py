@@ -1,4 +1,4 @@
-"""The states of an action's goal, as tables: the transitions in the server, and those in a client on received statuses.
+"""The states of an action goal, as tables: the server's transitions, and a client's transitions on received statuses.
 
 In: a state and an event. Out: the next state, or the sequence of states, or None if the transition is invalid.
 Source: http://wiki.ros.org/actionlib/DetailedDescription, and actionlib itself for details missing on that page.
@@ -26,7 +26,7 @@ __all__ = [
 
 
 class GoalState(IntEnum):
-    """The status of a goal published by the server: the numbers of actionlib_msgs/GoalStatus."""
+    """A goal's status as the server publishes it, with the numbers in actionlib_msgs/GoalStatus."""
 
     PENDING = 0
     ACTIVE = 1
@@ -41,7 +41,7 @@ class GoalState(IntEnum):
 
 
 class ClientState(IntEnum):
-    """The state of a goal in the client: actionlib.CommState."""
+    """A goal's state in the client: actionlib.CommState."""
 
     WAITING_FOR_GOAL_ACK = 0
     PENDING = 1
@@ -55,7 +55,7 @@ class ClientState(IntEnum):
 
 
 class SimpleState(IntEnum):
-    """The state of a goal in the simple client: actionlib.SimpleGoalState."""
+    """A goal's state in the simple client: actionlib.SimpleGoalState."""
 
     PENDING = 0
     ACTIVE = 1
@@ -63,7 +63,7 @@ class SimpleState(IntEnum):
 
 
 class GoalEvent(Enum):
-    """A server's action on a goal, or a request for one. The value is a description of the resulting state, for messages."""
+    """A server's action on a goal, or a request for one. The value describes the resulting state, for messages."""
 
     ACCEPT = "an active state"
     CANCEL_REQUEST = "a cancel requested state"
@@ -74,7 +74,7 @@ class GoalEvent(Enum):
 
 
 class SimpleStep(Enum):
-    """The effect of a change of the client's state on the simple client."""
+    """The effect of a change in the client's state on the simple client."""
 
     NONE = "nothing"
     ACTIVATE = "the goal has become active"
@@ -92,7 +92,7 @@ TERMINAL = frozenset(
         GoalState.LOST,
     }
 )
-"""The final states of a goal."""
+"""A goal's final states."""
 
 _G = GoalState
 _C = ClientState
@@ -111,7 +111,7 @@ SERVER_STEPS: Mapping[GoalEvent, Mapping[int, GoalState]] = {
     GoalEvent.ABORT: {_G.PREEMPTING: _G.ABORTED, _G.ACTIVE: _G.ABORTED},
     GoalEvent.SUCCEED: {_G.PREEMPTING: _G.SUCCEEDED, _G.ACTIVE: _G.SUCCEEDED},
 }
-"""The server's transitions. In a state that is not listed for an event, the event is invalid and the state is kept."""
+"""The server's transitions. If a state is not listed for an event, the event is invalid and the state does not change."""
 
 _Steps = Mapping[int, tuple[ClientState, ...]]
 
@@ -153,7 +153,7 @@ CLIENT_STEPS: Mapping[int, _Steps] = {
         _G.ABORTED: _TO_RESULT,
         _G.PREEMPTING: (_C.PREEMPTING,),
     },
-    # A delayed status may be older than the result, whose status the client has already processed.
+    # Ignore an ACTIVE status: it may be delayed and older than the result, whose status was already processed.
     _C.WAITING_FOR_RESULT: {_G.ACTIVE: _STAYS, **_ENDED},
     _C.WAITING_FOR_CANCEL_ACK: {
         _G.PENDING: _STAYS,
@@ -185,7 +185,7 @@ CLIENT_STEPS: Mapping[int, _Steps] = {
 }
 """The client's transitions: the states that it passes through, in order, when it receives a goal's status.
 
-A client may miss a status, since each list replaces the previous one, so a status may lead through several states.
+A client may miss a status, because each list replaces the previous one, so a status may lead through several states.
 A status that is not listed is invalid in that state.
 """
 
@@ -207,15 +207,15 @@ SIMPLE_STEPS: Mapping[int, Mapping[int, SimpleStep]] = {
         _C.DONE: SimpleStep.WRONG,
     },
 }
-"""The simple client's transitions: its state, and the client's new state."""
+"""The simple client's transitions: its state -> the client's new state -> the effect."""
 
 _VISIBLE: Mapping[int, GoalState] = {_G.PREEMPTING: _G.ACTIVE, _G.RECALLING: _G.PENDING}
 
 
 def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
-    """Return the states that a client in ``state`` passes through on receiving ``status``; None if the status is invalid.
+    """Return the states that a client in ``state`` passes through on receiving ``status``, or None if the status is invalid.
 
-    Raise KeyError on a status that servers do not publish.
+    Raise KeyError if servers never publish the status.
     """
     if status not in CLIENT_STEPS[_C.WAITING_FOR_GOAL_ACK]:
         raise KeyError(status)
@@ -225,7 +225,7 @@ def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
 def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -> bool:
     """Return whether a cancel request applies to a goal: by id, by a stamp up to the request's, or to all (neither given).
 
-    Stamps are nanoseconds; zero means none.
+    Stamps are in nanoseconds; zero means none.
     """
     if not cancel_id and not cancel_stamp:
         return True
@@ -233,5 +233,5 @@ def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -
 
 
 def visible_state(status: int) -> int:
-    """Return the goal's status in the simple client: a goal being cancelled still counts as pending or active."""
+    """Return the goal's status as the simple client reports it: a goal being cancelled still counts as pending or active."""
     return int(_VISIBLE.get(status, status))

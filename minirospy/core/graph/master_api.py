@@ -1,8 +1,8 @@
-"""The Master API and the Parameter Server API: a table of methods, and the ``[status code, text, value]`` answers.
+"""The Master API and the Parameter Server API: a table of methods, and the ``[status code, message, value]`` responses.
 
-Pure: the effects of a call go through :meth:`MasterApi.notify` and :attr:`MasterApi.record`. A slow answer is computed
-in steps. Source: http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Parameter%20Server%20API; texts
-and corner cases are those of real rosmaster (tests/runtime/master/master_calls.py).
+Pure: a call's effects are passed to :meth:`MasterApi.notify` and :attr:`MasterApi.record`. A slow response is computed
+in steps. Source: http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Parameter%20Server%20API; messages
+and corner cases are rosmaster's (tests/runtime/master/master_calls.py).
 """
 
 from __future__ import annotations
@@ -50,20 +50,20 @@ _FEW = 200  # nodes to notify in one step
 
 _ROWS = 500  # rows of a table to collect in one step
 
-PARAMETERS = ""  # stands for parameters in :meth:`MasterApi.defer`; no topic has this name
+PARAMETERS = ""  # represents parameters in :meth:`MasterApi.defer`; no topic has this name
 
-# A message from the master to a node after a change.
+# A notification from the master to a node after a change.
 Notice = PublisherUpdate | NodeShutdown | ParameterUpdate
 
 
 class MasterApi(ABC):
-    """One method per call of the API; the XML-RPC server calls ``serve``."""
+    """One method per API call; the XML-RPC server calls ``serve``."""
 
     def __init__(self) -> None:
         self.registry = Registry()
         self.parameters = ParameterTree()
         self.log: Callable[[str], object] = nothing  # called with a line for each registration
-        self.record: Callable[..., object] = nothing  # called with each change, in the form for the journal
+        self.record: Callable[..., object] = nothing  # called with each change, as the journal stores it
         self.store: Callable[[object], Steps[int]] = _store_nothing
         """Writes a large value to the journal, and returns the number by which a change refers to it."""
 
@@ -117,10 +117,10 @@ class MasterApi(ABC):
 
     @abstractmethod
     def notify(self, action: Notice) -> None:
-        """Send the notice that a change of the tables requires."""
+        """Send the notification that a change in the tables requires."""
 
     def notify_in_steps(self, actions: Iterable[Notice]) -> Steps[None]:
-        """Send the notices that a change of the tables requires, which may be many."""
+        """Send the notifications, possibly many, that a change in the tables requires."""
         for number, action in enumerate(actions):
             self.notify(action)
             if number % _FEW == _FEW - 1:
@@ -128,7 +128,7 @@ class MasterApi(ABC):
 
     @abstractmethod
     def defer(self, uri: str, topic: str) -> None:
-        """Delay notices about a topic or PARAMETERS to a node that is receiving an answer about it now."""
+        """Delay notifications about a topic or PARAMETERS to a node that is receiving a response about it."""
 
     @abstractmethod
     def stop(self) -> None:
@@ -139,7 +139,7 @@ class MasterApi(ABC):
         """Return this master's status, for `minirospy master --status`; not part of ROS's API."""
 
     def dispatch(self, method: str, args: Sequence[object]) -> object:
-        """Return the answer to one call, or the steps that compute it. Raise RpcFault on an unknown method."""
+        """Return the response to one call, or the steps that compute it. Raise RpcFault if the method is unknown."""
         return self.dispatcher.dispatch(method, args)
 
     # --- about the master
@@ -176,9 +176,9 @@ class MasterApi(ABC):
         return finish(steps) if self.registry.is_small else steps
 
     def collect_system_state(self) -> Steps[Answer]:
-        """Return the answer to :meth:`get_system_state`, in steps."""
+        """Return the response to :meth:`get_system_state`, in steps."""
         if self.registry.is_large:
-            # One at a time, so that waiting clients do not each have a list in memory.
+            # Build one list at a time, so that there is not one in memory for each waiting client.
             yield ALONE
         publishers = yield from _collect(self.registry.publisher_rows())
         subscribers = yield from _collect(self.registry.subscriber_rows())
@@ -186,11 +186,11 @@ class MasterApi(ABC):
         return [SUCCESS, "current system state", [publishers, subscribers, services]]
 
     def get_topic_types(self, caller_id: str) -> Answer | Steps[Answer]:
-        """Return [topic, type] of each topic."""
+        """Return [topic, type] for each topic."""
         return self._answer_rows("current system state", self.registry.type_rows)
 
     def get_published_topics(self, caller_id: str, namespace: str) -> Answer | Steps[Answer]:
-        """Return [topic, type] of each published topic below a namespace."""
+        """Return [topic, type] for each published topic below a namespace."""
         return self._answer_rows("current topics", partial(self.registry.published_rows, namespace))
 
     def _answer_rows(
@@ -272,9 +272,10 @@ class MasterApi(ABC):
             return self._get(name)
 
         def get() -> Steps[Answer]:
-            # Count the items in a step, since this takes time.
+            # Count the items in a separate step, because this takes time.
             if not self.parameters.is_small_at(name):
-                # One at a time: a value that is being sent must be copied whenever another client changes it.
+                # Send one value at a time, because a value that is being sent must be copied whenever another client
+                # changes it.
                 yield ALONE
             return self._get(name)
 
@@ -297,7 +298,7 @@ class MasterApi(ABC):
         return self._run(steps, self.parameters.count_subscriptions())
 
     def _set_large(self, caller_id: str, name: str, value: object) -> Steps[Answer]:
-        # One at a time: a value is stored in the tree or freed before the next one is processed.
+        # Process one value at a time, so that each is stored in the tree or freed before the next one.
         yield ALONE
         weight = yield from _weigh(name, value)
         yield from self.parameters.make_room(weight)
@@ -339,7 +340,7 @@ class MasterApi(ABC):
         return self._run(delete(), self.parameters.count_subscriptions())
 
     def search_param(self, caller_id: str, key: str) -> Answer:
-        """Return the closest parameter of a name, upwards from the caller's namespace."""
+        """Search for a parameter from the caller's namespace upwards; return the name of the first match."""
         if key.startswith("~"):
             return [FAILURE, "Internal failure: invalid key", 0]
         if not caller_id.startswith("/"):
@@ -360,8 +361,8 @@ class MasterApi(ABC):
         return finish(collect()) if self.parameters.is_small else collect()
 
     def subscribe_param(self, caller_id: str, uri: str, name: str) -> Answer:
-        """Subscribe a node to a parameter's changes; return its present value."""
-        # First, so that a refusal because of a limit has no side effects.
+        """Subscribe a node to a parameter's changes; return its current value."""
+        # Subscribe first, so that a refusal because of a limit has no side effects.
         value = self.parameters.subscribe(name, caller_id, uri)
         try:
             actions = self.registry.register_parameter(caller_id, key_of_node(name), uri)
@@ -385,13 +386,14 @@ class MasterApi(ABC):
     # --- helpers
 
     def _run(self, steps: Steps[Answer], actions: int) -> Answer | Steps[Answer]:
-        """Return the answer immediately if it needs few actions, otherwise the steps that compute it."""
+        """Return the response immediately if it needs few actions, otherwise the steps that compute it."""
         return finish(steps) if actions <= _FEW else steps
 
     def _act_first(self, actions: Iterable[Notice]) -> Iterator[Notice]:
         """Perform the first action, and return the others.
 
-        The first one may stop a node whose name was taken over: its parameters are dropped before the change is recorded.
+        The first one may stop a node whose name was taken over; that node's parameters must be dropped before the change is
+        recorded.
         """
         others = iter(actions)
         for action in islice(others, 1):
@@ -411,7 +413,7 @@ class MasterApi(ABC):
 
 
 def _collect(rows: Iterator[tuple[object, ...]]) -> Steps[list[list[object]]]:
-    """Return the rows of a table as lists."""
+    """Return a table's rows as lists."""
     table: list[list[object]] = []
     while found := [list(row) for row in islice(rows, _ROWS)]:
         table += found
@@ -436,5 +438,5 @@ def nothing(*_: object) -> None:
 
 
 def key_of_node(key: str) -> str:
-    """Return a parameter's name in a node's table, which contains topics and services too."""
+    """Return the name to use for a parameter in a node's table, which also contains topics and services."""
     return key.rstrip("/") or "/"

@@ -1,7 +1,7 @@
 """The cache of parameters that a node has read: values and change notifications in, values out.
 
-Pure. A change only invalidates the affected values, and the next read queries the master. So updates that overtake each
-other do no harm, nor does the ambiguous empty dictionary, which means "deleted" as well as "empty".
+Pure. A change only invalidates the affected values, and the next read queries the master. Therefore updates may overtake
+each other, and an empty dictionary may mean both "deleted" and "empty".
 Source: http://wiki.ros.org/ROS/Slave_API, paramUpdate.
 """
 
@@ -21,7 +21,7 @@ NOT_SET: Final = _Missing.NOT_SET  # the value of a parameter that is not set; N
 
 
 class ParameterCache:
-    """Values by global name; the value NOT_SET means that the master has none.
+    """Values by global name; NOT_SET means that the parameter is not set in the master.
 
     If several threads call :meth:`store` and :meth:`changed`, the caller must use a lock.
     """
@@ -36,16 +36,16 @@ class ParameterCache:
         return self._changes
 
     def get(self, key: str) -> object:
-        """Return the value stored for ``key``, if it has not changed since. Raise LookupError."""
+        """Return the value stored for ``key``. Raise LookupError if there is none, or it has changed since it was stored."""
         return self._values[key]
 
     def store(self, key: str, value: object, changes: int) -> None:
-        """Store the master's answer, unless there was a change since the query."""
+        """Store the value that the master returned, unless there was a change since the query."""
         if changes == self._changes:
             self._values[key] = value
 
     def changed(self, key: str) -> None:
-        """Invalidate the values affected by a change of ``key``: itself, those below it, and the namespaces that contain it."""
+        """Invalidate the values that a change of ``key`` affects: itself, those below it, and the namespaces that contain it."""
         changed = _with_slash(key)
         self._changes += 1
         for known in list(self._values):

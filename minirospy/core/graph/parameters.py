@@ -1,7 +1,7 @@
 """The parameter server's tree, and the nodes to notify of a change.
 
 Pure: calls in, values and updates out. Keys are global names. Source:
-http://wiki.ros.org/ROS/Parameter%20Server%20API, and real rosmaster for details missing there.
+http://wiki.ros.org/ROS/Parameter%20Server%20API, and rosmaster for details missing there.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from minirospy.core.graph.shares import Excess, Shares, holder_of
 
 __all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 
-_MAX_DEPTH = 56  # nested namespaces and dictionaries; an answer around them must fit into XML-RPC's 64 levels
+# nested namespaces and dictionaries; together with the response, they must fit into XML-RPC's 64 levels
+_MAX_DEPTH = 56
 
 _MAX_INT = 2**31
 
 _STEP_ITEMS = 1000
-# Approximate sizes of a number, an empty list, and a dictionary or an entry of it
+# Approximate bytes for a number, an empty list, and a dictionary or an entry in it
 _ITEM_BYTES, _LIST_BYTES, _ENTRY_BYTES = 40, 70, 120
 
 MAX_BYTES = 96 * 1024 * 1024  # memory limit for all parameters together
@@ -32,7 +33,7 @@ MAX_BYTES = 96 * 1024 * 1024  # memory limit for all parameters together
 # Part of MAX_BYTES that is reserved for values of at most SMALL bytes
 RESERVE, SMALL = 16 * 1024 * 1024, 256 * 1024
 
-# Subscriptions to parameters, of all nodes and of one host and port
+# Maximum subscriptions to parameters: from all nodes, and from one host and port
 MAX_SUBSCRIPTIONS, MAX_OF_ONE = 20_000, 10_000
 
 # Part of MAX_SUBSCRIPTIONS that is reserved for hosts and ports with at most FEW subscriptions
@@ -68,27 +69,28 @@ class _Subscriber:
 class ParameterTree:
     """Parameters in namespaces, as nested dictionaries.
 
-    The result of :meth:`get` is never changed afterwards: it may be serialized in steps, while other clients set
-    parameters. So a dictionary that was returned is copied before it is changed.
+    The result of :meth:`get` never changes afterwards, so that it may be serialized in steps while other clients set
+    parameters: a dictionary that was returned is copied before it is changed.
     """
 
     def __init__(self, most: int = MAX_BYTES, reserve: int = RESERVE) -> None:
         self._root: dict[str, object] = {}
-        # The ids of the dictionaries that were not returned to any caller since their creation: these may be changed.
+        # The ids of the dictionaries that have not been returned to a caller since their creation: these may be
+        # changed.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
-        # The keys of subscriptions, sorted, so that those below a namespace are adjacent.
+        # The subscribed keys, sorted, so that those below a namespace are adjacent.
         self._keys: list[str] = []
         self._shares = Shares(MAX_SUBSCRIPTIONS, MAX_OF_ONE, FEW_RESERVE, FEW)
-        # URI of a node -> its keys, each with the number of node names that subscribed to it.
+        # A node's URI -> its keys, each with the number of node names that subscribed to it.
         self._keys_of: dict[str, dict[str, int]] = {}
         self._most = most
         self._reserve = reserve
-        # An upper bound of the memory that all values take.
+        # An upper bound for the memory that all values use.
         self._bytes = 0
 
     def get(self, key: str) -> object:
-        """Return the value, or the dictionary of a namespace. Raise KeyError."""
+        """Return the value, or the dictionary of a namespace. Raise KeyError if it is not set."""
         value = self._find(_split(key))
         if value is _UNSET:
             raise KeyError(key)
@@ -107,7 +109,7 @@ class ParameterTree:
 
     @property
     def is_large(self) -> bool:
-        """Return whether a list of all names takes so much memory that only one is built at a time."""
+        """Return whether a list of all names uses so much memory that only one should be built at a time."""
         return self._bytes > _MANY_BYTES
 
     def is_small_at(self, key: str, most: int = SMALL_ITEMS) -> bool:
@@ -115,14 +117,14 @@ class ParameterTree:
         return is_small(self._find(_split(key)), most)
 
     def has_room(self, weight: int) -> bool:
-        """Return whether there is certainly room for a value of ``weight`` bytes."""
+        """Return whether there is certainly enough memory for a value of ``weight`` bytes."""
         return self._bytes + weight <= self._most_for(weight)
 
     def _most_for(self, weight: int) -> int:
         return self._most if weight <= SMALL else self._most - self._reserve
 
     def make_room(self, weight: int) -> Steps[None]:
-        """Recount the memory, since replaced values are still counted. Raise ParametersFullError."""
+        """Recount the memory, because replaced values are still counted. Raise ParametersFullError if it does not suffice."""
         if not self.has_room(weight):
             before = self._bytes
             counted = yield from weigh_in_steps("/", self.get("/"))
@@ -131,10 +133,11 @@ class ParameterTree:
                 raise ParametersFullError(f"no more than {self._most_for(weight) // 1024**2} MiB in memory")
 
     def set(self, key: str, value: object, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
-        """Set a value that takes ``weight`` bytes; a dictionary replaces the namespace.
+        """Set a value of ``weight`` bytes; a dictionary replaces the namespace.
 
-        A value at the position of a required namespace is replaced by it. Raise ValueError if the root would not be a
-        dictionary.
+        If a parameter has the name of a namespace in ``key``, the namespace replaces it. Raise ValueError if the root
+        would not
+        be a dictionary.
         """
         path = _split(key)
         if path:
@@ -148,7 +151,7 @@ class ParameterTree:
         return self._updates(path, caller_id)
 
     def delete(self, key: str) -> Iterator[ParameterUpdate]:
-        """Delete a parameter or namespace. Raise KeyError, also for the root."""
+        """Delete a parameter or namespace. Raise KeyError if it is not set or is the root."""
         path = _split(key)
         if not path or self._find(path) is _UNSET:
             raise KeyError(key)
@@ -156,9 +159,9 @@ class ParameterTree:
         return self._updates(path)
 
     def search(self, namespace: str, key: str) -> str | None:
-        """Return the name of the closest parameter ``key``, upwards from ``namespace``; None if there is none.
+        """Search for ``key`` from ``namespace`` upwards; return the name of the first match, or None.
 
-        Only the first part of ``key`` has to exist, as the API demands: a node may search for a namespace
+        Only the first part of ``key`` must exist, as the API requires: a node may search for a namespace
         whose parameters are set later.
         """
         if key.startswith("/"):
@@ -182,8 +185,8 @@ class ParameterTree:
         left = _STEP_ITEMS
         root = self.get("/")
         assert isinstance(root, dict)
-        # The namespaces around the present one. This is not a recursive function, since such a closure is in a
-        # reference cycle with its list, and the master's garbage collector does not examine old objects.
+        # The namespaces that contain the current item. This is not a recursive function, because such a closure is in
+        # a reference cycle with its list, and the master's garbage collector does not examine old objects.
         around: list[tuple[str, Iterator[tuple[str, object]]]] = [("/", iter(root.items()))]
 
         while around:
@@ -204,7 +207,7 @@ class ParameterTree:
     def subscribe(self, key: str, caller_id: str, uri: str) -> object:
         """Notify the node at ``uri`` of changes at, below or above ``key``; return its value, {} if it is not set.
 
-        Raise ParametersFullError.
+        Raise ParametersFullError if there are too many subscriptions.
         """
         full = _with_slash(_split(key))
         subscriber = _Subscriber(caller_id, uri)
@@ -228,7 +231,7 @@ class ParameterTree:
         return True
 
     def unsubscribe_node(self, caller_id: str, uri: str) -> None:
-        """Remove all subscriptions of a node."""
+        """Remove all of a node's subscriptions."""
         gone = _Subscriber(caller_id, uri)
         for key in self.subscribed_keys(uri):
             if gone in self._subscribers[key]:
@@ -243,7 +246,7 @@ class ParameterTree:
         return list(self._keys_of.get(uri, ()))
 
     def subscriptions(self) -> Iterator[tuple[str, str, str]]:
-        """Yield (node, URI, key) of each subscription; keys end in a slash."""
+        """Yield (node, URI, key) for each subscription; keys end in a slash."""
         return (
             (s.caller_id, s.uri, key) for key, subscribers in self._subscribers.items() for s in subscribers
         )
@@ -270,7 +273,7 @@ class ParameterTree:
         return value
 
     def _enter(self, path: list[str]) -> dict[str, object]:
-        """Return the dictionary at ``path``, created if it does not exist, in a form that may be changed."""
+        """Return a modifiable dictionary at ``path``, creating it if it does not exist."""
         table = self._root = self._owned(self._root)
         for name in path:
             inner = table.get(name)
@@ -299,21 +302,21 @@ class ParameterTree:
             del self._keys[bisect_left(self._keys, key)]
 
     def _updates(self, path: list[str], setter: str | None = None) -> Iterator[ParameterUpdate]:
-        """Yield the updates that a change requires one by one, since there may be many."""
+        """Yield the updates that a change requires, one by one, because there may be many."""
         changed = _with_slash(path)
         for length in range(len(path) + 1):
-            # The node that set it knows the value.
+            # Skip the node that set the value, because it has the value already.
             for each in list(self._subscribers.get(_with_slash(path[:length]), ())):
                 if each.caller_id != setter:
                     yield ParameterUpdate(each.uri, changed)
 
-        # The node that set the namespace is notified too: its cached value of a parameter inside is outdated.
+        # Notify the node that set the namespace too: its cached value for a parameter inside is outdated.
         at = bisect_right(self._keys, changed)
         while at < len(self._keys) and self._keys[at].startswith(changed):
             key = self._keys[at]
             for each in list(self._subscribers[key]):
                 yield ParameterUpdate(each.uri, key)
-            # The subscriptions may have changed meanwhile.
+            # The subscriptions may have changed while the caller processed the update.
             at = bisect_right(self._keys, key)
 
 
@@ -321,16 +324,16 @@ _UNSET = object()
 
 
 def weigh_in_steps(key: str, value: object) -> Steps[int]:
-    """Return approximately how many bytes of memory a value takes.
+    """Return approximately how many bytes of memory a value uses.
 
-    Raise ValueError if no answer could contain it: it would make the namespaces above ``key`` unreadable.
+    Raise ValueError if no response could contain the value: it would make the namespaces above ``key`` unreadable.
     """
     if not _split(key) and not isinstance(value, dict):
         raise ValueError("cannot set root of parameter tree to non-dictionary")
-    # The namespaces around the value, which may not exist yet.
+    # Include the namespaces that contain the value, because they may not exist yet.
     weight = sum(sys.getsizeof(name) + 2 * _ENTRY_BYTES for name in _split(key)[:-1])
     left = _STEP_ITEMS
-    # The containers around the present item: the depth of their items, and the remaining ones.
+    # The containers of the current item: the depth of their items, and the remaining items.
     around: list[tuple[int, Iterator[Any]]] = [(len(_split(key)), iter((value,)))]
     while around:
         depth, items = around[-1]

@@ -1,6 +1,6 @@
-"""The master's registry: the publishers, subscribers and services of each node.
+"""The master's registry: each node's publishers, subscribers and services.
 
-Pure: calls in, (answer, actions) out. Names are global. Source: http://wiki.ros.org/ROS/Master_API, and real
+Pure: calls in, (response, actions) out. Names are global. Source: http://wiki.ros.org/ROS/Master_API, and
 rosmaster for details missing there.
 """
 
@@ -32,14 +32,14 @@ _FEW_BYTES, _MANY_BYTES = 50_000, 2_000_000
 
 
 class PublisherUpdate(NamedTuple):
-    """Send the subscriber at ``uri`` the complete list of a topic's publishers at the time of sending."""
+    """Send the subscriber at ``uri`` the complete list of a topic's publishers, as it is at the time of sending."""
 
     uri: str
     topic: str
 
 
 class NodeShutdown(NamedTuple):
-    """Stop the node at ``uri``, since another node has taken its name."""
+    """Stop the node at ``uri``, because another node has registered with its name."""
 
     uri: str
     name: str
@@ -88,14 +88,14 @@ class _Service(NamedTuple):
 
 
 class Registry:
-    """The publishers, subscribers and services of a graph. Tables keep the order of registration.
+    """The publishers, subscribers and services in a graph. Tables preserve the order of registration.
 
-    Actions are yielded one by one, on demand, since there may be many.
+    Actions are yielded one by one, on demand, because there may be many.
     """
 
     def __init__(self, shares: Shares | None = None) -> None:
-        """Take ``shares``, the bytes that the nodes of each host and port may use."""
-        self.changes = 0  # grows whenever publishers, subscribers or services may have changed
+        """Create an empty registry; ``shares`` limits the bytes that the nodes on each host and port may use."""
+        self.changes = 0  # increases whenever publishers, subscribers or services may have changed
         self._shares = shares or registry_limits.new_shares()
         self._nodes: dict[str, _NodeEntry] = {}
         self._publishers: dict[str, dict[str, str]] = {}
@@ -127,7 +127,7 @@ class Registry:
         return self._updates(topic)
 
     def register_subscriber(self, node: str, topic: str, type_: str, uri: str) -> Registered:
-        """Register ``node`` as a subscriber of ``topic``; type "*" matches any type and does not become the topic's."""
+        """Register ``node`` as a subscriber to ``topic``; type "*" matches any type and does not become the topic's type."""
         actions = self._claim(node, uri, topic, SUBSCRIBES, type_)
         entry = self._enter(node, topic, SUBSCRIBES)
         _row(self._subscribers, topic)[entry.name] = entry.uri
@@ -144,7 +144,7 @@ class Registry:
         return True
 
     def register_service(self, node: str, service: str, service_uri: str, uri: str) -> Iterable[Action]:
-        """Register ``service`` of ``node`` at ``service_uri``; it replaces an earlier provider."""
+        """Register the service ``service`` of ``node`` at ``service_uri``; it replaces the previous provider."""
         actions = self._claim(node, uri, service, SERVES, service_uri)
         before = self._services.get(service)
         if before:
@@ -157,7 +157,7 @@ class Registry:
         return actions
 
     def unregister_service(self, node: str, service: str, service_uri: str) -> bool:
-        """Unregister ``service`` of ``node``; return whether it was offered at ``service_uri``."""
+        """Unregister the service ``service`` of ``node``; return whether it was offered at ``service_uri``."""
         if self._services.get(service) != _Service(node, service_uri):
             return False
         del self._services[service]
@@ -178,7 +178,7 @@ class Registry:
             self._leave(node, key, PARAMETER)
 
     def forget(self, node: str, uri: str) -> Iterable[Action]:
-        """Remove all registrations of ``node`` from ``uri``, since it is gone."""
+        """Remove all registrations that ``node`` made from ``uri``, because the node no longer exists."""
         entry = self._nodes.get(node)
         if entry is None or entry.uri != uri:
             return ()
@@ -186,7 +186,7 @@ class Registry:
         return self._updates(*published)
 
     def set_type(self, topic: str, type_: str) -> None:
-        """Set the type of a topic that has no registrations now."""
+        """Set the type of a topic that has no registrations at present."""
         self._types.keep(topic, type_)
 
     # --- queries
@@ -198,12 +198,12 @@ class Registry:
 
     @property
     def is_large(self) -> bool:
-        """Return whether a list of all registrations takes so much memory that only one is built at a time."""
+        """Return whether a list of all registrations uses so much memory that only one should be built at a time."""
         return self._shares.total > _MANY_BYTES
 
     @property
     def is_crowded(self) -> bool:
-        """Return whether only the reserve for nodes with few registrations is left."""
+        """Return whether only the memory reserved for nodes with few registrations is left."""
         return self._shares.total > self._shares.shared * 7 // 8
 
     def node_uri(self, node: str) -> str | None:
@@ -216,7 +216,7 @@ class Registry:
         return {name: entry.uri for name, entry in self._nodes.items()}
 
     def service_uri(self, service: str) -> str | None:
-        """Return the URI of a service."""
+        """Return a service's URI."""
         entry = self._services.get(service)
         return entry.uri if entry else None
 
@@ -234,11 +234,11 @@ class Registry:
         return entry.names(SUBSCRIBES) if entry else []
 
     def topic_types(self) -> dict[str, str]:
-        """Return the type of each topic that was ever registered with a type."""
+        """Return the type of each topic that has ever been registered with a type."""
         return dict(self.type_rows())
 
     def published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:
-        """Return (topic, type) of each published topic below the namespace ``subgraph``."""
+        """Return (topic, type) for each published topic below the namespace ``subgraph``."""
         return list(self.published_rows(subgraph))
 
     def publishers(self) -> dict[str, list[str]]:
@@ -254,11 +254,11 @@ class Registry:
         return dict(self.service_rows())
 
     def type_rows(self) -> Iterator[tuple[str, str]]:
-        """Yield the items of :meth:`topic_types`. The table may change meanwhile."""
+        """Yield the items of :meth:`topic_types`. The table may change during the iteration."""
         return self._types.rows()
 
     def published_rows(self, subgraph: str = "") -> Iterator[tuple[str, str]]:
-        """Yield the items of :meth:`published_topics`. The table may change meanwhile."""
+        """Yield the items of :meth:`published_topics`. The table may change during the iteration."""
         prefix = subgraph if not subgraph or subgraph.endswith("/") else subgraph + "/"
         return (
             (topic, self._types[topic])
@@ -267,15 +267,15 @@ class Registry:
         )
 
     def publisher_rows(self) -> Iterator[tuple[str, list[str]]]:
-        """Yield each topic and the nodes that publish it. The table may change meanwhile."""
+        """Yield each topic and the nodes that publish it. The table may change during the iteration."""
         return _rows(self._publishers)
 
     def subscriber_rows(self) -> Iterator[tuple[str, list[str]]]:
-        """Yield each topic and the nodes that subscribe to it. The table may change meanwhile."""
+        """Yield each topic and the nodes that subscribe to it. The table may change during the iteration."""
         return _rows(self._subscribers)
 
     def service_rows(self) -> Iterator[tuple[str, list[str]]]:
-        """Yield each service and the node that offers it, in a list. The table may change meanwhile."""
+        """Yield each service and the node that offers it, in a list. The table may change during the iteration."""
         return ((service, [entry.node]) for service, entry in list(self._services.items()))
 
     def count_topics(self) -> int:
@@ -287,23 +287,24 @@ class Registry:
         return len(self._services)
 
     def publications(self) -> Iterator[tuple[str, str]]:
-        """Yield (node, topic) of each publication, in the order of the tables, which may change meanwhile."""
+        """Yield (node, topic) for each publication, in table order. The tables may change during the iteration."""
         return _pairs(self._publishers)
 
     def all_subscriptions(self) -> Iterator[tuple[str, str]]:
-        """Yield (node, topic) of each subscription. The table may change meanwhile."""
+        """Yield (node, topic) for each subscription. The table may change during the iteration."""
         return _pairs(self._subscribers)
 
     def offers(self) -> Iterator[tuple[str, str, str]]:
-        """Yield (node, service, URI) of each service."""
+        """Yield (node, service, URI) for each service."""
         return ((entry.node, service, entry.uri) for service, entry in self._services.items())
 
     # --- helpers
 
     def _claim(self, node: str, uri: str, name: str, kind: int, text: str = "") -> Iterable[Action]:
-        """Record that ``node`` at ``uri`` registers ``name`` with a type or a service's URI.
+        """Record that ``node`` at ``uri`` registers ``name`` with a type or a service URI.
 
-        Registrations of the same node name at another address are removed and that node is stopped. Raise RegistryFullError.
+        If the node name is registered from another address, remove those registrations and stop that node. Raise
+        RegistryFullError if a limit is exceeded.
         """
         entry = self._nodes.get(node)
         is_new = entry is None or entry.uri != uri
@@ -330,7 +331,7 @@ class Registry:
         return chain((shutdown,), self._updates(*published))
 
     def _cost_of_text(self, name: str, kind: int, text: str) -> int:
-        """Return the bytes for a type or a service's URI, minus those of the one that it replaces."""
+        """Return the bytes for a type or service URI, minus those of the one that it replaces."""
         if kind == SERVES:
             service = self._services.get(name)
             return text_cost(text) - (text_cost(service.uri) if service else 0)
@@ -389,7 +390,7 @@ class Registry:
             self._types.leave(topic, entry.name, others)
 
     def _updates(self, *topics: str) -> Iterator[Action]:
-        """Yield an update for each subscriber of the topics, as they are at the time of yielding."""
+        """Yield an update for each subscriber to the topics, with the publishers at the time of yielding."""
         for topic in topics:
             for uri in list(self._subscribers.get(topic, {}).values()):
                 yield PublisherUpdate(uri, topic)
@@ -413,6 +414,6 @@ def _remove(table: dict[str, dict[str, str]], topic: str, node: str) -> None:
 
 
 def _pairs(table: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
-    # This is the fastest copy of many small tables; rewriting a journal starts with it.
+    # This is the fastest way to copy many small tables; every rewrite of a journal starts with such a copy.
     rows = list(zip(table, map(tuple, table.values()), strict=True))
     return ((node, topic) for topic, nodes in rows for node in nodes)

@@ -1,6 +1,6 @@
-"""The limits of the registry: the memory that registrations take, and the share for the nodes of one host and port.
+"""The registry's limits: the memory that registrations use, and the share for the nodes on one host and port.
 
-Pure. Sizes are those of CPython on 64 bits: a registered name is in up to four tables.
+Pure. Sizes are those in 64-bit CPython: a registered name is in up to four tables.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _MIB = 1024 * 1024
 
 MAX_BYTES = 64 * _MIB  # memory limit for all registrations together: about 60,000 nodes with one topic each
 
-MAX_OF_ONE = 32 * _MIB  # memory limit for the registrations of one host and port
+MAX_OF_ONE = 32 * _MIB  # memory limit for the registrations from one host and port
 
 RESERVE = 16 * _MIB
-"""Part of MAX_BYTES that is reserved for hosts and ports with at most FEW_OF_ONE, some 300 topics and services."""
+"""Part of MAX_BYTES that is reserved for hosts and ports that use at most FEW_OF_ONE, some 300 topics and services."""
 
 FEW_OF_ONE = _MIB // 4
 
@@ -37,9 +37,10 @@ MAX_ENTRIES = 10_000  # topics, services and parameters per node
 # Approximate sizes of a node and of each name that it registers, without their strings
 _NODE_BYTES, _NAME_BYTES = 400, 150
 
-PUBLISHES, SUBSCRIBES, SERVES, PARAMETER = 1, 2, 4, 8  # kinds of registration of a name, as bits
+PUBLISHES, SUBSCRIBES, SERVES, PARAMETER = 1, 2, 4, 8  # kinds of registration for a name, as bits
 
-_KIND_BYTES = {PUBLISHES: 200, SUBSCRIBES: 200, SERVES: 200, PARAMETER: 400}  # size of each kind
+# bytes per registration of each kind
+_KIND_BYTES = {PUBLISHES: 200, SUBSCRIBES: 200, SERVES: 200, PARAMETER: 400}
 
 
 class RegistryFullError(MinirospyError):
@@ -54,12 +55,12 @@ class RegistryFullError(MinirospyError):
 
 
 def new_shares() -> Shares:
-    """Return the shares of registration memory for each host and port, none of them in use."""
+    """Return the shares of registration memory for each host and port, with none of the memory in use."""
     return Shares(MAX_BYTES, MAX_OF_ONE, RESERVE, FEW_OF_ONE)
 
 
 def describe(excess: Excess, shares: Shares) -> str:
-    """Return a description of a limit."""
+    """Return a description of the limit that was exceeded."""
     match excess:
         case Excess.ALL:
             return f"{shares.most // _MIB} MiB for all registrations"
@@ -70,15 +71,15 @@ def describe(excess: Excess, shares: Shares) -> str:
 
 
 def text_cost(text: str) -> int:
-    """Return the bytes that a string takes.
+    """Return the bytes of memory that a string uses.
 
-    sys.getsizeof would be inexact: Python caches a string's UTF-8 form once it is needed, such as for the journal.
+    sys.getsizeof would be inexact: Python caches a string's UTF-8 encoding once it is needed, for example for the journal.
     """
     return 50 + len(text) if text.isascii() else 80 + 8 * len(text)
 
 
 def node_cost(name: str, uri: str) -> int:
-    """Return the bytes that a node takes."""
+    """Return the bytes of memory that a node uses."""
     return _NODE_BYTES + text_cost(name) + text_cost(uri)
 
 
@@ -87,6 +88,6 @@ def name_cost(name: str, kind: int, kinds: int) -> int:
     if kinds & kind:
         return 0
     text = text_cost(name)
-    # The parameter server has its own copy of the name.
+    # Count the name again, because the parameter server has its own copy of it.
     size = _KIND_BYTES[kind] + (text if kind == PARAMETER else 0)
     return size if kinds else size + _NAME_BYTES + text

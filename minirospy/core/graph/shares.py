@@ -1,7 +1,7 @@
-"""Fair shares of a resource of the master, such as memory, among its clients.
+"""Fair shares of one of the master's resources, such as memory, among its clients.
 
-Pure. ROS 1 has no users, and on loopback all clients have the same address. So a holder is the host and port of a
-node's Slave API, which differ for each process.
+Pure. ROS 1 has no users, and on loopback all clients have the same address. Therefore a holder is identified by the host
+and port of a node's Slave API, which differ for each process.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ class Excess(Enum):
 
 
 class Shares:
-    """The share of each holder in a limited resource, such as bytes or entries.
+    """Each holder's share in a limited resource, such as bytes or entries.
 
-    One holder gets at most ``largest`` of ``most``. The last ``reserve`` is kept for holders with at most ``small``,
-    so these always find room.
+    One holder gets at most ``largest`` out of ``most``. The last ``reserve`` is only for holders with at most ``small``,
+    so that they can always get more.
     """
 
     def __init__(self, most: int, largest: int, reserve: int, small: int) -> None:
@@ -31,11 +31,11 @@ class Shares:
         self.most = most
         self.largest = largest
         self.small = small
-        self.shared = most - reserve  # limit for all holders of more than ``small`` together
+        self.shared = most - reserve  # limit for the total of all holders that have more than ``small``
         self._held: dict[str, int] = {}
 
     def excess(self, holder: str, more: int) -> Excess | None:
-        """Return the limit that prevents a holder from getting ``more``, or None."""
+        """Return the limit that prevents a holder from getting ``more``, or None if there is none."""
         held, total = self._held.get(holder, 0) + more, self.total + more
         if total > self.most:
             return Excess.ALL
@@ -46,7 +46,7 @@ class Shares:
         return None
 
     def add(self, holder: str, more: int) -> None:
-        """Count an amount that a holder gets, or returns (if negative)."""
+        """Add the amount ``more`` to a holder's share, or remove it if negative."""
         self.total += more
         held = self._held.get(holder, 0) + more
         if held:

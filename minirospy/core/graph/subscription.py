@@ -1,4 +1,4 @@
-"""The connection plan of one subscribed topic: which publishers to connect or disconnect, and when to retry.
+"""The connection plan for one subscribed topic: which publishers to connect or disconnect, and when to retry.
 
 Pure: events in, actions out.
 """
@@ -11,9 +11,9 @@ from itertools import count, islice
 
 __all__ = ["MAX_PUBLISHERS", "Connect", "Disconnect", "SubscriptionPlan"]
 
-MAX_PUBLISHERS = 1000  # publishers of one topic that a node connects to
+MAX_PUBLISHERS = 1000  # maximum publishers of one topic that a node connects to
 
-# New publishers to connect together, and the seconds between groups, so that not all refusals come together
+# New publishers to connect to together, and the seconds between groups, so that not all refusals arrive at once
 _CONNECTS_AT_ONCE, _CONNECT_PAUSE = 100, 0.01
 
 _FIRST_DELAY = 0.1
@@ -22,7 +22,7 @@ _MAX_DELAY = 8.0
 
 @dataclass(frozen=True)
 class Connect:
-    """Connect to the publisher at ``uri`` (its Slave API) after ``delay`` seconds."""
+    """Connect to the publisher whose Slave API is at ``uri`` after ``delay`` seconds."""
 
     uri: str
     delay: float = 0.0
@@ -36,21 +36,22 @@ class Disconnect:
 
 
 class SubscriptionPlan:
-    """The publishers in the master's list, and the number of failures of each.
+    """The publishers in the master's list, and each one's number of failures.
 
     A link that closes while the master still lists its publisher is retried, with pauses that double: the master reports
-    unregistered publishers, but not broken cables. A publisher that refused is called again at the next update of the
-    topic, since it may publish another type by then.
+    unregistered publishers, but not broken cables. A publisher that refused is called again at the topic's next
+    update, because it may publish another type by then.
     """
 
     def __init__(self) -> None:
-        self._failures: dict[str, int] = {}  # keys are the URIs of the master's last list, in its order
+        # keys are the URIs in the master's last list, in the same order
+        self._failures: dict[str, int] = {}
         self._refusals: set[str] = set()
 
     def publishers_changed(self, uris: Iterable[str], *, keep: bool = False) -> list[Connect | Disconnect]:
-        """Apply the master's list: the complete one, or with ``keep`` one that lacks some existing publishers.
+        """Apply the master's list: the complete list, or with ``keep`` one that lacks some existing publishers.
 
-        Publishers beyond MAX_PUBLISHERS are ignored, since any process may send a list.
+        Publishers beyond MAX_PUBLISHERS are ignored, because any process may send a list.
         """
         wanted = dict.fromkeys(islice(uris, MAX_PUBLISHERS))
         if keep:
@@ -63,21 +64,21 @@ class SubscriptionPlan:
         return [*map(Disconnect, gone), *map(Connect, new, delays)]
 
     def failures(self, uri: str) -> int:
-        """Return the number of consecutive failures of the link to ``uri``."""
+        """Return how often the link to ``uri`` has failed in a row."""
         return self._failures.get(uri, 0)
 
     def worked(self, uri: str) -> None:
-        """Record that the link to ``uri`` works: its next failure counts as the first."""
+        """Record that the link to ``uri`` works, so that its next failure counts as the first."""
         if uri in self._failures:
             self._failures[uri] = 0
 
     def refused(self, uri: str) -> None:
-        """Record that the publisher at ``uri`` refuses this subscriber; a retry would get the same answer."""
+        """Record that the publisher at ``uri`` refuses this subscriber, so that it is not retried with the same result."""
         if uri in self._failures:
             self._refusals.add(uri)
 
     def lost(self, uri: str) -> Connect | None:
-        """Return the next attempt at ``uri``, whose link failed or closed; None if its publisher has left."""
+        """Return the next attempt to connect to ``uri`` after its link has closed, or None if it is no longer listed."""
         if uri not in self._failures:
             return None
         failures = self._failures[uri]

@@ -1,6 +1,6 @@
 """The types of topics: of registered topics and, as in rosmaster, of some that are no longer registered.
 
-Pure. The memory of a type in use is counted for one of the nodes that register its topic.
+Pure. The memory for a type in use is counted for one of the nodes that register its topic.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from minirospy.core.graph.registry_limits import text_cost
 
 __all__ = ["TopicTypes"]
 
-_MAX_OLD = 10_000  # unregistered topics whose types are kept
+_MAX_OLD = 10_000  # maximum unregistered topics whose types are stored
 _MAX_OLD_BYTES = 4 * 1024 * 1024  # memory limit for these types
 
 _TYPE_BYTES = 100  # approximate size of a type without its string
@@ -21,7 +21,7 @@ _TYPE_BYTES = 100  # approximate size of a type without its string
 
 class _Type(NamedTuple):
     text: str
-    node: str  # the node for which it is counted; "" if no node registers the topic
+    node: str  # the node for which the type is counted; "" if no node registers the topic
 
 
 class TopicTypes:
@@ -33,7 +33,7 @@ class TopicTypes:
     def __init__(self, count: Callable[[str, int], object]) -> None:
         self._count = count
         self._types: dict[str, _Type] = {}
-        # The unregistered topics, the latest last, and the bytes of their types.
+        # The unregistered topics, the latest last, and the bytes that their types use.
         self._old: dict[str, None] = {}
         self._old_bytes = 0
 
@@ -49,11 +49,11 @@ class TopicTypes:
         return type_ is not None and type_.node == node
 
     def rows(self) -> Iterator[tuple[str, str]]:
-        """Yield each topic and its type. The table may change meanwhile."""
+        """Yield each topic and its type. The table may change during the iteration."""
         return iter([(topic, type_.text) for topic, type_ in self._types.items()])
 
     def cost(self, topic: str, type_: str) -> int:
-        """Return the bytes for a type minus those of the one that it replaces, for a node that registers the topic."""
+        """Return the bytes for a type, minus those of the type that it replaces, for a node that registers the topic."""
         before = self._types.get(topic)
         if before and before.node:
             return max(0, text_cost(type_) - text_cost(before.text))
@@ -72,13 +72,13 @@ class TopicTypes:
         self._count(node, _size_of(type_))
 
     def add(self, topic: str, type_: str, node: str) -> None:
-        """Set a topic's type unless it is known."""
+        """Set a topic's type, unless it has one."""
         before = self._types.get(topic)
         if not (before and before.node):
             self.set(topic, before.text if before else type_, node)
 
     def keep(self, topic: str, type_: str) -> None:
-        """Keep the type of a topic that is no longer registered, as the most recent of the kept ones."""
+        """Store the type of a topic that is no longer registered, as the most recent of those."""
         before = self._types.get(topic)
         if before and before.node:
             return
@@ -96,7 +96,7 @@ class TopicTypes:
             self._remove_old(oldest, self._types.pop(oldest).text)
 
     def leave(self, topic: str, node: str, others: Iterable[str]) -> None:
-        """Count a type for one of the ``others`` that register the topic, once ``node`` has unregistered it."""
+        """Count a topic's type for one of the ``others`` that register the topic, after ``node`` has unregistered it."""
         heir = next(iter(others), "")
         if heir == node or not self.is_counted_for(topic, node):
             return

@@ -1,6 +1,6 @@
-"""Convert a message's arrays of numbers to numpy arrays.
+"""Convert a message's number arrays to numpy arrays.
 
-An array of received bytes becomes a numpy array without creating Python numbers, read-only like genpy's.
+Received array bytes become a numpy array without creating Python numbers; like genpy's, it is read-only.
 Arrays of uint8 and char remain bytes. numpy is imported only when a message needs it.
 Source: http://wiki.ros.org/rospy_tutorials/Tutorials/numpy.
 """
@@ -27,7 +27,7 @@ _KEPT = {"uint8", "char", "string", "time", "duration"}
 
 
 def arrays_from_bytes(message: Message, numpy: ModuleType) -> Message:
-    """Convert the arrays of numbers in a just deserialized message to numpy arrays; return the message."""
+    """Convert the number arrays in a message that was just deserialized to numpy arrays; return the message."""
     raw = getattr(message, "_raw", {})
 
     for name, base, is_array in _fields(_class_of(message)):
@@ -36,11 +36,11 @@ def arrays_from_bytes(message: Message, numpy: ModuleType) -> Message:
             value = getattr(message, name)
             for inner in value if is_array else (value,):
                 if _is_plain(inner):
-                    # The other elements have the same type.
+                    # The other elements have the same type, so they need not be checked.
                     break
                 arrays_from_bytes(inner, numpy)
         elif name in raw:
-            # ROS's byte order is little-endian, on every machine.
+            # ROS's byte order is little-endian on every machine.
             setattr(message, name, numpy.frombuffer(raw[name], numpy.dtype(dtype).newbyteorder("<")))
         else:
             values = numpy.array(getattr(message, name), dtype)
@@ -58,7 +58,7 @@ class _Field(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def _fields(message_class: type[Message]) -> tuple[_Field, ...]:
-    """Return the fields of a class that are arrays of numbers, or messages."""
+    """Return the fields of a class that are number arrays, or messages."""
     found = []
     for name, type_ in zip(message_class.__slots__, message_class._slot_types, strict=True):
         base, array, _ = type_.partition("[")
@@ -68,7 +68,7 @@ def _fields(message_class: type[Message]) -> tuple[_Field, ...]:
 
 
 def _is_plain(message: Message) -> bool:
-    """Return whether no message of this type can contain an array of numbers."""
+    """Return whether messages of this type can never contain a number array."""
     return all(
         field.base not in _DTYPES and not field.is_array and _is_plain(getattr(message, field.name))
         for field in _fields(_class_of(message))

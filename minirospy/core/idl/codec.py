@@ -1,9 +1,9 @@
 """Generate a message's ``serialize`` and ``deserialize`` as straight-line Python code.
 
-The fields are in the order of the bytes, with nested messages expanded. Consecutive values of fixed size, and the
-length of the following field, share one compiled ``struct``; an array of messages of fixed size
+The fields are in byte order, with nested messages expanded. Consecutive fixed-size values, and the
+length of the following field, share one compiled ``struct``; an array of fixed-size messages
 is one ``iter_unpack``. Reading never goes beyond the data: ``struct`` raises, a slice that is too short is detected
-at the end, and the count of elements that consist of slices, or of no bytes, is checked before the loop.
+at the end, and the number of elements that consist of slices, or of no bytes, is checked before the loop.
 """
 
 from __future__ import annotations
@@ -19,53 +19,53 @@ from minirospy.core.idl.spec import PRIMITIVES, Field, FieldType, MessageSpec
 __all__ = ["keeps_buffer", "lazy_arrays", "write_deserialize", "write_serialize"]
 
 _BYTES = {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8}
-_SPARE = 10_000  # elements that take no bytes, in addition to one for each byte of the message
+_SPARE = 10_000  # maximum elements without bytes, in addition to one per byte in the message
 _TIMES = {"time": "_Time", "duration": "_Duration"}
 
 
 class _Leaf(NamedTuple):
-    """A field in the order of the bytes; ``path`` is the Python expression that it is read from or assigned to."""
+    """A field; fields are in the order of their bytes. ``path`` is the Python expression that it is read from or assigned to."""
 
     path: str
     type: FieldType
 
     @property
     def letters(self) -> str:
-        """The field's format characters for ``struct`` if its size is fixed; else ""."""
+        """The field's format characters for ``struct`` if it has a fixed size, else ""."""
         if not self.type.is_array:
             return PRIMITIVES[self.type.base]
         return f"{self.type.length}s" if self.type.is_bytes and self.type.length else ""
 
     @property
     def has_length(self) -> bool:
-        """Return whether its bytes start with a length."""
+        """Return whether the field's bytes start with a length."""
         return not self.letters and self.type.length is None
 
     @property
     def is_numbers(self) -> bool:
-        """Return whether it is an array that ``struct`` packs at once."""
+        """Return whether the field is an array that a single ``struct`` packs."""
         return self.type.is_array and not self.type.is_bytes and len(PRIMITIVES.get(self.type.base, "")) == 1
 
     def values(self) -> list[str]:
-        """Return the expressions of the field's values in ``struct``."""
+        """Return the expressions for the field's values in ``struct``."""
         if self.type.base in _TIMES:
             return [f"{self.path}.secs", f"{self.path}.nsecs"]
         return [self.path]
 
     def packed(self) -> list[str]:
-        """Return the expressions to pack with ``struct``: it rejects numpy's bool, but accepts its sum with an integer."""
+        """Return the expressions to pack; ``struct`` rejects numpy's bool, but accepts the sum of a numpy bool and an integer."""
         return [f"{self.path} + 0"] if self.type.base == "bool" and not self.type.is_array else self.values()
 
 
 class _Chunk(NamedTuple):
-    """Fields of fixed size, and the following field of another kind."""
+    """Consecutive fixed-size fields, and the following field of another kind."""
 
     run: tuple[_Leaf, ...]
     tail: _Leaf | None
 
 
 def keeps_buffer(spec: MessageSpec, lookup: Lookup) -> bool:
-    """Return whether a message may be large and mostly bytes, so that it should not be copied as a whole."""
+    """Return whether a message may be large and consist mostly of bytes, so that it should not be copied as a whole."""
     return any(
         (field.type.is_array and field.type.base in ("uint8", "char", "int8", "byte"))
         or (not field.type.is_primitive and keeps_buffer(lookup(field.type.base), lookup))
@@ -74,7 +74,7 @@ def keeps_buffer(spec: MessageSpec, lookup: Lookup) -> bool:
 
 
 def lazy_arrays(spec: MessageSpec) -> dict[str, str]:
-    """Return the format characters of the fields that stay bytes until they are read: arrays of numbers of any length."""
+    """Return the format characters of the fields that remain bytes until they are read: number arrays of any length."""
     return {
         python_name(field.name): PRIMITIVES[field.type.base]
         for field in spec.fields
@@ -148,7 +148,7 @@ def _is_fixed(spec: MessageSpec, lookup: Lookup) -> bool:
 
 
 def _size(letters: str) -> int:
-    """Return the number of bytes for some format characters; a number before ``s`` counts bytes."""
+    """Return the size in bytes for some format characters; a number before ``s`` counts bytes."""
     size, count = 0, ""
     for letter in letters:
         if letter.isdigit():
@@ -159,7 +159,7 @@ def _size(letters: str) -> int:
 
 
 def _least_size(spec: MessageSpec, lookup: Lookup) -> int:
-    """Return the minimum size of a message in bytes."""
+    """Return a message's minimum size in bytes."""
     size = 0
     for leaf in _leaves(spec.fields, "", lookup):
         if leaf.letters:
@@ -176,7 +176,7 @@ def _least_size(spec: MessageSpec, lookup: Lookup) -> int:
 
 
 def _has_elements_without_bytes(spec: MessageSpec, lookup: Lookup) -> bool:
-    """Return whether an array anywhere in a message has elements that may take no bytes."""
+    """Return whether any array in a message, at any level, has elements that may have no bytes."""
     return any(
         not field.type.is_primitive
         and (
@@ -191,7 +191,7 @@ def _has_elements_without_bytes(spec: MessageSpec, lookup: Lookup) -> bool:
 
 
 class _Writer:
-    """Generates the lines that pass the bytes of fields to ``write``."""
+    """Generates the lines that pass the fields' bytes to ``write``."""
 
     def __init__(self, source: Source, lookup: Lookup, write: str) -> None:
         self._source = source
@@ -215,7 +215,7 @@ class _Writer:
         self._source.line(text)
 
     def _pack(self, letters: str, values: list[str]) -> str:
-        """Return the call that packs values; an inner message that several values belong to is fetched once."""
+        """Return the call that packs values; an inner message that contains several of them is read once."""
         owners = [value.rpartition(".")[0] for value in values]
         uses = Counter(owners)
         names: dict[str, str] = {}
@@ -232,7 +232,7 @@ class _Writer:
         return f"{self._source.struct(letters)}.pack({', '.join(arguments)})"
 
     def _fixed(self, leaf: _Leaf) -> list[str]:
-        """Return the values of a field of fixed size; check the length of an array of bytes, since struct does not."""
+        """Return the values of a fixed-size field; check the length of byte arrays, because struct does not."""
         if not leaf.type.is_array:
             return leaf.packed()
         name = self._bytes(leaf)
@@ -244,7 +244,7 @@ class _Writer:
         return [name]
 
     def _prepared(self, leaf: _Leaf) -> str:
-        """Return a local name for a field's value, in the form whose length is written."""
+        """Return a local name for a field's value, converted to the object whose length is written."""
         if leaf.type.is_bytes:
             return self._bytes(leaf)
         name = self._source.local(leaf.path.rpartition(".")[2])
@@ -349,7 +349,7 @@ class _Reader:
                 self._line('raise genpy.DeserializationError("the message ends too early")')
 
         if raw:
-            # Delete the slots' values: reading one of them then calls __getattr__.
+            # Delete the slots' values, so that reading one of them calls __getattr__.
             self._line(" = ".join(f"self.{name}" for name in raw) + " = []")
             self._line("del " + ", ".join(f"self.{name}" for name in raw))
             self._line("self._raw = {" + ", ".join(f'"{name}": {local}' for name, local in raw.items()) + "}")
@@ -358,7 +358,7 @@ class _Reader:
         self._source.line(text)
 
     def _create(self, spec: MessageSpec, path: str, owner: str = "") -> dict[str, str]:
-        """Generate the messages and times inside the message at ``path``; return path of each -> its local name."""
+        """Generate code that creates the messages and times inside the message at ``path``; return path -> local name."""
         names = {}
         for field in spec.fields:
             if field.type.is_array or (field.type.is_primitive and field.type.base not in _TIMES):
@@ -377,7 +377,10 @@ class _Reader:
     def _fields(
         self, chunks: list[_Chunk], names: dict[str, str], lazy: dict[str, str] | None = None
     ) -> dict[str, str]:
-        """Generate reading of the chunks. Of lazy arrays read only the bytes; return field name -> local name of its bytes."""
+        """Generate code that reads the chunks, but of lazy arrays only the bytes.
+
+        Return field name -> local name of its bytes.
+        """
         raw: dict[str, str] = {}
         for chunk in chunks:
             count = self._run(chunk, names, "data, end")
@@ -397,7 +400,7 @@ class _Reader:
         return f"{names.get(owner, owner)}{dot}{name}"
 
     def _run(self, chunk: _Chunk, names: dict[str, str], arguments: str) -> str:
-        """Generate reading a run and the length of what follows; return the length's local name, or the length itself."""
+        """Generate code that reads a run and the following length; return the length's local name, or the length itself."""
         letters = "".join(leaf.letters for leaf in chunk.run)
         targets = []
 
@@ -432,7 +435,7 @@ class _Reader:
         return count
 
     def _slice(self, size: str, whole: bool = False) -> str:
-        """Return an expression for the next bytes; ``whole``: the bytes are kept, so they must not reference the buffer."""
+        """Return an expression for the next bytes. ``whole``: the bytes are stored, so they must not reference the buffer."""
         self._slices = True
         part = f"data[end : (end := end + {size})]"
         return f"bytes({part})" if whole and self._keeps_buffer else part
@@ -466,7 +469,7 @@ class _Reader:
         spec = None if type_.is_primitive else self._lookup(type_.base)
         least = _least_size(spec, self._lookup) if spec else 0
         if spec and not least:
-            # Elements without bytes: otherwise a short message could contain any number of them.
+            # The elements have no bytes: without this limit a short message could contain any number of them.
             self._line(f"spare -= {count}")
             with self._source.block("if spare < 0:"):
                 self._line('raise genpy.DeserializationError("a length is longer than the message")')
@@ -488,7 +491,8 @@ class _Reader:
             return
 
         if least and type_.length is None:
-            # Elements that consist of slices: a slice that is too short is detected only at the end of the message.
+            # The elements consist of slices, and a slice that is too short is detected only at the end of the
+            # message.
             with self._source.block(f"if {_times(count, least)} > len(data) - end:"):
                 self._line('raise genpy.DeserializationError("a length is longer than the message")')
         with self._source.block(f"for _ in range({count}):"):

@@ -12,7 +12,7 @@ from minirospy.core.idl.spec import MessageSpec, ServiceSpec
 from minirospy.core.idl.validate import MAX_LEVELS
 
 try:
-    # Like hashlib without OpenSSL, which takes 2 ms to load, and refuses MD5 in FIPS mode.
+    # Like hashlib without OpenSSL: loading OpenSSL takes 2 ms, and it refuses MD5 in FIPS mode.
     from _md5 import md5  # type: ignore[import-not-found]
 except ImportError:
     from hashlib import md5
@@ -33,7 +33,7 @@ _SEPARATOR = "=" * 80
 
 
 def md5_text(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return the text for the md5sum: constants, then fields, with nested types replaced by their md5sums.
+    """Return the text to compute the md5sum from: constants, then fields, with nested types replaced by their md5sums.
 
     Raise DefinitionError if a message contains itself.
     """
@@ -46,12 +46,12 @@ def message_md5(spec: MessageSpec, lookup: Lookup) -> str:
 
 
 def service_md5(spec: ServiceSpec, lookup: Lookup) -> str:
-    """Return a service's md5sum, over request and response together."""
+    """Return a service's md5sum, computed over request and response together."""
     return _md5(md5_text(spec.request, lookup) + md5_text(spec.response, lookup))
 
 
 def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
-    """Return all types that a message uses, each once, a type before those that it uses itself."""
+    """Return all types that a message uses, each once and before the types that it uses itself."""
     found: dict[str, None] = {}
 
     def visit(current: MessageSpec) -> None:
@@ -65,7 +65,7 @@ def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
 
 
 def full_text(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return a message's text and those of all types that it uses, each after a line of 80 ``=``."""
+    """Return a message's text and the texts of all types that it uses, each after a line of 80 ``=``."""
     return joined_texts(spec.text, ((name, lookup(name).text) for name in dependencies(spec, lookup)))
 
 
@@ -82,7 +82,7 @@ def _md5(text: str) -> str:
 def _md5_text(
     spec: MessageSpec, lookup: Lookup, around: tuple[str, ...], known: dict[str, str] | None = None
 ) -> str:
-    """Take ``around``, the messages that contain this one, and ``known``, the md5sums computed so far."""
+    """Return the text for the md5sum; ``around``: the messages that contain this one; ``known``: md5sums computed so far."""
     if spec.full_name in around:
         raise DefinitionError(around[0], 1, f"[{spec.full_name}] contains itself")
     if len(around) > MAX_LEVELS:

@@ -1,10 +1,10 @@
 """Generate Python source from specs: one readable module per message or service.
 
-A generated module imports only public names of ``genpy``, so that it also works with real ROS. The code of
+A generated module imports only public names from ``genpy``, so that it also works with real ROS. The code for
 ``serialize`` and ``deserialize`` is generated in ``codec``.
 
 Definitions may be untrusted: names are emitted only after ``validate`` has checked them, all other text through
-``repr``. Every message used in the source passes :func:`_checked`.
+``repr``. Every message used in the source is checked by :func:`_checked`.
 """
 
 from __future__ import annotations
@@ -93,17 +93,17 @@ _HELPERS = {
         "            return value",
     ],
 }
-"""Helper functions for a module: name -> lines, in the order in which they are emitted."""
+"""Helper functions in a module: name -> lines, in the order in which they are emitted."""
 
 
 def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return the module of a message. Raise DefinitionError if a name is not legal in Python."""
+    """Return a message's module. Raise DefinitionError if a name is not legal in Python."""
     check_types(spec, lookup)
     return _Module(_checked(lookup)).source([spec], None, f"{spec.full_name}.msg")
 
 
 def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
-    """Return the source of a message's class, which expects the classes of its fields in its globals.
+    """Return the source of a message's class; its globals must contain the classes of its fields.
 
     Raise DefinitionError if a name is not legal in Python.
     """
@@ -114,7 +114,7 @@ def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
 
 
 def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
-    """Return the module of a service: request, response, and the class that combines them.
+    """Return a service's module: request, response, and the class that combines them.
 
     Raise DefinitionError if a name is not legal in Python.
     """
@@ -125,9 +125,9 @@ def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
 
 
 def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[str] = ("",)) -> str:
-    """Return the ``__init__`` of a package's msg or srv folder. Module ``_Name`` has ``Name`` with each suffix in ``parts``.
+    """Return the ``__init__`` for a package's msg or srv folder. Module ``_Name`` has ``Name`` with each suffix in ``parts``.
 
-    Each module is loaded when one of its names is first used. Raise DefinitionError as :func:`emit_message`.
+    Each module is loaded when one of its names is first used. Raise DefinitionError if a name is not legal in Python.
     """
     for name in names:
         check_type_name(f"{package}/{name}")
@@ -138,7 +138,7 @@ def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[
         "import importlib",
         "from typing import Any",
         "",
-        # Compact, since a wheel has hundreds of these.
+        # Use a compact format, because a wheel has hundreds of these.
         f"_NAMES = {' '.join(names)!r}.split()",
         f'_MODULES = {{name + part: "_" + name for name in _NAMES for part in {tuple(parts)!r}}}',
         "__all__ = sorted(_MODULES)",
@@ -160,14 +160,14 @@ def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[
 
 
 class ClassSource(NamedTuple):
-    """The source of a class, and the classes that it expects in its globals."""
+    """The source of a class, and the classes that its globals must contain."""
 
     source: str
     classes: dict[str, str]  # ``pkg/Name`` -> the global name of that class in the source
 
 
 def _checked(lookup: Lookup) -> Lookup:
-    """Return ``lookup`` with :func:`check_spec` applied to its results, to each message once."""
+    """Return ``lookup`` with :func:`check_spec` applied to its results, once per message."""
     seen: dict[str, MessageSpec] = {}
 
     def checked(name: str) -> MessageSpec:
@@ -182,7 +182,7 @@ def _checked(lookup: Lookup) -> Lookup:
 
 
 class _Module:
-    """Generates one module; without ``imports`` the classes of its fields must be in its globals already."""
+    """Generates one module; without ``imports``, its globals must already contain the classes of its fields."""
 
     def __init__(self, lookup: Lookup, *, imports: bool = True) -> None:
         self._lookup = lookup
@@ -330,7 +330,8 @@ class _Module:
 def _is_even(letters: str) -> bool:
     """Return whether ``struct`` adds no padding between these format characters, some of which are floats.
 
-    Return False for 32-bit floats: in native order a value that is too large would become infinity, not an OverflowError.
+    Return False for 32-bit floats: in native byte order a value that is too large would become infinity and not raise
+    OverflowError.
     """
     kinds = {letter for letter in letters if letter.isalpha()}
     return "d" in kinds and kinds <= set("dqQ")

@@ -1,6 +1,6 @@
 """Find, compile and import message definitions and classes.
 
-A catalogue reads ``<root>/<pkg>/{msg,srv,action}``; classes come from the generated modules, or are created from
+A catalogue reads ``<root>/<pkg>/{msg,srv,action}``; classes are imported from the generated modules, or created from
 a full text at run time.
 """
 
@@ -49,17 +49,17 @@ _SEPARATOR = "=" * 80
 
 
 class Catalogue:
-    """The definitions of some packages: package name -> its folder. Specs are parsed once.
+    """The definitions in some packages: package name -> its folder. Each spec is parsed once.
 
-    A package's definitions are the files in its folders msg, srv and action, or only those in ``definitions`` if it
-    contains the package.
+    A package's definitions are the files in its folders msg, srv and action, or, if ``definitions`` contains the package,
+    only the files listed there.
     """
 
     def __init__(
         self, packages: Mapping[str, Path], definitions: Mapping[str, Iterable[Path]] | None = None
     ) -> None:
         self.packages = packages
-        # By package and kind, since a package may have hundreds, and each is looked up by its name.
+        # Indexed by package and kind, because a package may have hundreds, and each is looked up by its name.
         self._definitions: dict[str, dict[str, dict[str, Path]]] = {}
         for package, files in (definitions or {}).items():
             kinds = self._definitions[package] = {"msg": {}, "srv": {}, "action": {}}
@@ -78,30 +78,36 @@ class Catalogue:
         return cls(found)
 
     def files(self, package: str, kind: str) -> Mapping[str, Path]:
-        """Return a package's definitions of a kind (msg, srv, action): name -> file."""
+        """Return a package's definitions of one kind (msg, srv, action): name -> file."""
         if package in self._definitions:
             return self._definitions[package][kind]
         return {path.stem: path for path in sorted((self.packages[package] / kind).glob(f"*.{kind}"))}
 
     def message(self, full_name: str) -> MessageSpec:
-        """Return the spec of ``pkg/Name``. Raise NotFoundError, DefinitionError."""
+        """Return the spec of ``pkg/Name``.
+
+        Raise NotFoundError if no file defines it, DefinitionError if its definition is invalid.
+        """
         if full_name not in self._specs:
             self._specs[full_name] = self._parse_message(full_name)
         return self._specs[full_name]
 
     def messages(self, package: str) -> list[MessageSpec]:
-        """Return all messages of a package by name, including those of its actions."""
+        """Return all messages in a package by name, including those of its actions."""
         names = {*self.files(package, "msg")}
         for action in self.actions(package):
             names |= {message.name for message in action.messages}
         return [self.message(f"{package}/{name}") for name in sorted(names)]
 
     def services(self, package: str) -> list[ServiceSpec]:
-        """Return all services of a package, by name."""
+        """Return all services in a package, by name."""
         return [self.service(f"{package}/{name}") for name in self.files(package, "srv")]
 
     def service(self, full_name: str) -> ServiceSpec:
-        """Return the spec of the service ``pkg/Name``. Raise KeyError if no file defines it, DefinitionError."""
+        """Return the spec of the service ``pkg/Name``.
+
+        Raise KeyError if no file defines it, DefinitionError if its definition is invalid.
+        """
         from minirospy.core.idl.parse import parse_service
 
         package, _, name = full_name.partition("/")
@@ -109,11 +115,14 @@ class Catalogue:
         return parse_service(read_definition(path), package, name, str(path))
 
     def actions(self, package: str) -> list[ActionSpec]:
-        """Return all actions of a package, by name."""
+        """Return all actions in a package, by name."""
         return [self.action(f"{package}/{name}") for name in self.files(package, "action")]
 
     def action(self, full_name: str) -> ActionSpec:
-        """Return the spec of the action ``pkg/Name``. Raise KeyError if no file defines it, DefinitionError."""
+        """Return the spec of the action ``pkg/Name``.
+
+        Raise KeyError if no file defines it, DefinitionError if its definition is invalid.
+        """
         from minirospy.core.idl.parse import parse_action
 
         package, _, name = full_name.partition("/")
@@ -155,11 +164,11 @@ _OF_OTHER_LANGUAGES = {
     "double": "float64",
     "str": "string",
     "boolean": "bool",
-}  # name of a type in C++ or Python -> type of ROS
+}  # name of a type in C++ or Python -> ROS type
 
 
 def read_definition(path: Path) -> str:
-    """Return the text of a definition's file. Raise DefinitionError if it cannot be read."""
+    """Return the text in a definition file. Raise DefinitionError if the file cannot be read."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -170,7 +179,7 @@ def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
     """Compile a package's definitions to Python: file below the package's folder (``msg/_Bool.py``) -> its text.
 
     The result includes stubs with the types of fields and constructors, and the empty ``py.typed``, which makes mypy use
-    them (PEP 561). Raise DefinitionError, NotFoundError.
+    them (PEP 561). Raise DefinitionError if a definition is invalid, NotFoundError if one uses a type that does not exist.
     """
     from minirospy.core.idl.emit import emit_message, emit_package, emit_service
     from minirospy.core.idl.stubs import emit_stub
@@ -197,13 +206,14 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
     """Compile a package's definitions into ``root``/<package>/{msg,srv}; return the files that were written.
 
     With ``on_demand`` only the ``__init__`` modules and the stubs are written, and each message's module is compiled when it
-    is first imported. Files that would not change are left alone. Raise DefinitionError, NotFoundError.
+    is first imported. Files whose text would not change are not written. Raise the same exceptions as
+    :func:`compile_package`.
     """
     sources = compile_package(catalogue, package)
     if on_demand:
         sources = _on_demand(sources)
         for kind in ("msg", "srv"):
-            # Left from an earlier build that compiled the modules in advance.
+            # These modules remain from an earlier build that compiled them in advance.
             for stale in (root / package / kind).glob("_[!_]*.py"):
                 stale.unlink()
     folder = root / package
@@ -213,13 +223,13 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
 
 
 def _on_demand(sources: dict[str, str]) -> dict[str, str]:
-    """Return the files of a package whose modules are compiled when they are imported."""
+    """Return the files for a package whose modules are compiled when they are imported."""
     modules = [text for name, text in sources.items() if _is_module(name)]
     fingerprint = zlib.crc32("".join(modules).encode())
     kept = {name: text for name, text in sources.items() if not _is_module(name)}
     for name, text in kept.items():
         if name.endswith("__init__.py"):
-            # Replaces the code of emit_package, which would be repeated in each such file.
+            # This replaces the code that emit_package generates, which would be repeated in each such file.
             names = " ".join(sorted(_module_name(each) for each in sources if _is_in(each, name)))
             kept[name] = (
                 f"{text.partition('import importlib')[0]}from minirospy.core.idl.on_demand import load_package\n\n"
@@ -233,7 +243,7 @@ def _is_in(module: str, init: str) -> bool:
 
 
 def _module_name(name: str) -> str:
-    """Return ``Name`` of ``msg/_Name.py``."""
+    """Return ``Name`` for ``msg/_Name.py``."""
     return name.partition("/_")[2].removesuffix(".py")
 
 
@@ -244,8 +254,8 @@ def _is_module(name: str) -> bool:
 def write_if_changed(path: Path, text: str) -> bool:
     """Write a file unless it already has this text; return whether it was written.
 
-    Its modification time is at least a second later than before, since Python recognizes an outdated compiled module by
-    the source's time in seconds and its size.
+    The new modification time is at least a second later than before, because Python recognizes an outdated compiled module by
+    the source's size and its time in seconds.
     """
     data = text.encode()
     earliest = 0
@@ -273,7 +283,7 @@ def get_service_class(name: str) -> ServiceClass | None:
 
 
 def message_class(name: str) -> type[Message]:
-    """Return the class of ``pkg/Name``. Raise NotFoundError with similar names."""
+    """Return the class of ``pkg/Name``. If there is none, raise NotFoundError, which lists similar names."""
     found = get_message_class(name)
     if found is None:
         raise NotFoundError("message type", name, _known("msg"), "types are written package/Type")
@@ -281,7 +291,7 @@ def message_class(name: str) -> type[Message]:
 
 
 def service_class(name: str) -> ServiceClass:
-    """Return the class of the service ``pkg/Name``. Raise NotFoundError with similar names."""
+    """Return the class of the service ``pkg/Name``. If there is none, raise NotFoundError, which lists similar names."""
     found = get_service_class(name)
     if found is None:
         raise NotFoundError("service type", name, _known("srv"), "types are written package/Type")
@@ -289,13 +299,16 @@ def service_class(name: str) -> ServiceClass:
 
 
 def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
-    """Return the specs in a full text: the message's own, and those of all types that it uses. Raise DefinitionError."""
+    """Return the specs in a full text: the message's own, and those of all types that it uses.
+
+    Raise DefinitionError if the text is invalid.
+    """
     from minirospy.core.idl.parse import parse_message
 
     if len(text) > MAX_TEXT:
         raise DefinitionError(full_name, 1, f"its definition has more than {MAX_TEXT} characters")
     specs: dict[str, MessageSpec] = {}
-    # The separator includes the newline before it, so a text without a trailing newline keeps none.
+    # The separator includes the newline before it, so a text without a trailing newline does not get one.
     for number, part in enumerate(text.split(f"\n{_SEPARATOR}\n")):
         name, body = full_name, part
         if number:
@@ -308,9 +321,9 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
 
 
 def checked_text(full_name: str, text: str) -> tuple[dict[str, MessageSpec], str]:
-    """Return the specs in a full text that the message uses, each after those that it uses itself, and the message's md5sum.
+    """Return the specs in a full text that the message uses, dependencies first, and the message's md5sum.
 
-    No class is created. Raise DefinitionError.
+    Does not create a class. Raise DefinitionError if the text is invalid.
     """
     from minirospy.core.idl.digest import message_md5
 
@@ -326,16 +339,19 @@ def checked_text(full_name: str, text: str) -> tuple[dict[str, MessageSpec], str
 
 
 def class_from_text(full_name: str, text: str) -> type[Message]:
-    """Return a message class created from a full text, as sent by a publisher, for a type that is not installed.
+    """Return a message class created from a full text, as a publisher sends it, for a type that is not installed.
 
-    Raise DefinitionError.
+    Raise DefinitionError if the text is invalid.
     """
     return classes_from_text(full_name, text)[full_name]
 
 
 @lru_cache(maxsize=256)
 def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
-    """Return the classes of a full text's message and of all types that it uses, by name. Raise DefinitionError."""
+    """Return the classes for a full text's message and for all types that it uses, by name.
+
+    Raise DefinitionError if the text is invalid.
+    """
     from minirospy.core.idl.emit import emit_class
 
     specs, _ = checked_text(full_name, text)
@@ -348,25 +364,25 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
 
 
 def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> type[Message]:
-    """Execute the source of a class, whose fields use the classes created before."""
+    """Execute the source of a class, whose fields use the classes that were created before."""
     file = f"<generated {name}>"
     module = types.ModuleType(f"minirospy_generated.{name.replace('/', '.')}")
     for type_, alias in emitted.classes.items():
         module.__dict__[alias] = made[type_]
     source = emitted.source
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
-    # Names were checked by `validate`, all other text is quoted by `repr`: a peer's text is never executed.
+    # `validate` has checked the names, and `repr` quotes all other text, so that a peer's text is never executed.
     try:
         exec(compile(source, file, "exec"), module.__dict__)
     except (SyntaxError, RecursionError, MemoryError, OverflowError, struct.error) as error:
-        # Python's own limits, such as for nested loops: arrays of arrays of arrays.
+        # Python has its own limits, for example on nested loops: arrays of arrays of arrays.
         raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
     found: type[Message] = module.__dict__[name.partition("/")[2]]
-    # genpy's naming: programs that read bags look for `_sensor_msgs__Image`.
+    # Use genpy's naming, because programs that read bags look for `_sensor_msgs__Image`.
     found.__name__ = found.__qualname__ = f"_{name.replace('/', '__')}"
     found.__reduce__ = _reduced  # type: ignore[assignment, method-assign]
     _running[id(found)] = found
-    # Remove the source together with the class, since a publisher may send any number of definitions.
+    # Remove the source together with the class, because a publisher may send any number of definitions.
     weakref.finalize(found, linecache.cache.pop, file, None).atexit = False
     return found
 
@@ -376,13 +392,13 @@ _running: weakref.WeakValueDictionary[int, type[Message]] = weakref.WeakValueDic
 
 
 def _reduced(message: Any) -> tuple[Any, ...]:
-    """Return how pickle and copy recreate a message whose class is in no module: from its class's full text."""
+    """Return how pickle and copy should recreate a message whose class is in no module: from the class's full text."""
     kind = type(message)
     return _unpickled, (id(kind), kind._type, kind._full_text), message.__getstate__()
 
 
 def _unpickled(key: int, type_: str, text: str) -> Message:
-    """Return a new message of a class created at run time; another process creates the class again."""
+    """Return a new message whose class was created at run time; in another process, create the class again."""
     found = _running.get(key)
     if found is None or (found._type, found._full_text) != (type_, text):
         found = class_from_text(type_, text)
@@ -390,10 +406,10 @@ def _unpickled(key: int, type_: str, text: str) -> Message:
 
 
 def _imported(name: str, kind: str) -> Any:
-    """Return the class ``pkg/Name`` of an installed package, or None.
+    """Return the class ``pkg/Name`` from an installed package, or None if there is none.
 
-    The name may come from a peer, and importing a module executes it. So only a package with a folder (or module)
-    ``msg`` or ``srv`` is imported, never any other module that happens to have the name.
+    The name may come from a peer, and importing a module executes it. Therefore only a package with a folder (or module)
+    ``msg`` or ``srv`` is imported, never another module that happens to have this name.
     """
     if name == "Header" and kind == "msg":
         name = "std_msgs/Header"
@@ -415,25 +431,25 @@ def _imported(name: str, kind: str) -> Any:
 
 
 def _has_definitions(package: str, kind: str) -> bool:
-    """Return whether a package contains a module of generated classes, without importing either."""
+    """Return whether a package contains a module of generated classes, without importing the package or the module."""
     if f"{package}.{kind}" in sys.modules:
         return True
     try:
         found = importlib.util.find_spec(package)
     except (ImportError, ValueError):
-        # A module that was added to sys.modules by hand has no spec, which raises ValueError.
+        # A module that was added to sys.modules manually has no spec, for which find_spec raises ValueError.
         found = None
     if found is None:
         return package in sys.modules
     if found.submodule_search_locations is None:
         return False
-    # An imported package may extend over several entries of sys.path (pkgutil.extend_path).
+    # An imported package may extend over several entries in sys.path (pkgutil.extend_path).
     folders = [*found.submodule_search_locations, *(os.path.join(entry, package) for entry in sys.path)]
     return importlib.machinery.PathFinder.find_spec(f"{package}.{kind}", folders) is not None
 
 
 def _known(kind: str) -> set[str]:
-    """Return the types of minirospy's own packages, and of all packages on sys.path with generated modules."""
+    """Return the types in minirospy's own packages, and in all packages on sys.path that have generated modules."""
     from minirospy.core.idl.own_packages import own_definitions
 
     files = [(path.parent.parent, path.stem) for path in own_definitions().glob(f"*/{kind}/*.{kind}")]

@@ -1,6 +1,6 @@
-"""The base of generated messages: the base class, checks, a message as text, and filling a message from values.
+"""The base of generated messages: the base class, checks, formatting a message as text, and filling it from values.
 
-The names and rules are genpy's, since user code relies on them: http://docs.ros.org/api/genpy/html/.
+The names and rules are genpy's, because user code relies on them: http://docs.ros.org/api/genpy/html/.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _HEADER_TYPES = ("std_msgs/Header", "roslib/Header")
 _TIME_SLOTS = ["secs", "nsecs"]
 _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_/.]*", re.ASCII)
 _NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
-# From this length on YAML folds a string that contains spaces.
+# YAML folds strings of at least this length if they contain spaces.
 _FOLDED = 76
 
 
@@ -64,7 +64,7 @@ class _Options(NamedTuple):
 
 
 class Message:
-    """The base of all messages. Subclasses have ``_type``, ``_md5sum``, ``_full_text``, ``_slot_types``."""
+    """The base class of all messages. Subclasses have ``_type``, ``_md5sum``, ``_full_text``, ``_slot_types``."""
 
     __slots__ = ["_connection_header"]
     _type: str
@@ -75,9 +75,9 @@ class Message:
     _connection_header: dict[str, str]
 
     def __init__(self, *args: object, **kwds: object) -> None:
-        """Set all fields in order, or some by name; None means a field's default.
+        """Set all fields in order, or some by name; None means the field's default.
 
-        Raise TypeError on a wrong number of values, AttributeError on a name that is not a field.
+        Raise TypeError if the number of values is wrong, AttributeError if a name is not a field.
         """
         if args and kwds:
             raise TypeError("Message constructor may only use args OR keywords, not both")
@@ -106,7 +106,7 @@ class Message:
         self.serialize(buff)
 
     def deserialize_numpy(self, data: Buffer, numpy: ModuleType) -> Message:
-        """Read this message from bytes; arrays of numbers become numpy arrays."""
+        """Read this message from bytes; number arrays become numpy arrays."""
         from minirospy.core.idl.arrays import arrays_from_bytes
 
         self.deserialize(data)
@@ -124,8 +124,8 @@ class Message:
         return self._slot_types
 
     def _check_types(self, exc: Exception | None = None) -> None:
-        """Raise SerializationError for the first field with an invalid value; otherwise for ``exc`` itself."""
-        # After an error, find the field that cannot be written; otherwise check for all that genpy refuses.
+        """Raise SerializationError for the first field with an invalid value, or for ``exc`` if there is no such field."""
+        # After an error, find the field that cannot be written; otherwise check everything that genpy checks.
         checks = _STRICT_CHECKS if exc is None else _CHECKS
         for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
             _check_field(name, type_, getattr(self, name), checks)
@@ -148,16 +148,16 @@ class Message:
 
 
 def _equal(value: object, other: object) -> bool:
-    """Return whether two values of a field are equal as in genpy: a list equals a tuple with the same items."""
+    """Return whether two field values are equal as in genpy: a list equals a tuple with the same items."""
     if type(value) is not type(other) and type(value) in _SEQUENCES and type(other) in _SEQUENCES:
         return tuple(cast("Sequence[object]", value)) == tuple(cast("Sequence[object]", other))
     return bool(value == other)
 
 
 def number_header(message: protocols.Message, sequence: int) -> None:
-    """Set ``seq`` of a message that starts with a header, as rospy does before sending; replace ``frame_id`` None by "0".
+    """Set ``seq`` in the header that a message starts with, as rospy does before sending; replace ``frame_id`` None with "0".
 
-    A header of a wrong type is left to ``serialize``, whose error names the field.
+    If the header has a wrong type, do nothing: ``serialize`` then raises an error that names the field.
     """
     if is_stamped(message) and is_message(message.header):
         message.header.seq = sequence
@@ -168,7 +168,7 @@ def number_header(message: protocols.Message, sequence: int) -> None:
 def check_type(field_name: str, field_type: str, field_val: object) -> None:
     """Raise SerializationError unless the value is valid for a field of this type (``int8``, ``string[]``, ``pkg/Name``).
 
-    Like genpy, refuse a bool as a number and non-ASCII strings, although both can be sent.
+    Like genpy, reject bools as numbers and non-ASCII strings, although both can be sent.
     """
     _check_field(field_name, field_type, field_val, _STRICT_CHECKS)
 
@@ -176,7 +176,7 @@ def check_type(field_name: str, field_type: str, field_val: object) -> None:
 def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Mapping[str, object]) -> _M:
     """Return the message passed to publish() or a service call, or create it from the passed field values.
 
-    Raise TypeError or AttributeError if they do not match.
+    Raise TypeError or AttributeError if the values do not match the fields.
     """
     if args and kwds:
         raise TypeError("publish() can be called with arguments or keywords, but not both.")
@@ -188,7 +188,8 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
     if len(args) == 1:
         only = args[0]
         if isinstance(only, data_class) or getattr(only, "_md5sum", None) == data_class._md5sum:
-            # From another generator, or created from another text: the bytes are the same.
+            # The class comes from another generator, or was created from another text, but the serialized bytes are
+            # the same.
             return cast("_M", only)
         if isinstance(only, Message) and len(data_class.__slots__) >= 1 and not _takes(data_class, only):
             raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")
@@ -199,10 +200,10 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
 
 
 def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] | None = None) -> None:
-    """Fill ``msg`` from values in their YAML form: a list of its fields' values, or a list of one dictionary of them.
+    """Fill ``msg`` from values as YAML represents them: a list of its field values, or a list with one dictionary of them.
 
-    ``keys`` are words that stand for values ("now", "auto"). Raise MessageException if a name or the number
-    of values does not match, ValueError on values that cannot be fields.
+    ``keys`` are words that represent values ("now", "auto"). Raise MessageException if a name or the number
+    of values does not match, ValueError if a value cannot be assigned to its field.
     """
     if not is_message(msg) or isinstance(msg, type):
         raise ValueError(f"msg must be a Message instance: {msg}")
@@ -224,7 +225,7 @@ def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] 
 
 
 def get_printable_message_args(msg: protocols.Message, buff: TextIO | None = None, prefix: str = "") -> str:
-    """Return the names of a message's fields in order, nested ones with dots; also write them to ``buff`` if given."""
+    """Return the names of a message's fields in order, nested ones with dots; also write them to ``buff``, if given."""
     found: list[str] = []
 
     def walk(current: protocols.Message, path: str) -> None:
@@ -249,7 +250,7 @@ def strify_message(
     field_filter: Callable[[protocols.Message], Sequence[str]] | None = None,
     fixed_numeric_width: int | None = None,
 ) -> str:
-    """Return a value as text in the format of `rostopic echo`: YAML.
+    """Return a value as YAML text, in the format that `rostopic echo` prints.
 
     ``field_filter`` selects the fields of a message; ``fixed_numeric_width`` pads numbers;
     ``time_offset`` is subtracted from times.
@@ -287,7 +288,7 @@ def _message_text(message: protocols.Message, indent: str, options: _Options) ->
         value = getattr(message, name)
         type_ = types[name]
         if type_.startswith("uint8[") and isinstance(value, bytes | bytearray | memoryview):
-            # Bytes are shown as numbers; genpy leaves a char[] unchanged.
+            # Show bytes as numbers; genpy leaves a char[] unchanged.
             value = list(value)
         elif type_.startswith("uint8[") and isinstance(value, str):
             value = [ord(letter) for letter in value]
@@ -327,7 +328,7 @@ def _number(value: object, width: int | None) -> str:
 
 
 def _number_or_text(value: object, width: int | None) -> str:
-    """Return an item as text, for a list whose first item is a number but that may also contain strings."""
+    """Return an item as text, for a list whose first item is a number but which may also contain strings."""
     if isinstance(value, str):
         return repr(value) if width is None else _quoted(value)
     return _number(value, width)
@@ -342,7 +343,7 @@ def _quoted(text: str) -> str:
 
 
 def _items(texts: Sequence[object]) -> list[str]:
-    """Return the lines of a list of strings in YAML."""
+    """Return the YAML lines for a list of strings."""
     if all(
         isinstance(text, str) and _PLAIN.fullmatch(text) and text.lower() not in _NOT_PLAIN for text in texts
     ):
@@ -359,7 +360,7 @@ _Check = Callable[[str, str, object], None]
 
 
 def _check_field(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> None:
-    """Raise SerializationError unless a value is valid for its field, including nested fields, according to ``checks``."""
+    """Raise SerializationError unless ``checks`` accept a value for its field, including nested fields."""
     if type_.endswith("]"):
         _check_array(name, type_.removesuffix("]"), value, checks)
     elif type_ in checks:
@@ -455,7 +456,7 @@ _STRICT_CHECKS: dict[str, _Check] = {
     **dict.fromkeys(("float32", "float64"), _check_strict_float),
     **dict.fromkeys(("time", "duration"), _check_strict_time),
     **dict.fromkeys(_INTEGERS, _check_strict_integer),
-}  # check like genpy, but also allow numpy's numbers, which genpy's messages can contain anyway
+}  # checks like genpy's that also accept numpy's numbers, which genpy's messages can contain anyway
 
 
 def _check_array(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> None:
@@ -487,7 +488,7 @@ def _fill(message: protocols.Message, values: object, words: Mapping[str, object
         for name, value in values.items():
             if name not in types:
                 raise MessageException(f"No field name [{path}{name}]")
-            # YAML reads a key without a value as null; an empty string was meant.
+            # YAML parses a key without a value as null, but the user means an empty string.
             _fill_field(message, name, types[name], "" if value is None else value, words, path)
         return
     if not isinstance(values, list | tuple):
@@ -538,7 +539,7 @@ def _filled_array(name: str, type_: str, values: object, words: Mapping[str, obj
     filled = []
     for value in values:
         element = element_class()
-        # genpy's path in errors starts at the element.
+        # The path in genpy's errors starts at the element.
         _fill(element, value, words, "")
         filled.append(element)
     return filled
@@ -565,7 +566,7 @@ def _filled_time(current: TVal, value: object, words: Mapping[str, object], path
         case bool():
             pass
         case int():
-            # As in genpy, a plain number is nanoseconds.
+            # As in genpy, interpret a plain number as nanoseconds.
             return type(current)(0, value)
         case TVal():
             return value

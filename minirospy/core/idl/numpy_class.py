@@ -1,4 +1,4 @@
-"""Create message classes whose arrays of numbers are numpy arrays, for `rospy.numpy_msg`.
+"""Create message classes whose number arrays are numpy arrays, for `rospy.numpy_msg`.
 
 numpy is imported only when a class is created. Source: http://wiki.ros.org/rospy_tutorials/Tutorials/numpy.
 """
@@ -29,9 +29,9 @@ class NumpyMissingError(MinirospyError, ImportError):
 
 @lru_cache(maxsize=256)
 def numpy_class(message_class: type[_M]) -> type[_M]:
-    """Return a message class whose arrays are numpy arrays; for peers it is the same type.
+    """Return a message class whose arrays are numpy arrays; peers see the same type.
 
-    Raise NumpyMissingError.
+    Raise NumpyMissingError if numpy is not installed.
     """
     try:
         import numpy
@@ -40,7 +40,7 @@ def numpy_class(message_class: type[_M]) -> type[_M]:
     if getattr(message_class, "_takes_numpy", False):
         return message_class
 
-    # genpy's generated code uses ndarray.tostring, which numpy 2.3 has removed.
+    # Do not use genpy's generated code, which calls ndarray.tostring; numpy 2.3 has removed it.
     is_ours = getattr(message_class, "serialize_numpy", None) is BaseMessage.serialize_numpy
     makes_methods = _own_methods if is_ours or not hasattr(numpy.ndarray, "tostring") else _genpy_methods
     fields = {
@@ -66,7 +66,7 @@ def _own_methods(message_class: type[Message], numpy: ModuleType) -> dict[str, o
         message_class.deserialize(self, data)
         return arrays_from_bytes(self, numpy)
 
-    # minirospy's serialize accepts numpy arrays like lists.
+    # minirospy's serialize accepts numpy arrays as well as lists.
     return {"deserialize": deserialize}
 
 

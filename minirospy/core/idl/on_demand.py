@@ -1,8 +1,8 @@
-"""Compile definitions to modules at their first import, for the many packages of which a program uses only a few types.
+"""Compile definitions to modules when they are first imported: a program uses only a few types from many packages.
 
-Such a package has no ``msg/_Name.py``. Its ``msg/__init__.py`` calls :func:`load_package`; from then on
-``import gazebo_msgs.msg._ModelState`` compiles that definition, and Python caches the result in ``__pycache__`` like
-that of any module. If that folder is not writable, each process compiles the module again.
+Such a package has no ``msg/_Name.py``. Its ``msg/__init__.py`` calls :func:`load_package`; after that,
+``import gazebo_msgs.msg._ModelState`` compiles that definition, and Python caches the result in ``__pycache__`` as for
+any module. If that folder is not writable, each process compiles the module again.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ __all__ = ["load_package"]
 def load_package(
     module: str, fingerprint: int, names: str
 ) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
-    """Make the modules of ``pkg.msg`` or ``pkg.srv`` importable.
+    """Make the modules in ``pkg.msg`` or ``pkg.srv`` importable.
 
     Return the package's ``__getattr__``, ``__dir__`` and ``__all__``. ``names``: its messages or services, separated by
-    spaces. ``fingerprint`` changes with the text of any of its modules.
+    spaces. ``fingerprint`` differs if the text of any of its modules differs.
     """
     if _FINDER not in sys.meta_path:
         sys.meta_path.append(_FINDER)
@@ -54,7 +54,7 @@ def load_package(
 
 
 class _Finder:
-    """The last entry of ``sys.meta_path``, so that a module that exists as a file is found first."""
+    """The last entry in ``sys.meta_path``, so that a module that exists as a file is found first."""
 
     def __init__(self) -> None:
         self.packages: dict[str, int] = {}
@@ -75,23 +75,23 @@ class _Finder:
 
 
 class _Loader(SourceFileLoader):
-    """Compiles the source from a definition; SourceFileLoader does the rest, such as caching."""
+    """Compiles the source generated from a definition; SourceFileLoader does the rest, such as caching."""
 
     def __init__(self, fullname: str, path: str, fingerprint: int) -> None:
         super().__init__(fullname, path)
         self._fingerprint = fingerprint
 
     def path_stats(self, path: str | bytes) -> dict[str, int]:
-        """Return the values that a cached module is compared with; the source's size is not known in advance."""
+        """Return the values that Python compares a cached module with; the source's size is not known in advance."""
         return {"mtime": self._fingerprint, "size": 0}
 
     def set_data(self, path: str, data: ReadableBuffer, *, _mode: int = 0o666) -> None:
-        """Write a module's cache, with the size that :meth:`path_stats` returns in its header (PEP 552)."""
+        """Write a module's cache, with the size from :meth:`path_stats` in its header (PEP 552)."""
         cached = bytes(data)
         super().set_data(path, cached[:12] + bytes(4) + cached[16:], _mode=_mode)
 
     def get_data(self, path: str | bytes) -> bytes:
-        """Return the source of the module, or the bytes of its cache."""
+        """Return the module's source, or the bytes in its cache."""
         if path != self.path:
             return super().get_data(str(path))
         package, kind, module = self.name.split(".")

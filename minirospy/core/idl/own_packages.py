@@ -1,4 +1,4 @@
-"""The message packages that come with minirospy: their folder, and those compiled in advance in the wheel."""
+"""The message packages included in minirospy: their folder, and those compiled in advance in the wheel."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ COMPILED_AHEAD = frozenset(
         "visualization_msgs",
     ]
 )
-"""Packages with modules as files in the wheel: those of ROS itself and of the workshop, which most programs import."""
+"""Packages whose modules are files in the wheel: those of ROS itself and of the workshop, which most programs import."""
 
 _OURS = Path(__file__).parents[2]
 
 
 def own_definitions() -> Path:
-    """Return the folder of minirospy's own definitions: ``share/msgs`` when installed, ``msgs`` in a checkout."""
+    """Return the folder of minirospy's own definitions: ``share/msgs`` if installed, ``msgs`` in a checkout."""
     installed = _OURS / "share" / "msgs"
     return installed if installed.is_dir() else _OURS.parent / "msgs"

@@ -32,12 +32,12 @@ _RANGES = {
 
 
 def parse_message(text: str, package: str, name: str, where: str = "") -> MessageSpec:
-    """Parse a .msg text. ``where`` is its name in errors (default: the type). Raise DefinitionError."""
+    """Parse a .msg text. ``where`` is its name in errors (default: the type). Raise DefinitionError if it is invalid."""
     return _parse(text, package, name, where or f"{package}/{name}", 1)
 
 
 def parse_service(text: str, package: str, name: str, where: str = "") -> ServiceSpec:
-    """Parse a .srv text. Raise DefinitionError."""
+    """Parse a .srv text. Raise DefinitionError if it is invalid."""
     where = where or f"{package}/{name}"
     parts = _split(text, 2, where, "request --- response")
     request, response = (
@@ -48,7 +48,7 @@ def parse_service(text: str, package: str, name: str, where: str = "") -> Servic
 
 
 def parse_action(text: str, package: str, name: str, where: str = "") -> ActionSpec:
-    """Parse a .action text. Raise DefinitionError."""
+    """Parse a .action text. Raise DefinitionError if it is invalid."""
     where = where or f"{package}/{name}"
     parts = _split(text, 3, where, "goal --- result --- feedback")
 
@@ -68,7 +68,7 @@ def parse_action(text: str, package: str, name: str, where: str = "") -> ActionS
 
     lines = {"Goal": parts[0][1], "Result": parts[1][1], "Feedback": parts[2][1]}
     messages = tuple(
-        # genaction.py adds this line at the start: full texts must equal those of real ROS.
+        # Add this line at the start as genaction.py does, so that full texts equal those in real ROS.
         _parse(_GENERATED + body, package, name + suffix, where, lines.get(suffix, 1) - 1)
         for suffix, body in texts.items()
     )
@@ -78,7 +78,7 @@ def parse_action(text: str, package: str, name: str, where: str = "") -> ActionS
 def _split(text: str, count: int, where: str, form: str) -> list[tuple[str, int]]:
     """Return the parts between lines that start with ``---``, each with the number of its first line.
 
-    Every line of a part ends with a newline, including the last one of the text, as in genmsg's full texts.
+    Every line in a part ends with a newline, including the last one in the text, as in genmsg's full texts.
     """
     parts: list[tuple[str, int]] = []
     current: list[str] = []
@@ -155,7 +155,7 @@ def _parse_constant(type_: FieldType, rest: str, line: str, where: str, number: 
     if type_.is_array or type_.base in ("time", "duration") or not type_.is_primitive:
         raise DefinitionError(where, number, f"a constant cannot be of type [{type_}]")
     if type_.base == "string":
-        # A string constant is the rest of its line, including comment signs.
+        # A string constant is the rest of its line, including comment characters.
         text = line.split("=", 1)[1].strip()
         return Constant(name, type_.base, text, text)
     text = rest.split("=", 1)[1].strip()
@@ -180,5 +180,5 @@ def _constant_value(type_: str, text: str) -> bool | int | float:
 
 
 def _cut(text: str) -> str:
-    """Return a text for a one-line error: shortened and escaped."""
+    """Return a text shortened and escaped for a one-line error."""
     return escaped(text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "...")

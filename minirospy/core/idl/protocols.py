@@ -1,7 +1,7 @@
 """The protocols of messages, services and actions, for code that works with all of them.
 
-These are protocols since the classes come from several generators: minirospy's, real genpy's in packages built with ROS,
-and classes created at run time. The names are genpy's (http://docs.ros.org/api/genpy/html/).
+These are protocols, because the classes come from several generators: minirospy's, real genpy's in packages built with
+ROS, and classes created at run time. The names are genpy's (http://docs.ros.org/api/genpy/html/).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Buffer: TypeAlias = bytes | bytearray | memoryview  # the bytes that a message i
 
 
 class Writer(Protocol):
-    """The target of ``serialize``, such as a BytesIO or a list of pieces."""
+    """The target of ``serialize``, such as a BytesIO or a list of byte strings."""
 
     def write(self, data: bytes, /) -> object:
         """Append the next bytes."""
@@ -48,15 +48,15 @@ class Message(Protocol):
     _slot_types: list[str]
     _connection_header: dict[str, str]
 
-    # Any, not object: otherwise pyright regards a class with other parameters as incompatible.
+    # Use Any, not object: otherwise pyright regards a class with other parameters as incompatible.
     def __init__(self, *args: Any, **kwds: Any) -> None:
         """Set all fields in order, or some by name."""
 
     def serialize(self, buff: Writer) -> None:
-        """Write the message. Raise genpy.SerializationError."""
+        """Write the message. Raise genpy.SerializationError if a field's value is invalid."""
 
     def deserialize(self, data: Buffer, /) -> Message:
-        """Read the message from bytes, and return it. Raise genpy.DeserializationError."""
+        """Read the message from bytes, and return it. Raise genpy.DeserializationError if the bytes are invalid."""
 
 
 class GoalID(Message, Protocol):
@@ -94,7 +94,7 @@ class Stamped(Message, Protocol):
 
 
 class ServiceClass(Protocol):
-    """A service's class, which has the classes of its request and response; it has no instances."""
+    """A service class, which contains the classes of its request and response; it has no instances."""
 
     @property
     def _type(self) -> str: ...
@@ -110,7 +110,7 @@ class ServiceClass(Protocol):
 
 
 class ActionGoal(Stamped, Protocol):
-    """The message from an action client to send a goal."""
+    """The message with which an action client sends a goal."""
 
     @property
     def goal_id(self) -> GoalID:
@@ -118,15 +118,15 @@ class ActionGoal(Stamped, Protocol):
 
     @property
     def goal(self) -> Message:
-        """Return the request of the client."""
+        """Return the client's request."""
 
 
 class ActionResult(Stamped, Protocol):
-    """The message from an action server at the end of a goal."""
+    """The message that an action server sends at the end of a goal."""
 
     @property
     def status(self) -> GoalStatus:
-        """Return the final status of the goal."""
+        """Return the goal's final status."""
 
     @property
     def result(self) -> Message:
@@ -134,11 +134,11 @@ class ActionResult(Stamped, Protocol):
 
 
 class ActionFeedback(Stamped, Protocol):
-    """The message from an action server during a goal."""
+    """The message that an action server sends during a goal."""
 
     @property
     def status(self) -> GoalStatus:
-        """Return the status of the goal."""
+        """Return the goal's status."""
 
     @property
     def feedback(self) -> Message:
@@ -162,7 +162,7 @@ class Action(Message, Protocol):
 
 
 def is_message(value: object) -> TypeGuard[Message]:
-    """Return whether a value, such as a field's or an argument, is a message."""
+    """Return whether a value, such as a field's value or an argument, is a message."""
     return hasattr(value, "_slot_types")
 
 

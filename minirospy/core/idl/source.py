@@ -1,4 +1,4 @@
-"""Collect the text of a generated module: lines, blocks, and their shared names."""
+"""Collect the text of a generated module: lines, blocks, and the names that they share."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ _RESERVED = {*keyword.kwlist, "self", "serialize", "deserialize"}
 
 
 def python_name(field: str) -> str:
-    """Return a field's name in Python: a keyword gets a trailing underscore."""
+    """Return a field's name in Python; add an underscore if it is a keyword."""
     return field + "_" if field in _RESERVED else field
 
 
 class Source:
-    """Collects lines; also records the structs, classes and helpers that the module's head must define."""
+    """Collects lines; also records the structs, classes and helpers that the start of the module must define."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.structs: dict[str, str] = {}
         """Format characters for ``struct`` -> name of the compiled struct in the module."""
-        self.classes: dict[str, str] = {}  # ``pkg/Name`` -> name of that class in the module
-        self.helpers: set[str] = set()  # names of the helpers of ``emit`` that the module needs
+        self.classes: dict[str, str] = {}  # ``pkg/Name`` -> name of the class in the module
+        self.helpers: set[str] = set()  # names of the helpers in ``emit`` that the module needs
         self._indent = ""
         self._taken: set[str] = set()
         self._last: dict[str, int] = {}
@@ -61,10 +61,10 @@ class Source:
         return helper
 
     def class_(self, full_name: str) -> str:
-        """Return the name of a message's class, unique within the module."""
+        """Return the name of a message's class, which is unique within the module."""
         if full_name not in self.classes:
             name = "_" + full_name.replace("/", "_")
-            # a/b_C and a_b/C would be equal, and struct/I would look like a compiled struct.
+            # Otherwise a/b_C and a_b/C would have equal names, and struct/I that of a compiled struct.
             while name in self.classes.values() or (name.startswith("_struct_") and name[-1] != "_"):
                 name += "_"
             self.classes[full_name] = name

@@ -28,7 +28,7 @@ PRIMITIVES = {
 
 
 class FieldType(NamedTuple):
-    """A field's type: a primitive or ``pkg/Name``; for an array, ``length`` is None if it varies."""
+    """A field's type: a primitive or ``pkg/Name``; for an array of variable length, ``length`` is None."""
 
     base: str
     is_array: bool = False
@@ -46,12 +46,12 @@ class FieldType(NamedTuple):
 
     @property
     def is_bytes(self) -> bool:
-        """Return whether Python stores it as bytes."""
+        """Return whether Python represents the field as bytes."""
         return self.is_array and self.base in ("uint8", "char")
 
 
 class Field(NamedTuple):
-    """A field; its name is that of the definition."""
+    """A field, with the name from the definition."""
 
     name: str
     type: FieldType

@@ -1,6 +1,6 @@
-"""Generate stubs (``__init__.pyi``) with the fields of messages and their constructors' arguments, for editors and checkers.
+"""Generate stubs (``__init__.pyi``) with messages' fields and constructor arguments, for editors and type checkers.
 
-The constructor of a message accepts all fields in order, or some by name, so each argument has a default. Arrays may be
+A message's constructor accepts all fields in order, or some by name, so each argument has a default. Arrays may be
 any collection, such as a tuple or a numpy array. Source: PEP 484, section Stub Files.
 """
 
@@ -17,7 +17,7 @@ _TYPES = {"bool": "bool", "float32": "float", "float64": "float", "string": "str
 
 
 def emit_stub(messages: Sequence[MessageSpec], services: Sequence[ServiceSpec] = ()) -> str:
-    """Return the stub of a package's msg or srv folder. ``emit`` must have checked its names."""
+    """Return the stub for a package's msg or srv folder. ``emit`` must have checked its names."""
     stub = _Stub(messages, has_services=bool(services))
     for message in messages:
         stub.message(message)
@@ -37,10 +37,10 @@ class _Stub:
         self._lines: list[str] = []
 
     def message(self, spec: MessageSpec) -> None:
-        """Write the class of a message."""
+        """Write a message's class."""
         fields = [(python_name(field.name), field.type) for field in spec.fields]
         constants = [(python_name(constant.name), constant.type) for constant in spec.constants]
-        # Inside the class, the name of a field or a constant hides a type of the same name.
+        # Inside the class, a field or a constant hides a type with the same name.
         self._hidden = {name for name, _ in fields} | {name for name, _ in constants}
         lines = [f"    {name}: {self._type(FieldType(type_))}" for name, type_ in constants]
         lines += [f"    {name}: {self._type(type_)}" for name, type_ in fields]
@@ -50,7 +50,7 @@ class _Stub:
         self._class(f"{spec.name}(_genpy.Message)", lines)
 
     def service(self, spec: ServiceSpec) -> None:
-        """Write the class of a service, which combines request and response."""
+        """Write a service's class, which combines request and response."""
         self._hidden = set()
         self._class(
             spec.name,
@@ -87,7 +87,7 @@ class _Stub:
         return f"{self._builtin('list')}[{one}]" if type_.is_array else one
 
     def _argument(self, type_: FieldType) -> str:
-        """Return the type of a constructor's argument for a field."""
+        """Return the type of a field's constructor argument."""
         if not type_.is_array:
             return self._one(type_)
         self._arrays = True

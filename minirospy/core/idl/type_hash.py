@@ -1,6 +1,6 @@
-"""The hash of a type's fields by which ROS 2 distinguishes definitions of one name (RIHS01). Pure.
+"""The hash of a type's fields (RIHS01), by which ROS 2 distinguishes definitions with the same name. Pure.
 
-Source: https://github.com/ros-infrastructure/rep/pull/381 (REP 2016), and rosidl's description of types.
+Source: https://github.com/ros-infrastructure/rep/pull/381 (REP 2016), and rosidl's type description.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
     """Return ``RIHS01_`` and 64 digits for a type.
 
     ``name`` and the types of fields are ``pkg/Name`` for messages, else ``pkg/srv/Name_Request`` and similar; ``fields``
-    returns the fields of a type, and may raise. Raise ValueError on a field of a type that messages cannot have.
+    returns a type's fields, and may raise. Raise ValueError if a field's type cannot occur in messages.
     """
     known: dict[str, object] = {}
 
@@ -34,7 +34,7 @@ def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
         whole = _whole(name)
         if whole in known:
             return
-        known[whole] = None  # a type that contains itself
+        known[whole] = None  # detects a type that contains itself
         found = []
         for field, text in (fields(name) or _EMPTY).items():
             id, capacity, nested = _described(text)
@@ -63,7 +63,7 @@ def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
 
 
 def _described(text: str) -> tuple[int, int, str]:
-    """Return a field's type: its number, its maximum number of elements, and the name if it is a message."""
+    """Return a field's type: its number, its maximum number of elements, and the message name, if it is a message."""
     added, capacity, base = 0, 0, text
     if text.startswith("sequence<"):
         base, _, bound = text[len("sequence<") : -1].partition(",")

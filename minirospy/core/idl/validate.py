@@ -1,9 +1,10 @@
 """Check all text that becomes Python source (names of types and fields, and sizes) before anything is generated.
 
-A definition may come from a file or from any publisher's connection header; its names are written into source that is
-executed. So they must match ROS's grammar (http://wiki.ros.org/Names, http://wiki.ros.org/msg), which allows no
-character that could end a name or a string in Python. Also, a short text may expand to very much: a type with two
-fields of a type with two fields of ..., or an array of a billion numbers. So the expanded size is computed first.
+A definition may come from a file or from any publisher's connection header, and its names are written into source that is
+executed. Therefore they must match ROS's grammar (http://wiki.ros.org/Names, http://wiki.ros.org/msg), which allows no
+character that could end a name or a string in Python. Also, a short text may expand to a very large message: a type with
+two fields of a type with two fields of ..., or an array of a billion numbers. Therefore the expanded size is computed
+first.
 """
 
 from __future__ import annotations
@@ -20,24 +21,24 @@ from minirospy.core.idl.spec import PRIMITIVES, MessageSpec
 
 __all__ = ["MAX_LEVELS", "MAX_TEXT", "check_spec", "check_type_name", "check_types", "is_type_name"]
 
-MAX_TEXT = 1 << 20  # characters in a full text; the largest of real packages have some 30,000
+MAX_TEXT = 1 << 20  # characters in a full text; the largest ones in real packages have some 30,000
 
 MAX_LEVELS = 50  # levels of nested messages
 
-# fields per message, including those of inner messages, which the generated source expands
+# Maximum fields per message, including those of inner messages, which the generated source expands
 _MAX_FIELDS = 4_000
 
-# The same for all types used by a message; the largest of MoveIt's has some 17,000
+# Maximum fields in all types that a message uses; the largest message in MoveIt has some 17,000
 _MAX_FIELDS_IN_ALL = 32_000
 
-_MAX_BYTES = 1 << 27  # memory limit for a message's arrays of fixed length
+_MAX_BYTES = 1 << 27  # memory limit for a message's fixed-length arrays
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _SHOWN = 80
 
 
 def is_type_name(name: str) -> bool:
-    """Return whether a string is ``pkg/Name`` by ROS's grammar, and neither part is a Python keyword."""
+    """Return whether a string is ``pkg/Name`` in ROS's grammar, and neither part is a Python keyword."""
     package, slash, short = name.partition("/")
     return bool(slash) and all(
         _NAME.fullmatch(part) and not keyword.iskeyword(part) for part in (package, short)
@@ -45,7 +46,7 @@ def is_type_name(name: str) -> bool:
 
 
 def check_type_name(name: str, where: str = "") -> None:
-    """Raise DefinitionError unless :func:`is_type_name`; ``where`` is the name of the text that contains it."""
+    """Raise DefinitionError if ``name`` is not a type name; ``where`` is the name of the text that contains it."""
     if is_type_name(name):
         return
     shown = _shown(name)
@@ -56,7 +57,7 @@ def check_type_name(name: str, where: str = "") -> None:
 
 
 def check_spec(spec: MessageSpec) -> None:
-    """Raise DefinitionError unless all names of a message are safe in generated source."""
+    """Raise DefinitionError unless all names in a message are safe in generated source."""
     check_type_name(spec.full_name)
 
     seen: set[str] = set()
@@ -73,10 +74,10 @@ def check_spec(spec: MessageSpec) -> None:
 
 
 def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list[str]:
-    """Return the names of a message and of all types that it uses, each after those that it uses itself.
+    """Return the names of a message and of all types that it uses, dependencies first.
 
     Raise DefinitionError if a name is not legal, if a message contains itself, or if it is too large or too
-    deeply nested for a class; also the exceptions of ``lookup``.
+    deeply nested for a class. Exceptions in ``lookup`` are passed on.
     """
     specs = {spec.full_name: spec}
     check_spec(spec)
@@ -93,7 +94,7 @@ def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list
     try:
         order = list(TopologicalSorter(needed).static_order())
     except CycleError as error:
-        # graphlib lists the first one twice.
+        # In graphlib's list of the cycle, the first name appears twice.
         around = spec.full_name if spec.full_name in error.args[1] else error.args[1][0]
         raise DefinitionError(spec.full_name, 1, f"[{around}] contains itself") from None
 
@@ -117,7 +118,7 @@ class _Size(NamedTuple):
 
 
 def _size_of(spec: MessageSpec, sizes: dict[str, _Size]) -> _Size:
-    """Return the size of a message whose inner messages have these ``sizes``."""
+    """Return a message's size, computed from the ``sizes`` of its inner messages."""
     fields, levels, memory = 5, 1, 0
     for field in spec.fields:
         inner = sizes.get(field.type.base)
@@ -126,7 +127,7 @@ def _size_of(spec: MessageSpec, sizes: dict[str, _Size]) -> _Size:
             each = 64 + inner.bytes
             levels = max(levels, inner.levels + 1)
         fields += 1 + (inner.fields if inner else 0)
-        # An array without a fixed length has no elements in a new message.
+        # In a new message, an array without a fixed length has no elements.
         memory += each * (1 if not field.type.is_array else field.type.length or 0)
     return _Size(fields, levels, memory)
 
@@ -141,7 +142,7 @@ def _check_size(where: str, size: _Size) -> None:
 
 
 def _shown(text: str) -> str:
-    """Return a peer's text for a one-line error: printable and shortened."""
+    """Return a peer's text for a one-line error, printable and shortened."""
     text = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
-    # A letter of another script may look like an ASCII letter.
+    # Escape non-ASCII letters, because a letter in another script may look like an ASCII letter.
     return text if text.isascii() and text.isprintable() else ascii(text)[1:-1]

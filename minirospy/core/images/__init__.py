@@ -1,1 +1,1 @@
-"""Images as arrays: encodings, views of messages, compression. Uses numpy; OpenCV or Pillow only if needed."""
+"""Images as arrays: encodings, views of messages, compression. Uses numpy, and OpenCV or Pillow only if needed."""

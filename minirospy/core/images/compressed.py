@@ -1,4 +1,4 @@
-"""Compressed images: with OpenCV if it is installed, else with Pillow (`pip install "minirospy[images]"`)."""
+"""Compressed images, with OpenCV if it is installed, else with Pillow (`pip install "minirospy[images]"`)."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _QUALITY = 95  # JPEG quality, OpenCV's default
 
 
 MAX_PIXELS = 100_000_000
-"""Pixels of a decoded image: a file of some kilobytes may have ten times as many, and take gigabytes."""
+"""Maximum pixels in a decoded image: a file of some kilobytes may have ten times as many, and use gigabytes of memory."""
 
 
 class Options(NamedTuple):
-    """Options of the compression."""
+    """Compression options."""
 
     quality: int = _QUALITY  # JPEG quality, from 1 to 100
     progressive: bool = False
@@ -57,8 +57,8 @@ def require_library() -> None:
 def decode(data: bytes, max_pixels: int = MAX_PIXELS) -> Pixels:
     """Decode a compressed image, with its channels in OpenCV's order: gray, BGR or BGRA.
 
-    Raise ValueError if it is not an image, or has more pixels than ``max_pixels``, before decoding anything. If the limit is
-    lower than the default, also refuse an image whose size cannot be determined in advance.
+    Raise ValueError, before decoding anything, if it is not an image or has more than ``max_pixels`` pixels. If the limit is
+    lower than the default, also reject an image whose size cannot be determined in advance.
     """
     import numpy as np
 
@@ -98,7 +98,7 @@ def _check_size(size: tuple[int, int], max_pixels: int) -> None:
 
 
 def encode(image: Pixels, format: str, options: Options | None = None) -> bytes:
-    """Encode an image, gray, BGR or BGRA, in a format such as jpg or png. Raise ValueError."""
+    """Encode a gray, BGR or BGRA image in a format such as jpg or png. Raise ValueError if the format is not supported."""
     options = options or Options()
     import numpy as np
 
@@ -139,7 +139,7 @@ def encode(image: Pixels, format: str, options: Options | None = None) -> bytes:
 
 
 def _swapped(image: Pixels) -> Pixels:
-    """Return an image with red and blue exchanged, since OpenCV uses BGR and Pillow RGB."""
+    """Return an image with red and blue exchanged, because OpenCV uses BGR and Pillow RGB."""
     import numpy as np
 
     if image.ndim == 2:

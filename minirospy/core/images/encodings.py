@@ -1,7 +1,7 @@
-"""Encodings of images, and conversions between them, with numpy. Pure.
+"""Image encodings, and conversions between them, with numpy. Pure.
 
-The numbers are OpenCV's: a type is a depth plus eight times the number of channels less one. The results of conversions
-equal OpenCV's bit by bit. Source: sensor_msgs/image_encodings.h, https://docs.opencv.org (cvtColor, convertTo).
+The numbers are OpenCV's: a type is a depth plus eight times the number of channels minus one. The results of conversions
+are bit for bit the same as OpenCV's. Source: sensor_msgs/image_encodings.h, https://docs.opencv.org (cvtColor, convertTo).
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ DEPTHS = {
     "32S": "int32",
     "32F": "float32",
     "64F": "float64",
-}  # OpenCV's depths -> numpy's types; a depth's number is its index
+}  # OpenCV's depths -> numpy types; a depth's number is its index
 
 _GENERIC = re.compile(r"(8U|8S|16U|16S|32S|32F|64F)(?:C(\d+))?\Z")
 _CHANNELS = {"mono": "Y", "bgr": "BGR", "rgb": "RGB", "bgra": "BGRA", "rgba": "RGBA"}
 _COLOR = re.compile(r"(mono|bgra?|rgba?|bayer_(?:rggb|bggr|gbrg|grbg))(8|16)\Z")
 _YUV = "yuv422"
-_GRAY = (9798, 19235, 3735)  # OpenCV's weights of red, green and blue, times 2**15
+_GRAY = (9798, 19235, 3735)  # OpenCV's weights for red, green and blue, times 2**15
 
 
 def type_of_encoding(encoding: str) -> int:
-    """Return the number of an encoding's type. Raise ValueError if it is unknown."""
+    """Return the type number of an encoding. Raise ValueError if it is unknown."""
     if encoding == _YUV:
         return _type("8U", 2)
     if match := _COLOR.match(encoding):
@@ -51,7 +51,7 @@ def _type(depth: str, channels: int) -> int:
 
 
 def is_converted_by_opencv(source: str, wanted: str) -> bool:
-    """Return whether a conversion needs OpenCV: from a Bayer pattern or YUV to colors."""
+    """Return whether a conversion needs OpenCV, which is the case from a Bayer pattern or YUV to colors."""
     return (
         _kind(source) in ("bayer", _YUV)
         and _kind(wanted) == "color"
@@ -60,9 +60,9 @@ def is_converted_by_opencv(source: str, wanted: str) -> bool:
 
 
 def converted(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Return an image in another encoding; the same array if nothing changes.
+    """Return an image in another encoding, or the same array if nothing changes.
 
-    Raise ValueError, with ROS's text, if the conversion does not exist.
+    Raise ValueError, with ROS's message, if there is no such conversion.
     """
     channels = type_of_encoding(source) // 8
     if wanted in ("", source):
@@ -92,7 +92,7 @@ def converted(image: Pixels, source: str, wanted: str) -> Pixels:
 
 
 def _kind(encoding: str) -> str:
-    """Return "color", "bayer" or "yuv422"; "" for an encoding without colors."""
+    """Return "color", "bayer" or "yuv422", or "" for an encoding without colors."""
     if encoding == _YUV:
         return _YUV
     match = _COLOR.match(encoding)
@@ -102,7 +102,7 @@ def _kind(encoding: str) -> str:
 
 
 def _recolored(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Return an image with the channels of another encoding, but its own depth."""
+    """Return an image with another encoding's channels, but its own depth."""
     import numpy as np
 
     if source == _YUV and wanted.startswith("mono"):
@@ -114,7 +114,7 @@ def _recolored(image: Pixels, source: str, wanted: str) -> Pixels:
     if before == after:
         return image
     if after == "Y":
-        # 32 bits suffice for 16 bits times 2**15.
+        # 32 bits suffice for 16-bit values times 2**15.
         red, green, blue = (image[..., before.index(each)].astype(np.uint32) for each in "RGB")
         sums = red * _GRAY[0] + green * _GRAY[1] + blue * _GRAY[2]
         return ((sums + (1 << 14)) >> 15).astype(image.dtype)
@@ -145,7 +145,7 @@ def _of_depth(image: Pixels, source: str, wanted: str) -> Pixels:
     values = image.astype(np.float64) * factor
     with np.errstate(invalid="ignore"):
         values = np.rint(values)
-        # As in OpenCV, values out of an int's range and NaN become its minimum, which is then clipped.
+        # As in OpenCV, NaN and values outside of an int's range become the int's minimum, which is then clipped.
         values[~((values >= -(2.0**31)) & (values < 2.0**31))] = -(2.0**31)
     limits = np.iinfo(dtype)
     return np.clip(values, limits.min, limits.max).astype(dtype)

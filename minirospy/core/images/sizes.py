@@ -1,7 +1,7 @@
 """Read the width and height of a compressed image from its header. Pure: nothing is decompressed.
 
-A file of some kilobytes may have 10,000 x 10,000 pixels, which take a decoder a gigabyte: servers check this first. Sources:
-PNG (third edition), ITU T.81 (JPEG), GIF89a, RFC 9649 (WebP), TIFF 6.0, ITU T.800 (JPEG 2000), netpbm, BMP.
+A file of some kilobytes may have 10,000 x 10,000 pixels, for which a decoder uses a gigabyte, so servers check the size
+first. Sources: PNG (third edition), ITU T.81 (JPEG), GIF89a, RFC 9649 (WebP), TIFF 6.0, ITU T.800 (JPEG 2000), netpbm, BMP.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _TIFF_SHORT, _TIFF_LONG = 3, 4
 
 
 def size_of(data: bytes) -> tuple[int, int] | None:
-    """Return width and height; None if the format is unknown or its header is invalid."""
+    """Return width and height, or None if the format is unknown or its header is invalid."""
     try:
         for magic, read in _READERS.items():
             if data.startswith(magic):
@@ -98,7 +98,7 @@ def _tiff(data: bytes) -> tuple[int, int] | None:
 
 
 def _jpeg_2000(data: bytes) -> tuple[int, int] | None:
-    # The marker SIZ directly follows the start of the codestream.
+    # The SIZ marker directly follows the start of the codestream.
     at = data.find(b"\xff\x4f\xff\x51")
     if at < 0:
         return None
@@ -121,4 +121,4 @@ _READERS = {
     b"MM\0*": _tiff,
     b"\0\0\0\x0cjP  ": _jpeg_2000,
     b"\xff\x4f\xff\x51": _jpeg_2000,
-}  # first bytes of a format -> function that reads its size
+}  # a format's first bytes -> function that reads the size

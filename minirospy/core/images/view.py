@@ -1,4 +1,4 @@
-"""The pixels of an image message, without a copy if its bytes have this machine's order. Pure."""
+"""An image message's pixels, without a copy if its byte order is this machine's. Pure."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ __all__ = ["pixels"]
 
 
 def pixels(message: Image) -> Pixels:
-    """Return the image of a message: (height, width) or (height, width, channels), in the message's encoding.
+    """Return a message's image: (height, width) or (height, width, channels), in the message's encoding.
 
     It is a read-only view unless the byte order must be changed. Padding after the rows (``step``) is removed. Raise
-    ValueError (an unknown encoding, less data than the size needs).
+    ValueError if the encoding is unknown, or there is less data than the size requires.
     """
     import numpy as np
 
@@ -27,7 +27,7 @@ def pixels(message: Image) -> Pixels:
     channels = number // 8 + 1
     dtype = np.dtype(list(DEPTHS.values())[number % 8]).newbyteorder(">" if message.is_bigendian else "<")
     row = message.width * channels * dtype.itemsize
-    # Some drivers do not set the step.
+    # Some drivers do not set ``step``.
     step = message.step if message.step >= row else row
     needed = max(message.height - 1, 0) * step + (row if message.height else 0)
     data = message.data

@@ -1,4 +1,4 @@
-"""Find the dead nodes of a nearly full master: those whose port refuses connections."""
+"""Find the dead nodes of a nearly full master: nodes whose port refuses connections."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SECONDS = 3.0
 async def find_dead(rpc: AsyncRpcClient, nodes: Mapping[str, str]) -> AsyncIterator[tuple[str, str]]:
     """Yield (name, URI) of each node in ``nodes`` (name -> URI) that refuses connections. Connect to each host and port once.
 
-    A node that does not answer is not reported: it may be slow, or its network may be down.
+    A node that does not respond is not reported: it may be slow, or its network may be down.
     """
     names: dict[str, list[str]] = {}
     for name, uri in nodes.items():

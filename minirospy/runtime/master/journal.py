@@ -1,9 +1,9 @@
-"""The master's journal on disk: the state that the successor of a killed master recovers.
+"""The master's journal on disk: the state from which another master continues if this one is killed.
 
 There is one file per user and port, ``ROS_HOME/master/journal-PORT``. Each record is written, without fsync, before
-the caller gets its answer, so kill -9 loses nothing that was answered. A power cut may lose the last seconds, but it
-also ends the nodes of this machine. The file is rewritten, and then synced, once it has grown to several times the size
-of the state. A master that shuts down cleanly removes the file: the next session starts empty.
+the caller gets its response, so kill -9 loses nothing that was confirmed. A power cut may lose the last seconds, but it
+also terminates the nodes on this machine. The file is rewritten, and then synced, once it has grown to several times the
+size of the state. A master that shuts down cleanly removes the file, so that the next session starts empty.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _STEP_RECORDS = 200
 RETRY_SECONDS = 30.0  # seconds before writing the journal again after a failure
 
 _BUSY = {errno.EAGAIN, errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK}
-"""The errors of locking a file that another process has locked; Windows raises the last two."""
+"""The errors from locking a file that another process has locked; Windows raises the last two."""
 
 
 class JournalBusyError(Exception):
@@ -50,9 +50,9 @@ class JournalBusyError(Exception):
 
 
 class Left(NamedTuple):
-    """The state in the journal of a killed master; ``age``: seconds since its last write.
+    """The state in a killed master's journal; ``age``: seconds since its last write.
 
-    ``copy`` is the path of the copy of a damaged journal, or None if the copy failed.
+    ``copy`` is the path of the copy of a damaged journal, or None if copying failed.
     """
 
     recovered: Recovered
@@ -62,7 +62,7 @@ class Left(NamedTuple):
 
 
 class Journal:
-    """An open journal. ``snapshot`` returns the records that make up the present state, for a rewrite.
+    """An open journal. ``snapshot`` returns the records that make up the current state, for a rewrite.
 
     Call :meth:`lock`, :meth:`read`, :meth:`start`, then :meth:`append`, in this order. If the disk fails at any step,
     the master runs without a journal: ``trouble`` is the reason, and a complete rewrite is retried every half minute.
@@ -75,7 +75,7 @@ class Journal:
         clock: Callable[[], float] = time.monotonic,
         start_steps: Callable[[Steps[None]], object] = finish,
     ) -> None:
-        """Take ``start_steps``, which runs long work, such as rewriting a large journal: immediately, or in steps."""
+        """Create the journal; ``start_steps`` runs long work, such as a large rewrite, immediately or in steps."""
         self.path = path
         self._start_steps = start_steps
         self._snapshot = snapshot
@@ -86,7 +86,7 @@ class Journal:
         self._size = 0
         self._compact_at: int
         self._failed_at: float
-        self.trouble = ""  # the reason why nothing is written at present, or ""
+        self.trouble = ""  # the reason why the journal is not being written, or ""
 
         # The numbers of the large values that are being stored, and the last number used.
         self._stored: set[int] = set()
@@ -104,13 +104,16 @@ class Journal:
         return self._size
 
     def lock(self) -> None:
-        """Lock the journal, so that only this process writes it. Raise OSError or JournalBusyError."""
+        """Lock the journal, so that only this process writes it.
+
+        Raise JournalBusyError if another master has locked it, OSError if it cannot be locked.
+        """
         if self._lock is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._lock = _locked(self.path.with_name(self.path.name + ".lock"), self.path)
 
     def read(self) -> Left | None:
-        """Return the state that another master left, or None if there is none."""
+        """Return the state that a killed master left, or None if there is none."""
         try:
             data, written = private_files.read_file(self.path)
         except (FileNotFoundError, NotADirectoryError):
@@ -125,12 +128,12 @@ class Journal:
         return Left(recovered, max(0.0, time.time() - written), same_boot, copy)
 
     def discard(self) -> None:
-        """Discard the state that another master left."""
+        """Discard the state that a killed master left."""
         with contextlib.suppress(OSError):
             self.path.unlink()
 
     def start(self) -> None:
-        """Write the present state; from now on :meth:`append` writes each change. Never raises: see ``trouble``."""
+        """Write the current state; after this, :meth:`append` writes each change. Never raises: see ``trouble``."""
         try:
             self.lock()
             self.rewrite()
@@ -138,7 +141,7 @@ class Journal:
             self._fail(error)
 
     def rewrite(self) -> None:
-        """Replace the file's contents by the present state. Raise OSError; the old file then remains."""
+        """Replace the file's contents with the current state. Raise OSError if the disk fails; the old file then remains."""
         head = HEAD + serialize_record(["boot", boot_id()])
         data = head + b"".join(serialize_record(record) for record in self._snapshot())
         self._abandon()
@@ -149,10 +152,10 @@ class Journal:
             os.fsync(file)
             file = self._put_in_place(file)
         except BaseException:
-            # Windows has already closed it.
+            # Windows has already closed the file.
             with contextlib.suppress(OSError):
                 os.close(file)
-            # On a full disk, free the space: the old file may need it.
+            # Free the space on a full disk, because the old file may need it.
             with contextlib.suppress(OSError):
                 new.unlink()
             raise
@@ -167,7 +170,8 @@ class Journal:
         try:
             if record[0] == "put":
                 if record[2] not in self._stored:
-                    # The disk failed meanwhile, and the parts of the value were lost with the old file.
+                    # The disk failed meanwhile, and the parts of the value were lost with the old file, so write
+                    # everything again.
                     self.rewrite()
                     return
                 self._stored.discard(record[2])
@@ -214,7 +218,7 @@ class Journal:
             self._since.append(data)
 
     def _rewrite_in_steps(self, number: int) -> Steps[None]:
-        """Do the same as :meth:`rewrite`, in steps, while :meth:`append` goes on."""
+        """Do the same as :meth:`rewrite`, in steps, while :meth:`append` continues to write."""
         size = 0
         try:
             if number != self._rewrites:
@@ -229,7 +233,7 @@ class Journal:
                     return
             size += self._write_since(self._second)
 
-            # Syncing may take long, and other writes to the file wait for it.
+            # Sync in a thread: syncing may take long, and other writes to the file wait for it.
             syncing = _Sync(self._second)
             syncing.start()
             while syncing.is_alive():
@@ -245,21 +249,24 @@ class Journal:
             _log.warning("the journal %s could not be rewritten, it keeps growing: %s", self.path, error)
             self._compact_at = 2 * self._size
             if self._file is None:
-                # On Windows the old file is already closed here.
+                # On Windows the old file has already been closed at this point.
                 self._fail(error)
         finally:
             if number == self._rewrites:
                 self._abandon()
 
     def _write_since(self, file: int) -> int:
-        """Write the records appended since the rewrite started to the new file; return the number of bytes. Raise OSError."""
+        """Write the records appended since the rewrite started to the new file; return the number of bytes.
+
+        Raise OSError if the disk fails.
+        """
         data = b"".join(self._since or ())
         _write_all(file, data)
         self._since = []
         return len(data)
 
     def _put_in_place(self, file: int) -> int:
-        """Rename the new, synced file to the journal's name; return its open descriptor. Raise OSError."""
+        """Rename the new, synced file to the journal's name; return its open descriptor. Raise OSError if renaming fails."""
         if sys.platform == "win32":
             # Windows can neither replace an open file nor rename one.
             self._close_file()
@@ -289,14 +296,14 @@ class Journal:
                 self._new_path.unlink()
 
     def retry(self) -> None:
-        """Write the present state if writing failed at least half a minute ago. Never raises."""
+        """Write the current state if writing failed at least half a minute ago. Never raises."""
         if self.trouble and self._clock() - self._failed_at >= RETRY_SECONDS:
             self.start()
             if not self.trouble:
                 _log.warning("the journal %s is written again", self.path)
 
     def touch(self) -> None:
-        """Record that this master is alive, for the age that :meth:`read` returns."""
+        """Record that this master is alive; :meth:`read` computes the age from this."""
         if self._lock is None:
             return
         with contextlib.suppress(OSError):
@@ -310,7 +317,7 @@ class Journal:
         self.close()
 
     def close(self) -> None:
-        """Close the file and keep its contents. Idempotent."""
+        """Close the file without removing it. Idempotent."""
         self._abandon()
         self._close_file()
         self.trouble = ""
@@ -365,12 +372,12 @@ class Journal:
 
 
 def _pieces_of(records: Iterable[list[object]]) -> Iterator[bytes]:
-    """Yield the bytes of a complete journal, large values in parts."""
+    """Yield the bytes of a complete journal, with large values in parts."""
     yield HEAD + serialize_record(["boot", boot_id()])
     written: list[bytes] = []
     for number, record in enumerate(records):
         if record[0] == "set" and not is_small(record[2]):
-            # Negative numbers, since values stored later get positive ones.
+            # Use negative numbers, since values stored later get positive ones.
             for piece in pack_in_steps(record[2]):
                 yield serialize_record(["part", -number - 1, piece])
             written.append(serialize_record(["put", record[1], -number - 1]))
@@ -383,7 +390,7 @@ def _pieces_of(records: Iterable[list[object]]) -> Iterator[bytes]:
 
 
 class _Sync(threading.Thread):
-    """A thread that syncs a file, which may take long; ``error`` is the error from the disk."""
+    """A thread that syncs a file, which may take long; ``error`` is the disk's error, if any."""
 
     def __init__(self, file: int) -> None:
         super().__init__(name="minirospy-journal-sync", daemon=True)
@@ -408,9 +415,9 @@ def _write_all(file: int, data: bytes) -> None:
 
 
 def _locked(path: Path, journal: Path) -> int:
-    """Return the descriptor of a lock that the system releases when this process exits; the file contains the process id.
+    """Return the descriptor of a lock file, which contains the process id; the system releases the lock when this process exits.
 
-    Raise as Journal.lock.
+    Raise JournalBusyError if another master has locked it, OSError if it cannot be locked.
     """
     file = private_files.open_file(path, os.O_RDWR | os.O_CREAT, 0o600)
     try:
@@ -432,7 +439,7 @@ def _locked(path: Path, journal: Path) -> int:
             text = os.read(file, 20).strip()
             os.close(file)
             raise JournalBusyError(journal, int(text) if text.isdigit() else 0) from error
-        # The file system has no locks; but no other master can have the same port.
+        # The file system does not support locks. Continue, because no other master can have the same port.
 
     # The lock works even if a full disk prevents writing the process id.
     with contextlib.suppress(OSError):
@@ -448,5 +455,5 @@ def boot_id() -> str:
     except OSError:
         import psutil
 
-        # Except on Linux, the boot time is computed back from now and varies by about a second.
+        # On systems other than Linux the boot time is computed from the current time, and varies by about a second.
         return str(round(psutil.boot_time() / 60))

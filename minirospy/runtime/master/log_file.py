@@ -1,4 +1,4 @@
-"""The log files of a master. Lines are collected and written twice a second, so that thousands per second cost little."""
+"""A master's log files. Lines are collected and written twice a second, so that thousands per second cost little."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ from minirospy.base.escape import escaped
 __all__ = ["LogFile", "LogFileHandler"]
 
 _SECONDS = 0.5
-_MAX_PENDING = 64 * 1024  # characters to collect at most: writing megabytes in one go would block the master
+# maximum characters to collect: writing megabytes in one call would block the master
+_MAX_PENDING = 64 * 1024
 
 
 class LogFileHandler(RotatingFileHandler):
-    """A logging handler that does not follow symbolic links, since the name of a log file can be predicted."""
+    """A logging handler that does not follow symbolic links, since another user could predict the log file's name."""
 
     def __init__(self, path: Path, most_bytes: int = 0, older_files: int = 0) -> None:
-        """Open ``path``; ``most_bytes`` 0 means no limit. Raise OSError."""
+        """Open ``path``; ``most_bytes`` 0 means no limit. Raise OSError if it cannot be opened."""
         super().__init__(path, maxBytes=most_bytes, backupCount=older_files, encoding="utf-8")
 
     def _open(self) -> TextIOWrapper:
@@ -35,10 +36,10 @@ class LogFileHandler(RotatingFileHandler):
 
 
 class LogFile(LogFileHandler):
-    """The log file ``path``, of ``most_bytes`` at most, with up to three rotated files.
+    """The log file ``path``, of at most ``most_bytes``, with up to three rotated files.
 
-    Used as a logging handler, it writes warnings and errors immediately. :meth:`line` and :meth:`text` add plain strings,
-    on the loop.
+    Used as a logging handler, it writes warnings and errors immediately. :meth:`line` and :meth:`text` add plain strings
+    and must be called on the loop.
     """
 
     def __init__(self, path: Path, most_bytes: int, name: str) -> None:
@@ -52,11 +53,11 @@ class LogFile(LogFileHandler):
         self._second = (0, "")
 
     def line(self, text: str) -> None:
-        """Add a line of level INFO (on the loop)."""
+        """Add a line with level INFO. Call this on the loop."""
         self.text(f"{self._line_head}{self._stamp(time.time())}: {escaped(text)}")
 
     def text(self, text: str) -> None:
-        """Add a line that already contains its time and level (on the loop)."""
+        """Add a line that already contains its time and level. Call this on the loop."""
         self._add(text + "\n")
         if self._pending > _MAX_PENDING:
             self._write_out()
@@ -64,7 +65,7 @@ class LogFile(LogFileHandler):
             self._timer = asyncio.get_running_loop().call_later(_SECONDS, self._time_is_up)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Add a record, from any thread."""
+        """Add a record. Thread-safe."""
         try:
             self._add(self.format(record) + "\n")
         except Exception:  # noqa: BLE001 - as every handler of logging
@@ -77,7 +78,7 @@ class LogFile(LogFileHandler):
         self._write_out()
 
     def close(self) -> None:
-        """Write the pending lines, and close. Idempotent."""
+        """Write the pending lines, and close the file. Idempotent."""
         self._write_out()
         if self._timer:
             self._timer.cancel()
@@ -113,7 +114,8 @@ class LogFile(LogFileHandler):
                 self.stream.write("".join(lines))
                 self.stream.flush()
             except (OSError, ValueError):
-                # A full disk must not stop the master. Unwritten data in the stream would make its close fail again.
+                # A full disk must not stop the master. Discard the stream: its unwritten data would make closing it
+                # fail again.
                 if self.stream:
                     with contextlib.suppress(OSError, ValueError):
                         self.stream.close()
@@ -121,7 +123,7 @@ class LogFile(LogFileHandler):
 
 
 class _Formatter(logging.Formatter):
-    """Formats records like the other lines; caches the formatted time for each second."""
+    """Formats records like the other lines; caches the formatted time of the current second."""
 
     def __init__(self, stamp: Callable[[float], str]) -> None:
         super().__init__("[%(name)s][%(levelname)s] %(asctime)s: %(message)s")
@@ -131,6 +133,6 @@ class _Formatter(logging.Formatter):
         return self._stamp(record.created)
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's
-        # Peers choose the names and URIs in the message: these must not start another line.
+        # Peers choose the names and URIs in the message: escape them, so that they cannot start another line.
         record.message = escaped(record.message)
         return super().formatMessage(record)

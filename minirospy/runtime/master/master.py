@@ -1,6 +1,6 @@
 """The master: its server, its calls to nodes, its journal, and the check of a killed master's nodes.
 
-The answers are computed in ``core/graph/master_api.py``.
+``core/graph/master_api.py`` computes the responses.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ _RESTART_SECONDS = 600.0  # maximum age of a killed master's journal for its ses
 
 _COLLECT_SECONDS = 60.0
 _COLLECT = (2000, 5, 1_000_000_000)
-"""The garbage collector's thresholds: it examines at most 10,000 objects, for some 4 ms; the oldest generation is not
+"""The garbage collector's thresholds: it examines at most 10,000 objects, which takes some 4 ms; the oldest generation is not
 collected automatically.
 """
 
@@ -83,17 +83,17 @@ class Master(MasterApi):
         same_host: bool = True,
         owns_process: bool = False,
     ) -> None:
-        """Take ``journal``, the file that stores the master's state (None: no file); ``fresh`` discards its contents.
+        """Create the master. ``journal`` is the file that stores its state (None: no file); ``fresh`` empties the file.
 
-        ``timeout``: seconds that a node has to answer a call. ``same_host``: processes on this machine may connect, and are
-        called, through Unix sockets. ``owns_process``: the process runs only the master, which may tune the garbage collector.
+        ``timeout``: seconds that a node has to respond to a call. ``same_host``: use Unix sockets for connections from and to
+        processes on this machine. ``owns_process``: the process runs only the master, which may tune the garbage collector.
         """
         super().__init__()
         self.host = host
         self.calls = 0
-        # The serialized answer to getSystemState, and the registry's change count at which it was serialized.
+        # The serialized response to getSystemState, and the registry's change count when it was serialized.
         self._state = (-1, Serialized(()))
-        # Messages for the user about the start: what was recovered, and what was not
+        # Messages for the user about the start: what was recovered, and what could not be recovered
         self.news: list[str] = []
         self._started = time.monotonic()
         self._journal_path = journal
@@ -115,7 +115,7 @@ class Master(MasterApi):
         self._touching: asyncio.TimerHandle | None = None
         self._collecting: asyncio.TimerHandle | None = None
         self._sweeping: asyncio.Task[None] | None = None
-        self.stopped = asyncio.Event()  # set when a stop of the master was requested
+        self.stopped = asyncio.Event()  # set when the master is requested to stop
 
     @property
     def port(self) -> int:
@@ -131,17 +131,17 @@ class Master(MasterApi):
     def session(self) -> str:
         """The /run_id of the continued session; "" if the session is new."""
         found = self.parameters.get("/run_id") if self.parameters.has("/run_id") else ""
-        # It becomes the name of a folder, and any node may have set it.
+        # Check the id: it becomes a folder name, and any node may have set it.
         return found if isinstance(found, str) and re.fullmatch(r"[\w-]{1,64}", found) else ""
 
     @property
     def omits_topics(self) -> bool:
-        """Return whether rosout.log leaves out the topics of nodes: the parameter /rosout/omit_topics."""
+        """Return whether rosout.log omits the topic lists, as the parameter /rosout/omit_topics specifies."""
         key = "/rosout/omit_topics"
         return self.parameters.has(key) and self.parameters.get(key) is True
 
     async def start(self) -> None:
-        """Bind the port, recover the state of a killed master, and serve. Raise OSError."""
+        """Bind the port, recover a killed master's state, and serve. Raise OSError if the port cannot be bound."""
         # Bind the port first: of two masters that start together, the one that gets the port also gets the journal.
         self._server.listen()
         try:
@@ -160,7 +160,7 @@ class Master(MasterApi):
         self._sweeping = asyncio.ensure_future(self._sweep())
 
     async def close(self, *, keep_journal: bool = False) -> None:
-        """Stop and remove the journal, so that the next master starts empty. Idempotent.
+        """Stop, and remove the journal, so that the next master starts empty. Idempotent.
 
         With ``keep_journal`` the next master continues this session.
         """
@@ -180,11 +180,14 @@ class Master(MasterApi):
                 self._journal.remove()
 
     def attach(self, node: Node) -> None:
-        """Notify ``node``, which has started on this loop, of publishers directly, without an XML-RPC call."""
+        """Notify ``node``, which runs on this loop, of publishers directly, without an XML-RPC call."""
         self._notifier.here[node.uri] = node.publishers_changed
 
     def serve(self, method: str, args: Sequence[object]) -> object:
-        """Return the answer to one call from a client, possibly already serialized. Raise RpcFault as :meth:`dispatch`."""
+        """Return the response to one call from a client, possibly already serialized.
+
+        Raise RpcFault as :meth:`dispatch` does, if the method is unknown.
+        """
         self.calls += 1
         if method == "getSystemState" and len(args) == 1 and isinstance(args[0], str):
             if self._state[0] == self.registry.changes:
@@ -194,11 +197,11 @@ class Master(MasterApi):
         return self.dispatch(method, args)
 
     def _write_state(self) -> Steps[Serialized]:
-        """Return the serialized system state. It is cached, since it is slow to serialize and tools request it all the time."""
+        """Return the serialized system state. It is cached, because it is slow to serialize and tools request it often."""
         if self.registry.is_large:
             yield ALONE
         if self._state[0] == self.registry.changes:
-            # It was serialized while this client waited.
+            # Another client's request serialized the state while this client waited.
             return self._state[1]
 
         changes = self.registry.changes
@@ -210,7 +213,7 @@ class Master(MasterApi):
         return state
 
     def notify(self, action: Notice) -> None:
-        """Call the node that the notice is for."""
+        """Send the notification to its node."""
         if isinstance(action, NodeShutdown):
             self.parameters.unsubscribe_node(action.name, action.uri)
             self._replaced.warning("another node took the name %s: %s is stopped", action.name, action.uri)
@@ -225,7 +228,7 @@ class Master(MasterApi):
         return self.parameters.get(key) if self.parameters.has(key) else {}
 
     def subscribed_parameters(self, uri: str) -> list[str]:
-        """Return the keys of parameters that the node at ``uri`` has subscribed to."""
+        """Return the parameter keys that the node at ``uri`` has subscribed to."""
         return self.parameters.subscribed_keys(uri)
 
     def defer(self, uri: str, topic: str) -> None:
@@ -279,7 +282,7 @@ class Master(MasterApi):
         return f"{self._journal.path} ({self._journal.size} bytes)"
 
     async def _open_journal(self) -> dict[str, str]:
-        """Recover the state from the journal, and start to write it; return the nodes to check, with their URIs."""
+        """Recover the state from the journal, and start to write the journal; return the nodes to check, with their URIs."""
         from minirospy.runtime.master.journal import RETRY_SECONDS, Journal, JournalBusyError
 
         assert self._journal_path
@@ -295,7 +298,7 @@ class Master(MasterApi):
             # The journal belongs to another master.
             busy = error
         except OSError:
-            # The journal may still be readable. :meth:`Journal.start` finds out whether it is writable.
+            # The journal may still be readable. :meth:`Journal.start` then determines whether it is writable.
             pass
 
         if busy:
@@ -326,7 +329,7 @@ class Master(MasterApi):
 
         uri = self.registry.node_uri(_OWN_NODE)
         if uri:
-            # The /rosout node exited with its master; this master starts its own.
+            # The /rosout node exited with the master that ran it; this master starts its own.
             self.registry.forget(_OWN_NODE, uri)
 
         if recovered.damage:
@@ -351,7 +354,7 @@ class Master(MasterApi):
         self.news.append(f"journal: recovered {what}")
 
     def _collect(self) -> None:
-        """Have the garbage collector examine only the youngest objects, and all objects now and then if they are few.
+        """Restrict the garbage collector to the youngest objects; collect all objects now and then if there are few.
 
         Examining all objects would block a master with many registrations, which hardly ever has cyclic garbage.
         """
@@ -400,9 +403,9 @@ class Master(MasterApi):
         _log.warning("of %s %d answer, the others are forgotten", _many(found, "recovered node"), sum(found))
 
     async def _sweep(self) -> None:
-        """Forget the nodes whose port refuses connections, whenever the registrations are nearly full.
+        """Forget the nodes whose port refuses connections whenever the registrations are nearly full.
 
-        Otherwise they would stay full: like rosmaster, this master keeps the registrations of a killed node.
+        Without this they would stay full, because this master, like rosmaster, keeps a killed node's registrations.
         """
         while True:
             await asyncio.sleep(_SWEEP_SECONDS)
@@ -429,7 +432,7 @@ class Master(MasterApi):
 
 
 async def _lock(journal: Journal) -> None:
-    """Lock the journal, as Journal.lock; if it is locked, retry for a moment. The caller has bound the port."""
+    """Lock the journal; if another process has locked it, retry for a moment. The caller has bound the port."""
     from minirospy.runtime.master.journal import JournalBusyError
 
     end = time.monotonic() + _LOCK_SECONDS
@@ -445,7 +448,7 @@ async def _lock(journal: Journal) -> None:
 
 
 async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries: int = 1) -> bool:
-    """Return whether the node still is at its URI. Any answer counts, except the name of another node."""
+    """Return whether the node is still at its URI. Any response counts, unless it contains another node's name."""
     for _ in range(tries):
         try:
             answer = await rpc.call(uri, "getName", "/master", timeout=timeout)
@@ -453,7 +456,7 @@ async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries
             if isinstance(error.__cause__, (ConnectionRefusedError, EOFError)):
                 return False
         except RpcError:
-            # roscpp has no getName and returns an error.
+            # roscpp has no getName and returns an error, so an error is a response too.
             return True
         else:
             return not (

@@ -35,14 +35,14 @@ _TICK = 0.001
 _HOLD_SECONDS = 0.02
 _HOLD_TICK = 0.01
 
-_SECONDS_PER_TURN = 0.003  # time limit per loop iteration, to start calls
+_SECONDS_PER_TURN = 0.003  # time limit per loop iteration for starting calls
 
-# Pending parameter notices per node; beyond that, one notice for each subscribed key replaces them
+# Pending parameter notifications per node; if there are more, one notification per subscribed key replaces them
 _MAX_PARAMETERS = 32
 
-_LARGE_BYTES = 32 * 1024 * 1024  # total size of large calls in progress, above which the next one waits
+_LARGE_BYTES = 32 * 1024 * 1024  # maximum total size of large calls in progress; the next one is queued
 
-_MAX_ANSWER = 65536  # bytes of a node's answer to a notice, which is ignored
+_MAX_ANSWER = 65536  # maximum bytes of a node's response to a notification; the response is ignored
 
 
 class State(Protocol):
@@ -60,19 +60,19 @@ class State(Protocol):
 
 @dataclass(eq=False, slots=True)
 class _Backlog:
-    """The pending notifications of one node: the newest of each topic and parameter."""
+    """One node's pending notifications: only the newest for each topic and parameter."""
 
     uri: str
     notices: dict[object, Notice] = field(default_factory=dict)
-    parameters: int = 0  # number of pending parameter notices
-    # Topic -> time before which no notice of it is sent
+    parameters: int = 0  # number of pending parameter notifications
+    # Topic -> earliest time at which its next notification may be sent
     pauses: dict[object, float] = field(default_factory=dict)
     timer: asyncio.TimerHandle | None = None
 
 
 @dataclass(eq=False, slots=True)
 class _Line:
-    """Nodes that wait for their call; at most ``most`` are called concurrently."""
+    """A queue of nodes to call; at most ``most`` are called concurrently."""
 
     most: int
     under_way: int = 0
@@ -80,23 +80,23 @@ class _Line:
 
 
 class Notifier:
-    """Sends notices. Nodes that did not answer the last notice share a few call slots.
+    """Sends notifications to nodes. Nodes that did not respond to the last notification share a few call slots.
 
     Only the newest list of a topic's publishers, or value of a parameter, is queued: older ones are obsolete. Processing a
-    very long list costs the receiver time, so for a topic with thousands of publishers the next list follows after a pause.
+    very long list costs the receiver time, so if a topic has thousands of publishers, the next list is sent after a pause.
     """
 
     def __init__(self, state: State, turns: Turns, timeout: float, *, same_host: bool = True) -> None:
-        """Take ``turns``, which run long work, and ``timeout``, the time limit of a call in seconds."""
+        """Create the notifier; ``turns`` runs long work, ``timeout`` is the time limit for a call in seconds."""
         self._state = state
         self._turns = turns
         self._timeout = timeout
         self._rpc = AsyncRpcClient(same_host=same_host, max_answer=_MAX_ANSWER)
 
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
-        """URI of a node on this loop -> function called with a topic and its publishers in place of an XML-RPC call."""
+        """URI of a node on this loop -> function to call with a topic and its publishers, instead of an XML-RPC call."""
         self._nodes: dict[str, _Backlog] = {}
-        # (URI, topic) -> time before which no notice of it is sent, the earliest first.
+        # (URI, topic) -> earliest time at which its next notification may be sent, earliest first.
         self._held: dict[tuple[str, str], float] = {}
 
         self._line = _Line(_MAX_CONCURRENT_CALLS)
@@ -110,25 +110,26 @@ class Notifier:
         # The last serialized large update, of a topic or a parameter.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
 
-        # Large calls that wait; the bytes of those in progress; whether one is being serialized.
+        # The queued large calls; the bytes of those in progress; whether one is being serialized.
         self._large: deque[Callable[[], None]] = deque()
         self._large_bytes = 0
         self._is_writing = False
 
     def defer(self, uri: str, topic: str) -> None:
-        """Delay notices to a node whose pending answer contains the current state of a topic, or of PARAMETERS.
+        """Delay notifications to a node whose pending response contains the current state of a topic, or of PARAMETERS.
 
-        A rospy node that receives the update first and then the answer applies the answer, which is the older of the two.
+        If a rospy node received the update first and then the response, it would apply the response, which is the older of the
+        two.
         """
         now = asyncio.get_running_loop().time()
         while self._held and next(iter(self._held.values())) <= now:
             del self._held[next(iter(self._held))]
         self._held.pop((uri, topic), None)
-        # Round up to a tick, so that all delays that end within one tick wake the master once.
+        # Round up to a tick, so that the master wakes up once for all delays that end within one tick.
         self._held[uri, topic] = (now // _HOLD_TICK + 1) * _HOLD_TICK + _HOLD_SECONDS
 
     def send(self, notice: Notice) -> None:
-        """Call the node that the notice is for, soon."""
+        """Call the node that the notification is for, soon."""
         key: object = object()
         end: float | None = None
 
@@ -146,7 +147,7 @@ class Notifier:
 
         if end and end > asyncio.get_running_loop().time():
             node.pauses[key] = max(end, node.pauses.get(key, 0.0))
-        # Move a parameter's notice behind the pending ones of its parents and children.
+        # Queue a parameter's notification after the pending ones for its parents and children.
         if isinstance(notice, ParameterUpdate) and node.notices.pop(key, None) is None:
             node.parameters += 1
         node.notices[key] = notice
@@ -157,7 +158,7 @@ class Notifier:
             self._go_on(node)
 
     async def close(self) -> None:
-        """Discard the pending notices."""
+        """Discard the pending notifications."""
         self._closed = True
         for node in self._nodes.values():
             if node.timer:
@@ -165,7 +166,7 @@ class Notifier:
         await self._rpc.close()
 
     def _summarize(self, node: _Backlog) -> None:
-        """Replace the notices of many parameters by one for each key that the node subscribed to."""
+        """Replace the notifications for many parameters with one for each key that the node subscribed to."""
         for key in [key for key, notice in node.notices.items() if isinstance(notice, ParameterUpdate)]:
             del node.notices[key]
         for name in self._state.subscribed_parameters(node.uri):
@@ -177,7 +178,7 @@ class Notifier:
         self._start_soon()
 
     def _start_soon(self) -> None:
-        # Not immediately: the registering node gets its answer first.
+        # Do not start the calls immediately: the registering node gets its response first.
         if not self._starts_soon:
             self._starts_soon = True
             asyncio.get_running_loop().call_soon(self._start)
@@ -193,7 +194,7 @@ class Notifier:
                 self._call(line.waiting.popleft(), line)
 
     def _call(self, node: _Backlog, line: _Line) -> None:
-        """Send a node its first notice that is not paused."""
+        """Send a node its first notification that is not paused."""
         key = next((key for key in node.notices if key not in node.pauses), None)
         if key is None:
             self._go_on(node)
@@ -226,12 +227,12 @@ class Notifier:
     def _call_later(
         self, node: _Backlog, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
     ) -> None:
-        """Send a large notice as soon as the memory limit allows."""
+        """Send a large notification as soon as the memory limit allows."""
 
         def start() -> None:
             self._turns.start(self._call_in_steps(node, line, notice, count))
 
-        # Nodes that answered the last notice come first.
+        # Call nodes that responded to the last notification first.
         (self._large.append if line is self._suspect_line else self._large.appendleft)(start)
         self._start_large()
 
@@ -275,7 +276,7 @@ class Notifier:
     def _called(
         self, node: _Backlog, line: _Line, notice: Notice, count: int, size: int, answer: Body | RpcError
     ) -> None:
-        """Continue after a call that listed ``count`` publishers; ``size`` is its bytes if it was large."""
+        """Continue after a call whose notification listed ``count`` publishers; ``size`` is its bytes if it was large."""
 
         line.under_way -= 1
         self._large_bytes -= size
@@ -302,7 +303,7 @@ class Notifier:
             self._start_soon()
 
     def _go_on(self, node: _Backlog) -> None:
-        """Queue the node if it has a notice to send; otherwise wait for the end of its first pause, if any."""
+        """Queue the node if it has a notification to send; otherwise wait for the end of its first pause, if any."""
         if node.timer:
             node.timer.cancel()
             node.timer = None

@@ -19,7 +19,7 @@ __all__ = ["Replay", "changes_to", "forget_node"]
 
 
 class Replay:
-    """Applies the records of a journal, in their order."""
+    """Applies a journal's records in order."""
 
     def __init__(self, registry: Registry, parameters: ParameterTree) -> None:
         self._registry = registry
@@ -28,7 +28,7 @@ class Replay:
         self._parts: dict[int, list[bytes]] = {}
 
     def apply(self, what: str, *args: Any) -> None:
-        """Apply one change; the nodes that were notified of it then are not notified again.
+        """Apply one change. Nodes that were notified when it happened are not notified again.
 
         Raise TypeError, ValueError, KeyError or MinirospyError if the record is invalid.
         """
@@ -76,7 +76,7 @@ class Replay:
 
 
 def changes_to(registry: Registry, parameters: ParameterTree) -> Iterator[list[object]]:
-    """Return the changes that lead from an empty state to the present one, preserving the order of every table.
+    """Return the changes that lead from an empty state to the current one, preserving the order of every table.
 
     The state is copied immediately: the returned changes may be read while the state changes further.
     """
@@ -96,6 +96,6 @@ def changes_to(registry: Registry, parameters: ParameterTree) -> Iterator[list[o
 
 
 def forget_node(registry: Registry, parameters: ParameterTree, name: str, uri: str) -> list[Notice]:
-    """Forget everything that the node ``name`` at ``uri`` has registered; return the notices to send."""
+    """Forget everything that the node ``name`` at ``uri`` has registered; return the notifications to send."""
     parameters.unsubscribe_node(name, uri)
     return list(registry.forget(name, uri))

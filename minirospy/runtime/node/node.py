@@ -1,7 +1,7 @@
 """A node: its servers, its registrations with the master, and its connections to peers.
 
 Everything here runs on one event loop; a process may have several nodes. ``minirospy.client`` is the blocking
-API in front of it.
+API for it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _REQUEST_AGAIN_SECONDS = 0.5
 
 
 class Node:
-    """A node of the computation graph, with a global name (``/talker``).
+    """A node in the computation graph, with a global name (``/talker``).
 
     ``await start()`` opens its servers. ``advertise``, ``subscribe`` and ``serve`` register with the master. If that
     fails, they raise MasterUnreachableError or RpcRefused, but the topic or service remains and is registered later.
@@ -55,9 +55,9 @@ class Node:
         on_parameter: Callable[[str, object], None] | None = None,
         watch_seconds: float = 2.0,
     ) -> None:
-        """Take the functions ``on_shutdown(reason)`` and ``on_parameter(key, value)``, which are called in a worker.
+        """Create the node; ``on_shutdown(reason)`` and ``on_parameter(key, value)`` are called in a worker.
 
-        Every ``watch_seconds`` the node checks whether the master still knows it.
+        Every ``watch_seconds`` the node checks whether it is still registered with the master.
         """
         self.name = name
         self.environment = environment
@@ -87,7 +87,7 @@ class Node:
         self.parameters = self._registrations.parameters
         """The parameters that this node has subscribed to at the master; the subscribing code adds them."""
         self.when_registered_again = self._registrations.when_registered_again
-        """Functions that register further state, called in workers after the master had lost this node."""
+        """Functions that register further state; called in workers after the master has lost this node's registrations."""
 
         self._server: RpcServer | None = None
         self._access = Access.parse(environment.allow) if environment.allow else None
@@ -95,7 +95,8 @@ class Node:
         self._unix_listener = tcp.Listener(self._accept)
         # The value of :func:`local.this_host` if this node also uses Unix sockets, else ""
         self.this_host = ""
-        self.unix_name = ""  # name of the Unix socket that serves topics to processes on this machine, or ""
+        # name of the Unix socket that serves topics to processes on this machine, or ""
+        self.unix_name = ""
 
         self._closed = False
         self._unregistering: asyncio.Task[None] | None = None
@@ -107,11 +108,11 @@ class Node:
 
     @property
     def is_sending(self) -> bool:
-        """Return whether a thread is publishing, and so holds a lock. From any thread."""
+        """Return whether a thread is publishing, and so holds a lock. Thread-safe."""
         return any(publication.is_sending for publication in list(self.publications.values()))
 
     async def start(self, xmlrpc_port: int = 0, tcpros_port: int = 0) -> None:
-        """Open the node's servers; port 0 means any free port. Raise OSError."""
+        """Open the node's servers; port 0 means any free port. Raise OSError if a server cannot listen."""
         host = self.environment.bind_host
         ports = self.environment.ports
         self._listener.open(host, tcpros_port, ports)
@@ -137,20 +138,20 @@ class Node:
         self._registrations.uri, self._registrations.service_uri = self.uri, self.service_uri
         self._registrations.watch()
         if host in {"127.0.0.1", "::1"} and not _is_loopback(self.environment.master_address[0]):
-            # Resolving a name may wait for a server.
+            # Run this in a thread, because resolving a host name may block.
             await asyncio.get_running_loop().run_in_executor(None, self._check_own_address)
 
     async def close(self, *, announces: bool = True) -> None:
         """Leave the graph: unregister from the master, flush the links, close everything. Idempotent.
 
         Waits for the master as :meth:`Registrations.close` does, or until :meth:`stop_unregistering` is called. If the master
-        does not answer, it keeps the remaining registrations. ``announces``: whether to log a line when this takes long.
+        does not respond, the remaining registrations stay in it. ``announces``: whether to log a line when this takes long.
         """
         if self._closed:
             return
         self._closed = True
         self._unregistering = asyncio.ensure_future(self._registrations.close(announces=announces))
-        # Send the first call before doing anything else.
+        # Let the first call be sent before doing anything else.
         await asyncio.sleep(0)
 
         for timer in [*self._left.values(), *self._requesting.values()]:
@@ -171,14 +172,14 @@ class Node:
         await close_all([*waits, *servers, self._rpc.close, self._registrations.cancel])
 
     def stop_unregistering(self) -> None:
-        """Let :meth:`close` return even if the master has not answered (on the loop)."""
+        """Let :meth:`close` return even if the master has not responded. Call this on the loop."""
         if self._unregistering:
             self._unregistering.cancel()
 
     async def master(self, method: str, *args: object) -> Any:
-        """Call the master as this node and return the value of its answer.
+        """Call the master as this node and return the value in its response.
 
-        Raise MasterUnreachableError, or RpcRefused with the master's text.
+        Raise MasterUnreachableError if it does not respond, RpcRefused with the master's message if it refuses the call.
         """
         return await self._registrations.call(method, *args)
 
@@ -277,22 +278,22 @@ class Node:
         return f"rosrpc://{self.environment.uri_host}:{self.tcpros_port}"
 
     def publishers_changed(self, topic: str, uris: list[str]) -> None:
-        """Apply the master's list of a topic's publishers."""
+        """Apply the master's new list of a topic's publishers."""
         subscription = self.subscriptions.get(topic)
         if subscription:
             subscription.publishers_changed(uris)
             if topic in self._left and topic not in self._requesting:
-                # The list may have been meant for the previous subscription: rosmaster queues its updates.
+                # The list may have been meant for the previous subscription, because rosmaster queues its updates.
                 loop = asyncio.get_running_loop()
                 self._requesting[topic] = loop.call_later(_REQUEST_AGAIN_SECONDS, self._request_again, topic)
 
     def parameter_changed(self, key: str, value: object) -> None:
-        """Pass on a parameter's new value that the master has sent."""
+        """Pass a parameter's new value, which the master has sent, to ``on_parameter``."""
         if self._on_parameter:
             self._parameter_updates.start(self._on_parameter, key, value)
 
     def request_shutdown(self, reason: str) -> None:
-        """Shut down at the request of another process."""
+        """Shut down because another process requested it."""
         if self._on_shutdown:
             self.workers.start(self._on_shutdown, reason)
 
@@ -301,7 +302,7 @@ class Node:
         self._registrations.request_again(topic)
 
     async def _accept(self, sock: socket.socket, address: str) -> None:
-        """Serve a connected peer, whose header names a topic or service."""
+        """Serve a connected peer; its header specifies a topic or service."""
         try:
             fields = await tcp.receive_header(sock, memory=self._header_memory)
         except (OSError, WireError):

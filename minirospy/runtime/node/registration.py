@@ -1,6 +1,6 @@
-"""The registrations of a node: those that the master has, and those that it should have.
+"""A node's registrations: those in the master, and those that should be there.
 
-Registrations are ordered, retried until the master accepts them, repeated after it has restarted, and undone when the
+Registrations are ordered, retried until the master accepts them, repeated after it has restarted, and removed when the
 node closes. Source: http://wiki.ros.org/ROS/Master_API.
 """
 
@@ -32,18 +32,19 @@ from minirospy.runtime.transport.workers import InOrder, Workers
 __all__ = ["Registrations"]
 
 _log = logging.getLogger(__name__)
-# Time limit of a call; on a small computer, many nodes that start together wait for each other
+# Time limit for a call; long, because many nodes that start together on a small computer delay each other
 _CALL_SECONDS = 30.0
 
-_LOOK_SECONDS = 5.0  # time limit of the check whether the master knows this node, which is repeated soon
+# time limit for the check whether this node is registered; short, because the check is repeated soon
+_LOOK_SECONDS = 5.0
 
 _SILENT_SECONDS, _STILL_SILENT_SECONDS = 10.0, 2.0
-"""A closing node gives up if the master answers nothing for this many seconds; the shorter limit applies if the master
-was already silent before. The total is not limited: the node waits for a busy master that keeps answering.
+"""A closing node gives up if the master sends no response for this many seconds; the shorter limit applies if the master
+was already silent before. The total time is not limited: the node waits for a busy master that continues to respond.
 """
 
 _CLOSING_CALL_SECONDS = 3600.0
-_PROBE_SECONDS = 3.0  # between a closing node's checks that the master still answers
+_PROBE_SECONDS = 3.0  # between a closing node's checks whether the master still responds
 
 _NOTICE_SECONDS = 3.0  # before a closing node logs that it is still waiting for the master
 
@@ -51,13 +52,13 @@ _MAX_CALLS_PER_MULTICALL = 100  # unregistrations per system.multicall
 
 _Part: TypeAlias = Publication | Subscription | ServiceServer
 _Key: TypeAlias = tuple[str, str]
-"""The kind of a registration, as in the names of the master's methods ("Publisher"), and its topic or name."""
+"""The kind of a registration, as in the names of the master's methods ("Publisher"), and the topic or name."""
 _Call: TypeAlias = tuple[str, tuple[object, ...]]
 """A method of the Master API, and its arguments after the caller id."""
 
 
 class Registrations:
-    """The registrations of one node with its master, and the calls that make them. On the loop."""
+    """One node's registrations with its master, and the calls that register them. Use it on the loop only."""
 
     def __init__(
         self,
@@ -68,43 +69,43 @@ class Registrations:
         workers: Workers,
         watch_seconds: float,
     ) -> None:
-        """Take ``tables``, the node's publications, subscriptions and services by name, for each kind ("Publisher").
+        """Register the entries of ``tables``: kind ("Publisher") -> the node's publications, or other objects, by name.
 
-        Every ``watch_seconds`` :meth:`watch` checks whether the master still knows the node.
+        Every ``watch_seconds`` :meth:`watch` checks whether the node is still registered with the master.
         """
         self.uri = ""
         self.service_uri = ""
-        """The address of the node's services; like the Slave API's, set before the first registration."""
+        """The address of the node's services; like the Slave API's address, it is set before the first registration."""
         self.parameters: set[str] = set()  # the parameters that the node has subscribed to
         self.when_registered_again: list[Callable[[], object]] = []
-        """Functions that register further state, called in workers after the master had lost the node."""
+        """Functions that register further state; called in workers after the master has lost the node's registrations."""
 
         self._name = name
         self._environment = environment
         self._tables = tables
         self._rpc = rpc
-        # If no thread can be started, the functions wait, while the watch continues.
+        # If no thread can be started, the functions stay queued, and the watch continues.
         self._again = InOrder(workers)
         self._watch_seconds = watch_seconds
 
         self._known: dict[_Key, _Part | None] = {}
-        """The object registered with the master; None if the call failed or is not answered yet."""
+        """The object registered with the master; None if the call failed or has no response yet."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
         self._watching: asyncio.Task[None] | None = None
         self._is_master_silent = False
-        self._answered = 0.0  # time of the master's last answer, by the loop's clock
+        self._answered = 0.0  # time of the master's last response, by the loop's clock
         self._closed = False
 
     def watch(self) -> None:
-        """Start checking whether the master knows the node."""
+        """Start checking whether the node is registered with the master."""
         self._watching = asyncio.ensure_future(self._watch_master())
 
     async def close(self, *, announces: bool) -> None:
         """Unregister everything, and register nothing more; the first call is sent before anything else is done.
 
-        Waits as long as the master keeps answering; does not wait if it refuses connections, and gives up if it answers
-        nothing for ``_SILENT_SECONDS``. ``announces``: whether to log a line when this takes long.
+        Waits while the master continues to respond; does not wait if it refuses connections, and gives up if it sends no
+        response for ``_SILENT_SECONDS``. ``announces``: whether to log a line when this takes long.
         """
         self._closed = True
         if self._watching:
@@ -112,21 +113,21 @@ class Registrations:
         await self._unregister_all(announces=announces)
 
     async def cancel(self) -> None:
-        """Cancel the calls that the master has not answered."""
+        """Cancel the calls that have no response yet."""
         tasks = [*self._registering, *([self._watching] if self._watching else [])]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
     async def call(self, method: str, *args: object) -> Any:
-        """Call the master as the node and return the value of its answer.
+        """Call the master as the node and return the value in its response.
 
-        Raise MasterUnreachableError, or RpcRefused with the master's text.
+        Raise MasterUnreachableError if it does not respond, RpcRefused with the master's message if it refuses the call.
         """
         return unwrap(method, await self._call_master(method, self._name, *args))
 
     async def _call_master(self, method: str, *args: object) -> object:
-        """Call any method of the master. Raise MasterUnreachableError, RpcError."""
+        """Call any method of the master. Raise MasterUnreachableError if it does not respond, RpcError if the call fails."""
         uri = self._environment.master_uri
         # While the node closes, _wait_for_answers() decides when to give up.
         seconds = _CLOSING_CALL_SECONDS if self._closed else _CALL_SECONDS
@@ -140,14 +141,14 @@ class Registrations:
         return answer
 
     async def _look(self, method: str, name: str) -> None:
-        """Look up this node, or one of its services. Raise MasterUnreachableError, RpcError."""
+        """Look up this node, or one of its services. Raise MasterUnreachableError or RpcError if the look-up fails."""
         try:
             await asyncio.wait_for(self.call(method, name), _LOOK_SECONDS)
         except asyncio.TimeoutError as error:
             self._is_master_silent = True
             raise MasterUnreachableError(self._environment.master_uri) from error
         if self._closed:
-            # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives with the answer.
+            # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives together with the response.
             raise asyncio.CancelledError
 
     def request_again(self, topic: str) -> None:
@@ -158,10 +159,10 @@ class Registrations:
             self._start_registering(key)
 
     async def update(self, key: _Key, *, again: bool = False) -> None:
-        """Bring the master's registration of one name into line with this node: register, unregister, or do nothing.
+        """Make the master's registration of one name match this node: register, unregister, or do nothing.
 
-        Calls for the same name are sequential, and none is cancelled half way. Otherwise a registration could overtake the
-        preceding unregistration, which would undo it, or the node's shutdown could overtake a registration.
+        Calls for the same name are sequential, and none is cancelled half-way. Otherwise a registration could overtake the
+        preceding unregistration, which would then remove it, or the node's shutdown could overtake a registration.
         """
         task = self._start_registering(key, again=again)
         try:
@@ -169,7 +170,7 @@ class Registrations:
         except asyncio.CancelledError as error:
             if not task.cancelled():
                 raise
-            # close() has given up on the master.
+            # close() has stopped waiting for the master.
             raise MasterUnreachableError(self._environment.master_uri) from error
 
     def _start_registering(self, key: _Key, *, again: bool = False) -> asyncio.Task[None]:
@@ -181,7 +182,7 @@ class Registrations:
     def _has_registered(self, task: asyncio.Task[None]) -> None:
         self._registering.discard(task)
         if not task.cancelled():
-            # Retrieve the error: a waiting caller gets it, otherwise it is ignored, since the call is retried.
+            # Retrieve the error: a waiting caller receives it; without one it is ignored, since the call is retried.
             task.exception()
 
     async def _register_in_turn(self, key: _Key, *, again: bool) -> None:
@@ -195,11 +196,11 @@ class Registrations:
                 self._known[key] = None
                 method, args = self._unregistration(key)
                 await self.call(method, *args)
-                # A check of a restarted master may have removed it already.
+                # The check after a master's restart may have removed the entry already.
                 self._known.pop(key, None)
 
     def _wanted(self, key: _Key) -> _Part | None:
-        """Return the object to register for one name, or None."""
+        """Return the object to register for one name, or None if there is none."""
         kind, name = key
         return None if self._closed else self._tables[kind].get(name)
 
@@ -220,8 +221,8 @@ class Registrations:
     async def _register_subscription(self, subscription: Subscription) -> list[str]:
         """Register a subscription; return its publishers.
 
-        A publisherUpdate arrives by another connection and may overtake the answer, which then is the older list.
-        If one arrived meanwhile, the call is repeated.
+        A publisherUpdate arrives on another connection and may overtake the response, whose list is then the older one.
+        If an update arrived meanwhile, the call is repeated.
         """
         while True:
             lists = subscription.lists
@@ -235,8 +236,9 @@ class Registrations:
     async def _watch_master(self) -> None:
         """Detect that the master has restarted and lost this node, and register again.
 
-        Looks up a service of this node, or else its name, which a restarted master may already know from a newer topic.
-        The master's process id is no evidence: in containers it is always the same, and a master may recover its tables.
+        Looks up one of this node's services, if it has any: the node's name may be in a restarted master already, from a topic
+        registered later. The master's process id proves nothing: in containers it is always the same, and a master may recover
+        its tables.
         """
         failures = 0
         while not self._closed:
@@ -258,7 +260,8 @@ class Registrations:
                     _log.warning("%s. What is connected goes on; will keep trying.", error)
                 continue
             except RpcRefused:
-                # An entry unregistered meanwhile is expected to be unknown, and an illegal name is always refused.
+                # An entry that was unregistered meanwhile is expected to be missing, and an illegal name is always
+                # refused.
                 if asked and (asked[0] == "Service" or is_legal_name(self._name)):
                     has_forgotten = self._known.get(asked) is not None
             except RpcError as error:
@@ -275,11 +278,12 @@ class Registrations:
                 for function in self.when_registered_again:
                     self._again.start(function)
             elif has_forgotten:
-                # Logged only once, since this master no longer counts as one that knows this node.
+                # Log this only once per master: after this, it no longer counts as a master that had registered this
+                # node.
                 _log.warning("the master does not know this node, and refuses to")
 
     async def _register_all(self, *, again: bool = False) -> None:
-        """Register everything that the master does not know. Raise MasterUnreachableError."""
+        """Register everything that the master is missing. Raise MasterUnreachableError if it does not respond."""
         keys = [(kind, name) for kind, table in self._tables.items() for name in table]
         for key in dict.fromkeys([*keys, *self._known]):
             # A registration that the master never accepts must not block the others.
@@ -289,8 +293,8 @@ class Registrations:
                 _log.debug("registering %s: %s", key, error)
 
     async def _unregister_all(self, *, announces: bool) -> None:
-        """Unregister everything that the master has of this node, in as few calls as possible."""
-        # A name with a call in progress is unregistered after that call, which would undo it otherwise.
+        """Unregister everything that the node has registered with the master, in as few calls as possible."""
+        # Unregister a name with a call in progress after that call, which would otherwise register it again.
         under_way = {key for key, turn in self._turns.items() if turn.locked()}
         calls = [self._unregistration(key) for key in self._known if key not in under_way]
         calls += [("unsubscribeParam", (self.uri, parameter)) for parameter in self.parameters]
@@ -307,9 +311,9 @@ class Registrations:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _wait_for_answers(self, tasks: Sequence[asyncio.Task[None]], *, announces: bool) -> None:
-        """Wait for the last calls to the master, for as long as it answers anything.
+        """Wait for the last calls to the master while it responds to anything.
 
-        If many nodes shut down together, each waits for its turn: a short call, which a busy master answers in between,
+        If many nodes shut down together, each is queued at the master. A short call, which a busy master handles in between,
         shows that the master is alive.
         """
         loop = asyncio.get_running_loop()
@@ -342,7 +346,7 @@ class Registrations:
     async def _call_all(self, calls: Sequence[_Call]) -> None:
         """Make all calls, ignoring their results; batch them if the master has system.multicall (not all masters do).
 
-        Raise MasterUnreachableError.
+        Raise MasterUnreachableError if the master does not respond.
         """
         for start in range(0, len(calls), _MAX_CALLS_PER_MULTICALL):
             part = calls[start : start + _MAX_CALLS_PER_MULTICALL]
@@ -354,7 +358,7 @@ class Registrations:
             if not isinstance(answers, list) or len(answers) != len(part):
                 answers = [None] * len(part)
             for (method, args), answer in zip(part, answers, strict=True):
-                # Call individually if the batch was not answered, such as after a fault because it is too long.
+                # Call individually if the batch failed, for example because it is too long.
                 if not isinstance(answer, list):
                     with contextlib.suppress(RpcFault, RpcProtocolError, RpcRefused):
                         await self.call(method, *args)

@@ -1,7 +1,7 @@
 """A blocking service client, and exact reads from a socket.
 
-It does not import asyncio, which would delay a command that calls one service. Source: http://wiki.ros.org/ROS/TCPROS
-("Services").
+This module does not import asyncio, which would delay a command that calls one service.
+Source: http://wiki.ros.org/ROS/TCPROS ("Services").
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class ServiceClient:
     ) -> None:
         """Connect to ``uri`` (rosrpc://host:port), with ``same_host`` through a Unix socket if possible, and exchange headers.
 
-        With ``waits`` false, :meth:`finish` receives the server's header, so that the caller can do something else meanwhile.
+        With ``waits`` false, the caller can do something else before it calls :meth:`finish` to receive the server's header.
         Raise HandshakeRefused if the server refuses, OSError or WireError if communication fails.
         """
         self.header: Header = {}
@@ -59,7 +59,7 @@ class ServiceClient:
         fields = service_client_header(
             service, md5sum, caller_id, persistent=persistent, probe=probe, extra=headers
         )
-        # Serialize before connecting, so that the header has arrived when the server first reads the connection.
+        # Serialize before connecting, so that the header has arrived when the server first reads from the connection.
         header = serialize_header(fields)
         self._sock = _connected(parse_service_uri(uri), timeout, same_host=same_host)
 
@@ -77,13 +77,15 @@ class ServiceClient:
             self.finish()
 
     def finish(self, request: bytes | None = None) -> None:
-        """Receive the server's header. Raise as the constructor does; the connection is then closed.
+        """Receive the server's header. On an error, close the connection and raise the same exceptions as the constructor.
 
-        If the server is known to accept it, the ``request`` of the following :meth:`call` is sent first, so that one wait
-        serves both answers. A server that sends no header has not started to process the request.
+        The ``request`` of the following :meth:`call` is sent first if the server is known to accept that, so that both
+        responses
+        need only one wait. If the server sends no header, it has not started to process the request.
         """
         try:
-            # Only through a Unix socket, which only minirospy serves: rospy may lose data that arrives with a header.
+            # Do this only on a Unix socket, which only minirospy serves: rospy may lose data that arrives together
+            # with a header.
             if request is not None and len(request) < _RECEIVE and self._sock.family not in sockets.FAMILIES:
                 self._send(request)
                 self._is_asked = True
@@ -95,7 +97,10 @@ class ServiceClient:
             raise
 
     def call(self, request: bytes) -> bytes:
-        """Return the response to ``request``. Raise CallFailed if the handler failed, OSError, WireError."""
+        """Return the response to ``request``.
+
+        Raise CallFailed if the handler failed, OSError or WireError if communication fails.
+        """
         if self._is_asked:
             self._is_asked = False
         else:
@@ -111,8 +116,8 @@ class ServiceClient:
 
     def has_ended(self) -> bool:
         """Return whether the server has disconnected, so that it would not read another request."""
-        # A server sends nothing unasked: a readable socket means end of file. The poll object is reused, since each
-        # call checks.
+        # A server sends data only in response to requests, so a readable socket means end of file. The poll object is
+        # reused, because each call does this check.
         return bool(self._poll.poll(0)) if self._poll else sockets.is_readable(self._sock)
 
     def hang_up(self) -> None:
@@ -142,12 +147,12 @@ class ServiceClient:
 
 
 def parse_service_uri(uri: str) -> tuple[str, int]:
-    """Return (host, port) of ``rosrpc://host:port``. Raise WireError."""
+    """Return (host, port) of ``rosrpc://host:port``. Raise WireError if the URI is invalid."""
     try:
         host, port, _ = split_uri(uri, "rosrpc")
     except ValueError:
         raise WireError(f"protocol uri is invalid: {uri}") from None
-    # "localhost" may resolve to IPv6 first, where no ROS 1 server listens.
+    # "localhost" may resolve to an IPv6 address first, on which no ROS 1 server listens.
     return ("127.0.0.1" if host == "localhost" else host), port
 
 
@@ -163,9 +168,9 @@ class PeerEndedError(WireError):
 
 
 class Reader:
-    """Exact reads from a blocking socket; surplus bytes are kept for the next read.
+    """Exact reads from a blocking socket; surplus bytes are buffered for the next read.
 
-    A small request or answer arrives whole, so one receive gets its length and body together.
+    A small request or response arrives whole, so a single receive returns both its length and its body.
     """
 
     def __init__(self, sock: socket.socket) -> None:
@@ -173,7 +178,10 @@ class Reader:
         self.rest = b""  # bytes received beyond the last read
 
     def read(self, count: int, *, at_end_ok: bool = False) -> bytes:
-        """Return ``count`` bytes, or b"" if ``at_end_ok`` and the peer closed before the first byte. Raise WireError."""
+        """Return ``count`` bytes, or b"" if ``at_end_ok`` and the peer closed before the first byte.
+
+        Raise WireError if the peer closes too early.
+        """
         data = self.rest
         while len(data) < count:
             more = self._some(max(count - len(data), _RECEIVE))
@@ -192,7 +200,7 @@ class Reader:
         try:
             return self._receive(min(count, _MOST), flags)
         except ConnectionResetError:
-            # The peer closed with unread data, which also is end of file.
+            # The peer closed with unread data, which counts as end of file too.
             return b""
 
     def _take_large(self, data: bytes, count: int) -> bytes:
@@ -210,7 +218,7 @@ class Reader:
 
 
 def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> socket.socket:
-    """Return a connected and tuned blocking socket. Raise OSError."""
+    """Return a connected and tuned blocking socket. Raise OSError if connecting fails."""
     unix = local.reach(*address) if same_host else None
     if unix:
         unix.settimeout(timeout)
@@ -224,7 +232,7 @@ def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> 
         sockets.tune(sock)
         return sock
 
-    # Most service URIs contain an IP address: no resolver is needed.
+    # Most service URIs contain an IP address, which needs no resolver.
     sock = socket.socket()
     try:
         sockets.tune(sock)

@@ -48,12 +48,12 @@ __all__ = [
 _log = logging.getLogger(__name__)
 
 Handler = Callable[[memoryview, Header], bytes]
-"""Takes the request's bytes and the client's header; returns the response's bytes, or raises ServiceException.
+"""Called with the request's bytes and the client's header; returns the response's bytes, or raises ServiceException.
 
 Any other exception is logged and sent as rospy sends it: ``error processing request: ...``. The connection stays open.
 """
 
-# like Handler, but a coroutine function, called on the loop
+# A coroutine function with the same parameters and result as Handler, called on the loop
 AsyncHandler = Callable[[bytes, Header], Awaitable[bytes]]
 
 
@@ -82,7 +82,7 @@ class ServiceServer:
         self._closed = False
 
     async def accept(self, sock: socket.socket, fields: Header) -> str | None:
-        """Answer a client's header and serve the client, or return the reason for refusing it."""
+        """Reply to a client's header and serve the client, or return the reason for refusing it."""
         why = check_service_client(fields, self.type)
         if why:
             return why
@@ -107,7 +107,7 @@ class ServiceServer:
         return None
 
     async def _refuse_call(self, sock: socket.socket, error: Exception) -> None:
-        """Answer a client's call with the reason for refusing it, after its header was already accepted."""
+        """Respond to a client's call with the reason for refusing it, after the client's header was accepted."""
         try:
             head = await asyncio.wait_for(_receive(sock, REQUEST_HEAD), sockets.HANDSHAKE_SECONDS)
             length = parse_request_head(head)
@@ -119,7 +119,7 @@ class ServiceServer:
             sock.close()
 
     def close(self) -> None:
-        """Stop serving: clients that wait for an answer still get it, the others are disconnected."""
+        """Stop serving: clients with a call in progress still get their responses, the others are disconnected."""
         with self._lock:
             self._closed = True
             for connection in self._open:
@@ -160,7 +160,7 @@ class ServiceServer:
             raise WireError(f"no memory for a request of {size} bytes") from None
 
     def _client_failed(self, error: OSError | WireError, fields: Header) -> None:
-        """Log the reason for disconnecting a client; a client that simply left is logged at level debug."""
+        """Log the reason for disconnecting a client; if the client simply disconnected, log at level debug."""
         is_refused = isinstance(error, WireError) and not isinstance(error, PeerEndedError)
         log = self._refusals.warning if is_refused else _log.debug
         log("service %s: client %s is disconnected: %s", self.name, fields.get("callerid"), error)
@@ -172,7 +172,7 @@ class ServiceServer:
             return self._failure(error)
 
     def _failure(self, error: BaseException) -> bytes:
-        """Return the answer to a call whose handler raised; log the exception unless it is a ServiceException."""
+        """Return the response to a call whose handler raised; log the exception unless it is a ServiceException."""
         if isinstance(error, ServiceException):
             return serialize_failure(error)
 
@@ -251,8 +251,8 @@ class LoopServiceServer(ServiceServer):
             # asyncio would end the loop, and so all that the node does, with a task that raises SystemExit.
             return self._failure(error)
         except asyncio.CancelledError:
-            # Either this task was cancelled or something that the handler awaited; only Python 3.11 could distinguish
-            # them.
+            # Either this task was cancelled, or something that the handler awaited was; only Python 3.11 and later
+            # can distinguish the two.
             if not self._closed:
                 _log.error("service %s: the handler of a call was cancelled", self.name)
                 with contextlib.suppress(OSError):
@@ -264,14 +264,14 @@ class LoopServiceServer(ServiceServer):
 
 @dataclass(eq=False)
 class _Connection:
-    """One client of a service; ``busy`` is true from the first bytes of its request until it has received the answer."""
+    """One client of a service; ``busy`` is true from the first bytes of its request until its response has been sent."""
 
     sock: socket.socket
     busy: bool = False
 
 
 class AsyncServiceClient:
-    """A client on the loop, like the one in ``service_client.py``; made by :meth:`connect`, used by one task at a time."""
+    """A client on the loop, like the one in ``service_client.py``; created by :meth:`connect`, used by one task at a time."""
 
     def __init__(self, sock: socket.socket, header: Header) -> None:
         self.header = header
@@ -291,7 +291,7 @@ class AsyncServiceClient:
         timeout: float = sockets.HANDSHAKE_SECONDS,
         same_host: bool = True,
     ) -> AsyncServiceClient:
-        """Connect to ``uri`` and exchange headers. Raise as :class:`ServiceClient` does."""
+        """Connect to ``uri`` and exchange headers. Raise the same exceptions as :class:`ServiceClient`."""
         fields = service_client_header(
             service, md5sum, caller_id, persistent=persistent, probe=probe, extra=headers
         )
@@ -310,7 +310,10 @@ class AsyncServiceClient:
         return cls(sock, header)
 
     async def call(self, request: bytes) -> bytes:
-        """Return the response to ``request``. Raise CallFailed if the handler failed, OSError, WireError."""
+        """Return the response to ``request``.
+
+        Raise CallFailed if the handler failed, OSError or WireError if communication fails.
+        """
         await asyncio.get_running_loop().sock_sendall(self._sock, serialize_request(request))
         ok, length = parse_response_head(await _receive(self._sock, RESPONSE_HEAD))
         body = await _receive(self._sock, length)
@@ -340,7 +343,7 @@ def _never_called(_: memoryview, __: Header) -> bytes:
 
 
 async def _receive(sock: socket.socket, count: int) -> bytes:
-    """Return exactly ``count`` bytes, on the loop. Raise WireError if the peer closes before."""
+    """Return exactly ``count`` bytes, on the loop. Raise WireError if the peer closes earlier."""
     loop = asyncio.get_running_loop()
     try:
         buffer = bytearray(count)

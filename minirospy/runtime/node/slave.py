@@ -1,6 +1,6 @@
-"""The Slave API of a node: the XML-RPC methods that the master and other nodes call.
+"""A node's Slave API: the XML-RPC methods that the master and other nodes call.
 
-Source: http://wiki.ros.org/ROS/Slave_API. The answers are ``[status code, text, value]``.
+Source: http://wiki.ros.org/ROS/Slave_API. The responses are ``[status code, message, value]``.
 """
 
 from __future__ import annotations
@@ -71,9 +71,9 @@ class ServedNode(Protocol):
 
 
 class SlaveApi:
-    """One method per call of the API; the XML-RPC server calls ``dispatch`` (on the loop).
+    """One method per API call; the XML-RPC server calls ``dispatch`` on the loop.
 
-    Methods that only return data may be called from any thread.
+    Methods that only return data are thread-safe.
     """
 
     def __init__(self, node: ServedNode) -> None:
@@ -101,7 +101,7 @@ class SlaveApi:
         )
 
     def dispatch(self, method: str, args: Sequence[object]) -> object:
-        """Return the answer to one call, or the steps that compute it. Raise RpcFault on an unknown method."""
+        """Return the response to one call, or the steps that compute it. Raise RpcFault if the method is unknown."""
         return self.dispatcher.dispatch(method, args)
 
     def get_bus_stats(self, caller_id: str) -> Answer:
@@ -117,7 +117,7 @@ class SlaveApi:
         subscriptions = [
             [
                 subscription.topic,
-                # The number of lost messages is unknown: -1.
+                # The number of lost messages is unknown, which is reported as -1.
                 [[link.number, link.received_bytes, link.received, -1, True] for link in subscription.links],
             ]
             for subscription in list(self._node.subscriptions.values())
@@ -125,7 +125,7 @@ class SlaveApi:
         return [SUCCESS, "", [publications, subscriptions, []]]
 
     def get_bus_info(self, caller_id: str) -> Answer:
-        """Return one row per connection: [id, other end, direction, transport, topic, connected, text]."""
+        """Return one row per connection: [id, peer, direction, transport, topic, connected, text]."""
         rows: list[list[object]] = []
         for publication in list(self._node.publications.values()):
             for out in publication.links:
@@ -138,7 +138,7 @@ class SlaveApi:
         return [SUCCESS, "bus info", rows]
 
     def get_master_uri(self, caller_id: str) -> Answer:
-        """Return the master that this node registered with."""
+        """Return the URI of the master that this node registered with."""
         return [SUCCESS, self._node.environment.master_uri, self._node.environment.master_uri]
 
     def get_name(self, caller_id: str) -> Answer:
@@ -154,17 +154,17 @@ class SlaveApi:
         return [SUCCESS, "", os.getpid()]
 
     def get_publications(self, caller_id: str) -> Answer:
-        """Return [topic, type] of each topic that this node publishes."""
+        """Return [topic, type] for each topic that this node publishes."""
         rows = [[p.topic, p.type.name] for p in list(self._node.publications.values())]
         return [SUCCESS, "publications", rows]
 
     def get_subscriptions(self, caller_id: str) -> Answer:
-        """Return [topic, type] of each topic that this node subscribes to."""
+        """Return [topic, type] for each topic that this node subscribes to."""
         rows = [[s.topic, s.type.name] for s in list(self._node.subscriptions.values())]
         return [SUCCESS, "subscriptions", rows]
 
     def param_update(self, caller_id: str, key: str, value: object) -> Answer:
-        """Accept a new value of a parameter that this node subscribed to, of its namespace, or of a parameter below it."""
+        """Accept a new value for a parameter that this node subscribed to, for its namespace, or for a parameter below it."""
         self._node.parameter_changed(key, value)
         changed = names.canonicalize(key).rstrip("/") + "/"
         known = (f"{each.rstrip('/')}/" for each in list(self._node.parameters))
@@ -173,7 +173,7 @@ class SlaveApi:
         return [SUCCESS, "", 0]
 
     def publisher_update(self, caller_id: str, topic: str, publishers: list[str]) -> Answer:
-        """Accept the master's complete list of a topic's publishers."""
+        """Accept the master's complete list of publishers for a topic."""
         self._node.publishers_changed(topic, publishers)
         return [SUCCESS, "", 0]
 
@@ -194,8 +194,9 @@ class SlaveApi:
     def shutdown(self, caller_id: str, reason: str = "") -> Answer:
         """Shut the node down.
 
-        When a new node of the same name registers, the master calls the old node's address. The old node may have exited long
-        ago and this node may have its port: so the reason is checked for the name of the node that is meant.
+        When a new node with the same name registers, the master calls the old node's address. The old node may have
+        exited long
+        ago and this node may be using its port, so check that the reason contains this node's name.
         """
         meant = _BUMPED.fullmatch(reason) if caller_id == "/master" and isinstance(reason, str) else None
         if meant and meant[1] != self._node.name:
@@ -205,7 +206,7 @@ class SlaveApi:
 
 
 def _refusal_before_tcpros(protocols: object) -> Answer | None:
-    """Return rospy's answer if the list has no TCPROS or an invalid entry before it; otherwise None."""
+    """Return rospy's response if the list has no TCPROS, or an invalid entry before it; otherwise None."""
     if not isinstance(protocols, (list, dict, str)):
         kind = type(protocols).__name__
         return [ERROR, f"Error: invalid arguments: {kind!r} object is not iterable", []]
@@ -215,7 +216,7 @@ def _refusal_before_tcpros(protocols: object) -> Answer | None:
             kind = type(entry).__name__
             return [ERROR, f"Error: invalid arguments: {kind!r} object is not subscriptable", []]
         if isinstance(entry, dict):
-            # XML-RPC keys are strings, so rospy fails to find the key 0.
+            # XML-RPC keys are strings, so rospy fails with this message when it looks up the key 0.
             return [FAILURE, "Internal failure: 0", []]
         if not entry:
             kind = "list" if isinstance(entry, list) else "string"
@@ -226,6 +227,6 @@ def _refusal_before_tcpros(protocols: object) -> Answer | None:
 
 
 def connection_text(link: InLink | OutLink) -> str:
-    """Return a connection's description, whose numbers `rosnode info` shows; a Unix socket has no port."""
+    """Return a connection's description, whose numbers `rosnode info` prints; a Unix socket has no port."""
     on = f" on port {link.local_port}" if link.transport == "TCPROS" else ""
     return f"{link.transport} connection{on} to [{link.address} on socket {link.number}]"

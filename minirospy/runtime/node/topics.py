@@ -1,6 +1,6 @@
-"""The transport of topics: a Publication sends frames to its links, a Subscription receives frames from its links.
+"""The transport of topics: a Publication sends frames on its links, a Subscription receives frames from its links.
 
-Both work on bytes; ``minirospy.client`` and ``minirospy.aio`` know the message classes.
+Both work on bytes; ``minirospy.client`` and ``minirospy.aio`` handle the message classes.
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ __all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription", "Unrea
 
 _log = logging.getLogger(__name__)
 
-_SETTLE_SECONDS = 10.0  # within which all nodes register again at a master that has lost its state
+_SETTLE_SECONDS = 10.0  # within which all nodes register again with a master that has lost its state
 
-# Failures before reporting a publisher that refuses; one that is shutting down has gone by then
+# Failures before reporting a publisher that refuses; a publisher that is shutting down has exited by then
 _WARN_AFTER = 3
 
-_REFUSALS_LOGGED = 10  # log lines about publishers with invalid answers, before further ones are only counted
+_REFUSALS_LOGGED = 10  # log lines about publishers with invalid responses; further ones are only counted
 
-TOGETHER_SECONDS = 0.25  # within which the unreachable topics of one publisher are combined in one log line
+TOGETHER_SECONDS = 0.25  # within which one publisher's unreachable topics are combined in one log line
 MAX_TOPICS_SHOWN = 5  # topics named in such a log line
 _LEAVE_SECONDS = 10.0
 _WORKED_SECONDS = 5.0  # a link that was open for this long, or received a message, counts as working
@@ -68,9 +68,9 @@ Deliver = Callable[[Frame, Header], None]
 
 @dataclass(frozen=True)
 class InTurns:
-    """Options of a subscription that delivers messages of up to ``most`` bytes in steps on the loop, run by ``start``.
+    """Options for a subscription that delivers messages of up to ``most`` bytes in steps on the loop, run by ``start``.
 
-    ``on_left_out`` is called with the publisher's connection header when a longer message arrives.
+    When a longer message arrives, it is skipped and ``on_left_out`` is called with the publisher's connection header.
     """
 
     deliver: Callable[[Frame, Header], Steps[None]]
@@ -80,7 +80,7 @@ class InTurns:
 
 
 class Publication:
-    """A topic that this node publishes. ``publish`` may be called from any thread."""
+    """A topic that this node publishes. ``publish`` is thread-safe."""
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class Publication:
         tcp_nodelay: bool = False,
         on_link: Callable[[OutLink, bool], None] | None = None,
     ) -> None:
-        """Let ``queue_size`` frames wait for a slow subscriber (0: no limit; None: publish blocks).
+        """Queue up to ``queue_size`` frames for a slow subscriber (0: no limit; None: publish blocks).
 
         ``on_link(link, is_up)`` is called on the loop when a subscriber has connected or disconnected.
         """
@@ -104,9 +104,9 @@ class Publication:
         self.headers = dict(headers or {})
         self.tcp_nodelay = tcp_nodelay
         self.links: tuple[OutLink, ...] = ()
-        # Bytes of messages with at least one subscriber, each counted once, with length prefix
+        # Bytes of messages with at least one subscriber, including the length prefix; each message counts once
         self.sent_bytes = 0
-        self.expected = 0  # number of subscribers that the master knew when this was registered
+        self.expected = 0  # number of subscribers in the master when the publication was registered
         self._on_link = on_link
         self._latched: bytes | LargeFrame | None = None
         self._latch_lock = threading.Lock()
@@ -119,7 +119,7 @@ class Publication:
     def publish(self, frame: bytes | LargeFrame) -> None:
         """Send one frame to every subscriber."""
         if self.latch:
-            # A subscriber that connects now gets the frame exactly once: either here or in accept().
+            # Ensure that a subscriber that connects now receives the frame exactly once: either here or in accept().
             with self._latch_lock:
                 self._latched = frame
                 links = self.links
@@ -134,9 +134,9 @@ class Publication:
                 link.wait()
 
     def accept(self, sock: socket.socket, fields: Header, caller_id: str, peer: str) -> str | None:
-        """Answer a subscriber's header as node ``caller_id`` and send to it from now on, or return the reason for refusing it.
+        """Reply to a subscriber's header as node ``caller_id`` and start sending to it, or return the reason for refusing it.
 
-        On the loop.
+        Call this on the loop.
         """
         why = check_subscriber(fields, self.topic, self.type)
         if why:
@@ -157,10 +157,11 @@ class Publication:
 
         for other in self.links:
             if other.peer == link.peer and other.waiting:
-                # A node connects only once per topic: it has lost the old link, whose frames have no receiver.
+                # A node connects only once per topic, so it has lost the old link, and frames on that link would have
+                # no receiver.
                 other.close()
-        # A subscriber that has the header expects all messages published from then on, so the link accepts frames
-        # before the header is sent.
+        # A subscriber that has received the header expects all messages published after that, so the link accepts
+        # frames before the header is sent.
         with self._latch_lock:
             self.links += (link,)
             latched = self._latched if self.latch else None
@@ -171,7 +172,7 @@ class Publication:
             if self._on_link:
                 self._on_link(link, True)
         except BaseException:
-            # The caller closes the socket: a link without a socket must not be counted, or closed later.
+            # The caller closes the socket: a link without a socket must not be counted or closed later.
             link.close()
             raise
         return None
@@ -182,7 +183,7 @@ class Publication:
             self._latched = None
 
     def close(self) -> None:
-        """Close all links (on the loop)."""
+        """Close all links. Call this on the loop."""
         close_each([link.close for link in self.links])
 
     def _link_closed(self, link: OutLink) -> None:
@@ -193,7 +194,7 @@ class Publication:
 
 @dataclass(eq=False)
 class InLink:
-    """The subscriber's end of one connection. ``uri`` is the publisher's Slave API."""
+    """The subscriber's end of one connection. ``uri`` is the URI of the publisher's Slave API."""
 
     uri: str
     address: str
@@ -202,10 +203,11 @@ class InLink:
     received: int = 0
     received_bytes: int = 0
     closed: bool = field(default=False)
-    latched: Frame | None = None  # the last message of a latching publisher
+    latched: Frame | None = None  # the last message from a latching publisher
     since: float = field(default_factory=time.monotonic)
     fault: Exception | None = None
-    returned: bool = False  # the publisher left the master's list and came back while the link was open
+    # the publisher was removed from the master's list and added again while the link was open
+    returned: bool = False
 
     @property
     def number(self) -> int:
@@ -232,20 +234,20 @@ class InLink:
 
 
 class Unreachable:
-    """Logs publishers that cannot be reached, in one line for all topics of a node, such as those of a killed bridge.
+    """Logs unreachable publishers, in one line for all topics of a node, such as those of a killed bridge.
 
-    On the loop.
+    Use it on the loop only.
     """
 
     def __init__(self) -> None:
-        # A list may contain a thousand refusing publishers: logging all of them takes 0.2 s of the loop.
+        # A list may contain a thousand publishers that refuse: logging all of them would block the loop for 0.2 s.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._waiting: dict[str, tuple[list[str], Exception, str]] = {}
-        """Publisher's URI -> its topics, and the error and advice for the first one."""
+        """Publisher's URI -> its topics, and the error and advice for the first topic."""
         self._timer: asyncio.TimerHandle | None = None
 
     def add(self, uri: str, topic: str, error: Exception, advice: str) -> None:
-        """Log an unreachable publisher a moment later, together with its other topics."""
+        """Log an unreachable publisher a moment later, in one line with its other topics."""
         self._waiting.setdefault(uri, ([], error, advice))[0].append(topic)
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(TOGETHER_SECONDS, self._report)
@@ -275,10 +277,10 @@ class Unreachable:
 class Subscription:
     """A topic that this node subscribes to: one connection to each publisher, re-established when it breaks.
 
-    A separate worker reads each connection and calls ``deliver``: messages of one publisher stay in order, and neither topics
-    nor publishers wait for each other. With ``on_loop``, ``deliver`` is called on the loop instead and must be quick; for
-    longer work pass an :class:`InTurns`. ``newest`` may be changed at any time: if more messages arrive during a delivery,
-    only the newest ``newest`` are delivered (0: all).
+    A separate worker reads each connection and calls ``deliver``, so that messages from one publisher stay in order, and
+    neither topics nor publishers delay each other. With ``on_loop``, ``deliver`` is called on the loop instead and must
+    return quickly; for longer work pass an :class:`InTurns`. ``newest`` may be changed at any time: if more messages arrive
+    during a delivery, only the newest ``newest`` are delivered (0: all).
     """
 
     def __init__(
@@ -298,9 +300,9 @@ class Subscription:
         this_host: str = "",
         unreachable: Unreachable | None = None,
     ) -> None:
-        """Take ``this_host``, the value of :func:`local.this_host`, or "" to not use Unix sockets.
+        """Create the subscription; ``this_host`` is the value of :func:`local.this_host`, or "" to not use Unix sockets.
 
-        ``unreachable`` is shared by all subscriptions of the node, since several may lose the same publisher.
+        All subscriptions of the node share ``unreachable``, since several may lose the same publisher.
         """
         self.topic = topic
         self.type = type_
@@ -322,7 +324,7 @@ class Subscription:
         self._settling: asyncio.TimerHandle | None = None
         self._reported: set[str] = set()
         self._unreachable = unreachable or Unreachable()
-        # /rosout has as many publishers as there are nodes.
+        # Limit the rate, because /rosout has as many publishers as there are nodes.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._connecting: dict[str, asyncio.Task[None]] = {}
         # Links to publishers that have left the master's list, with the timer that closes each link.
@@ -336,7 +338,7 @@ class Subscription:
         return tuple(self._links.values())
 
     def publishers_changed(self, uris: Iterable[str]) -> None:
-        """Apply the master's list of publishers (on the loop)."""
+        """Apply the master's list of publishers. Call this on the loop."""
         if self._closed:
             return
         self.lists += 1
@@ -348,7 +350,7 @@ class Subscription:
                 self._start_connecting(action)
 
     def registered_again(self, uris: Iterable[str]) -> None:
-        """Apply the first list from a master that had lost its state (on the loop).
+        """Apply the first list from a master that had lost its state. Call this on the loop.
 
         The list lacks nodes that have not registered again yet, so for a while no connected publisher is dropped.
         """
@@ -358,7 +360,7 @@ class Subscription:
         self.publishers_changed(uris)
 
     def close(self) -> None:
-        """Close all links (on the loop)."""
+        """Close all links. Call this on the loop."""
         self._closed = True
         self._unreachable.close()
         self._limited_log.close()
@@ -374,7 +376,7 @@ class Subscription:
         await asyncio.gather(*self._connecting.values(), return_exceptions=True)
 
     def _settle(self) -> None:
-        """Forget publishers that the master does not list, unless their link is up: rospy nodes never register again."""
+        """Forget publishers that the master does not list, except those with an open link: rospy nodes never register again."""
         self._settling = None
         for action in self._plan.publishers_changed(self._named):
             if isinstance(action, Connect):
@@ -383,9 +385,9 @@ class Subscription:
                 self._disconnect(action.uri)
 
     def _leave(self, uri: str) -> None:
-        """Keep reading from a publisher that has unregistered: messages that it published before may still be in transit.
+        """Continue to read from a publisher that has unregistered: messages that it published before may still be in transit.
 
-        The publisher closes the connection when everything is sent. Otherwise it is disconnected after a while.
+        The publisher closes the connection when everything is sent. If it does not, it is disconnected after a while.
         """
         link = self._links.get(uri)
         if not link:
@@ -399,7 +401,7 @@ class Subscription:
         task = self._connecting.pop(uri, None)
         if task:
             task.cancel()
-        # Remove it immediately: the link itself closes only when its reader has noticed.
+        # Remove the link immediately: it closes only when its reader has detected the end of the connection.
         link = self._links.pop(uri, None)
         if link:
             link.close()
@@ -410,7 +412,7 @@ class Subscription:
 
     def _start_connecting(self, action: Connect) -> None:
         if action.uri in self._leaving:
-            # If the publisher kept the first connection, a second one would deliver each message twice.
+            # If the publisher still used the first connection, a second one would deliver each message twice.
             link, timer = self._leaving.pop(action.uri)
             timer.cancel()
             link.returned = True
@@ -438,7 +440,8 @@ class Subscription:
             if self.lists == lists:
                 self._plan.refused(uri)
             else:
-                # The next list, perhaps the last one, is older than this refusal: the publisher may accept by now.
+                # A newer list arrived after this refusal, and perhaps no other list will follow: retry, because the
+                # publisher may accept by now.
                 self._retry(uri, error)
         except _NoPublisher as error:
             self._limited_log.warning("no connection for %s: %s", self.topic, error)
@@ -446,7 +449,8 @@ class Subscription:
             self._retry(uri, error)
         else:
             if self._closed or self._connecting.get(uri) is not asyncio.current_task():
-                # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives with the last byte.
+                # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives together with the last
+                # byte.
                 link.sock.close()
                 return
 
@@ -483,7 +487,7 @@ class Subscription:
     async def _open_link(self, uri: str) -> InLink:
         protocols: list[list[str]] = [["TCPROS"]]
         if self._this_host:
-            # After TCPROS, since third-party nodes read the first protocol only.
+            # Add this after TCPROS, since third-party nodes read the first protocol only.
             protocols.append([local.PROTOCOL, self._this_host])
         answer = await self._rpc.call(uri, "requestTopic", self._caller_id, self.topic, protocols)
         sock, address = await self._reach(answer, uri)
@@ -495,7 +499,7 @@ class Subscription:
                 self.type,
                 self._caller_id,
                 tcp_nodelay=self.tcp_nodelay,
-                # Peers on other hosts get only the header fields of ROS 1.
+                # Send peers on other hosts only ROS 1's header fields.
                 split_frames=not self._on_loop and sock.family not in sockets.FAMILIES,
             )
             await tcp.send_header(sock, fields)
@@ -504,19 +508,19 @@ class Subscription:
         except BaseException:
             sock.close()
             raise
-        # Like rospy, count the sent header too.
+        # Like rospy, include the sent header in the count.
         link = InLink(uri, address, sock, header, received_bytes=len(serialize_header(fields)))
         # Third-party nodes omit the topic, but user code reads it.
         header.setdefault("topic", self.topic)
         return link
 
     async def _reach(self, answer: object, uri: str) -> tuple[socket.socket, str]:
-        """Return a socket connected to the publisher that gave this answer, and its address."""
+        """Return a socket connected to the publisher that sent this response, and its address."""
         unix = local.parse_answer(answer) if self._this_host else None
         if unix:
             with contextlib.suppress(OSError):
                 return local.connect(unix.name), unix.name
-            # Something, such as a sandbox, separates the two processes.
+            # Connecting failed, so the two processes are isolated from each other, for example by a sandbox: use TCP.
             host, port = unix.host, unix.port
         else:
             host, port = _tcpros_address(answer, uri, self.topic)
@@ -531,7 +535,7 @@ class Subscription:
             deliver(frame, header)
 
         def on_latched_frame(frame: Frame) -> None:
-            # A small frame is in a buffer that the next receive reuses.
+            # Copy a small frame: it is in a buffer that the next receive overwrites.
             link.latched = frame if len(frame) > CHUNK else bytes(frame)
             on_frame(frame)
 
@@ -545,7 +549,7 @@ class Subscription:
         except (OSError, WireError) as error:
             link.fault = error
         except MemoryError:
-            # Neither for the message nor for a callback.
+            # There is no memory for the message, or none for a callback.
             link.fault = WireError("no memory for a message")
         finally:
             with contextlib.suppress(RuntimeError):
@@ -560,13 +564,13 @@ class Subscription:
             return
         del self._links[link.uri]
         if link.returned:
-            # The closed connection was to the publisher's previous registration; connect to the present one
+            # The closed connection belonged to the publisher's previous registration; connect to the current one
             # immediately.
             self._start_connecting(Connect(link.uri))
             return
         fault = link.fault or EOFError("the publisher closed the connection")
         if isinstance(fault, WireError):
-            # Logged once: everything after the error in such a stream is invalid too.
+            # Log one line and disconnect: everything after the error in such a stream is invalid too.
             _log.warning("connection to %s for %s ended: %s", link.uri, self.topic, fault)
         elif link.received or time.monotonic() - link.since > _WORKED_SECONDS:
             self._plan.worked(link.uri)
@@ -580,14 +584,15 @@ class Subscription:
         _log.debug("connection to %s for %s: %s; again in %g s", uri, self.topic, error, action.delay)
         cause = error.__cause__ or error
         if isinstance(error, ThreadLimitError) or is_file_limit(cause):
-            # A limit of this process, not a fault of the publisher.
+            # The error is a limit in this process, not the publisher's fault.
             if is_file_limit(cause):
                 self._limited_log.error("no connection for %s: %s", self.topic, explain(cause))
             self._start_connecting(action)
             return
 
         nameless = isinstance(cause, socket.gaierror)
-        # A publisher that is shutting down refuses or disconnects; a timeout points to a wrong address or a firewall.
+        # Publishers that are shutting down refuse or disconnect, so report other errors immediately: a timeout
+        # indicates a wrong address or a firewall.
         at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
         if (at_once or self._plan.failures(uri) >= _WARN_AFTER) and uri not in self._reported:
             self._reported.add(uri)
@@ -596,7 +601,7 @@ class Subscription:
 
 
 def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
-    """Return advice on which host's address is wrong, and which variable sets it."""
+    """Return advice on which host has the wrong address, and which variable sets it."""
     if not isinstance(error, OSError | RpcUnreachable):
         return "Its address is right, since it answered"
     if isinstance(error, RpcTimeout):
@@ -628,11 +633,11 @@ def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
 
 
 class _NoPublisher(WireError):
-    """The answer cannot come from a publisher: a retry would fail again, and rospy does not retry either."""
+    """The response cannot come from a publisher: a retry would fail again, and rospy does not retry either."""
 
 
 def _tcpros_address(answer: object, uri: str, topic: str) -> tuple[str, int]:
-    """Return (host, port) from a publisher's answer to requestTopic. Raise WireError."""
+    """Return (host, port) from a publisher's response to requestTopic. Raise WireError if the response has neither."""
     match answer:
         case [1, _, ["TCPROS", str(host), int(port), *_]]:
             return host, port

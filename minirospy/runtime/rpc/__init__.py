@@ -1,1 +1,1 @@
-"""XML-RPC over HTTP: the server, the blocking and the asyncio client, and the proxies for master and nodes."""
+"""XML-RPC over HTTP: the server, the blocking client and the asyncio client, and the proxies for master and nodes."""

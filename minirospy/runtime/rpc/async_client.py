@@ -37,29 +37,31 @@ _KEEP_SECONDS = 10.0
 # 10035 is WSAEWOULDBLOCK, which Windows reports while connecting.
 _UNDER_WAY = {errno.EINPROGRESS, errno.EWOULDBLOCK, 10035}
 
-# Matches nearly all URIs of nodes; a complete parse costs as much as the call.
+# Matches nearly all node URIs, because a complete parse costs as much as the call
 _USUAL_URI = re.compile(r"http://([A-Za-z0-9._-]+):([1-9][0-9]{0,3}|[1-5][0-9]{4})(/[A-Za-z0-9._/-]*)?")
 
 _Address = tuple[str, int]
 
 
 class AsyncRpcClient:
-    """Calls methods of any server; a few connections to each server are kept for a while and reused."""
+    """Calls methods on any server; a few connections to each server stay open for a while and are reused."""
 
     def __init__(self, *, same_host: bool = True, max_answer: int = MAX_BODY) -> None:
-        """Take ``same_host``, to try a Unix socket first, and ``max_answer``, the limit of an answer in bytes."""
+        """Create the client; ``same_host``: try a Unix socket first; ``max_answer``: the maximum size of a response in bytes."""
         self.same_host = same_host
         self.max_answer = max_answer
-        # The idle connections to each server, in the order of their last use.
+        # The idle connections to each server, least recently used first.
         self._idle: dict[_Address, list[_Connection]] = {}
         self._sweep: asyncio.TimerHandle | None = None
         self.under_way: Deadlines[Call] = Deadlines(Call.end_late)
         self.closed = False
 
     async def call(self, uri: str, method: str, *args: object, timeout: float = 5.0) -> Any:
-        """Return the value that ``method`` at ``uri`` answers, within ``timeout`` seconds.
+        """Call ``method`` at ``uri`` and return the value in the response, within ``timeout`` seconds.
 
-        Raise RpcUnreachable, RpcFault, or RpcProtocolError.
+        Raise RpcUnreachable if the server does not respond, RpcFault if the call fails there, RpcProtocolError if the
+        response is
+        invalid.
         """
         answer: asyncio.Future[Body] = asyncio.get_running_loop().create_future()
         call = self.start(uri, serialize_call(method, args), timeout, partial(_settle, answer))
@@ -71,10 +73,10 @@ class AsyncRpcClient:
     def start(
         self, uri: str, body: bytes | list[bytes], timeout: float, done: Callable[[Body | RpcError], None]
     ) -> Call:
-        """Do the same as :meth:`call` with callbacks; on a busy master a coroutine would double the cost of a call.
+        """Do the same as :meth:`call` with callbacks: on a busy master a coroutine would double the cost of a call.
 
         ``body`` is the call as XML, possibly in pieces. ``done`` is called on the loop, possibly immediately, with the
-        answer as XML, or with the exception that :meth:`call` would raise.
+        response as XML, or with the exception that :meth:`call` would raise.
         """
         call = Call(self, uri, body, timeout, done)
         call.start()
@@ -95,7 +97,7 @@ class AsyncRpcClient:
         self.under_way.close()
 
     def acquire(self, address: _Address) -> _Connection | None:
-        """Return an idle connection to a server, or None."""
+        """Return an idle connection to a server and remove it from the idle ones, or return None."""
         kept = self._idle.get(address)
         if not kept:
             return None
@@ -105,7 +107,7 @@ class AsyncRpcClient:
         return connection
 
     def keep(self, connection: _Connection) -> None:
-        """Keep a connection for the next call."""
+        """Add a connection to the idle ones, for the next call."""
         if self.closed:
             connection.close()
             return
@@ -123,7 +125,7 @@ class AsyncRpcClient:
             self._sweep = loop.call_later(_KEEP_SECONDS, self._close_idle)
 
     def drop(self, connection: _Connection) -> None:
-        """Forget an idle connection, which has closed."""
+        """Remove an idle connection that has closed."""
         connection.close()
         kept = self._idle[connection.address]
         kept.remove(connection)
@@ -131,7 +133,7 @@ class AsyncRpcClient:
             del self._idle[connection.address]
 
     def _close_idle(self) -> None:
-        """Close connections that were not used for a while: each may occupy a thread of the server."""
+        """Close connections that have not been used for a while, because each may occupy a thread in the server."""
         loop = asyncio.get_running_loop()
         end = loop.time() - _KEEP_SECONDS / 2
         for connection in [each for kept in self._idle.values() for each in kept if each.used < end]:
@@ -140,7 +142,7 @@ class AsyncRpcClient:
 
 
 class _Connection:
-    """A connection to a server, for sequential calls; the loop watches it as long as it is open."""
+    """A connection to a server, for sequential calls; the loop watches the socket while it is open."""
 
     __slots__ = ("_client", "_fd", "_is_watched", "_loop", "address", "call", "reader", "sock", "used")
 
@@ -151,7 +153,8 @@ class _Connection:
         self._loop = loop
         self.sock = sock
         self.address = address
-        # The loop formats an unregistered socket as a string, which costs more than a number.
+        # Register the file descriptor and not the socket: asyncio formats an unregistered socket as a string, which
+        # is slow.
         self._fd = sock.fileno()
         self.call: Call | None = None
         self.reader = HttpReader(client.max_answer)
@@ -169,7 +172,7 @@ class _Connection:
         self._loop.add_writer(self._fd, function)
 
     def stop_writing(self) -> None:
-        """Stop calling that function."""
+        """Stop calling the function that :meth:`write_on` has registered."""
         self._loop.remove_writer(self._fd)
 
     def close(self) -> None:
@@ -193,12 +196,12 @@ class _Connection:
         if call:
             call.received(data)
         else:
-            # No call is in progress, so this is end of file.
+            # No call is in progress, so any readable event means end of file.
             self._client.drop(self)
 
 
 class Call:
-    """One call: its request and its answer, on an idle connection or a new one.
+    """One call: its request and its response, on an idle connection or a new one.
 
     It uses plain callbacks: on a master, which calls thousands of nodes, a coroutine and its tasks would double the cost.
     """
@@ -290,7 +293,7 @@ class Call:
         self._finish(error if isinstance(error, RpcError) else unreachable)
 
     def received(self, data: bytes) -> None:
-        """Accept bytes of the answer; b"" means end of file."""
+        """Accept bytes of the response; b"" means end of file."""
         assert self._connection
         reader = self._connection.reader
         try:
@@ -307,11 +310,11 @@ class Call:
         """Close this connection and try another one."""
         self._close()
         if self._is_kept and isinstance(error, ConnectionError | EOFError):
-            # The peer has closed an idle connection: retry on a new one.
+            # The peer has closed an idle connection, so retry on a new one.
             self._is_kept = False
             self._connect()
         elif isinstance(error, ConnectionRefusedError) and _literal(self._address[0]) != self._address[0]:
-            # "localhost" may be served only at its IPv6 address.
+            # The server may listen only on the IPv6 address of "localhost".
             self._look_up()
         else:
             self.fail(error)
@@ -333,7 +336,7 @@ class Call:
         try:
             sock = socket.socket()
         except OSError as error:
-            # There is no free file descriptor.
+            # There are no free file descriptors.
             self.fail(error)
             return
         sock.setblocking(False)
@@ -361,7 +364,8 @@ class Call:
                 self.fail(error)
             else:
                 if not self._done:
-                    # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives with the connection.
+                    # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives together with the
+                    # connection.
                     sock.close()
                     return
                 self._use(self._connected_by(sock))
@@ -379,7 +383,7 @@ class Call:
         self._next = 1
 
     def _send_early(self) -> None:
-        """Use a connection on this machine, which is open by now, although the loop has not reported it yet."""
+        """Send now on a connection to this machine: it is already open, although the loop has not reported that yet."""
         assert self._connection
         try:
             sent = self._connection.sock.send(self._left)
@@ -477,13 +481,13 @@ def _settle(answer: asyncio.Future[Body], found: Body | RpcError) -> None:
 
 
 def _parts(uri: str) -> tuple[str, int, str]:
-    """Return host, port and path. Raise RpcUnreachable."""
+    """Return host, port and path. Raise RpcUnreachable if the URI is invalid."""
     usual = _USUAL_URI.fullmatch(uri)
     return (usual[1], int(usual[2]), usual[3] or "/") if usual else parse_http_uri(uri)
 
 
 def _literal(host: str) -> str:
-    """Return the IPv4 address if ``host`` is one or is known to resolve to one; else ""."""
+    """Return the IPv4 address if ``host`` is one or is known to resolve to one, else ""."""
     if host == "localhost":
         return "127.0.0.1"
     try:

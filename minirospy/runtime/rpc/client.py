@@ -18,23 +18,23 @@ __all__ = ["RpcClient", "parse_http_uri"]
 
 _RECEIVE = 65536
 
-# The kernel accepts connections even for a busy program: after this the server counts as absent
+# The kernel accepts connections even for a busy program, so after this time the server counts as absent
 _CONNECT_SECONDS = 5.0
 
 
 class RpcClient:
-    """Calls methods of one server. Many threads may call; connections are kept and reused.
+    """Calls methods on one server. Thread-safe; connections stay open and are reused.
 
-    A call takes a connection out of the pool while it runs, so a signal handler that makes a call during another call of
-    the same thread gets a separate connection.
+    A call removes a connection from the pool while it runs, so a signal handler that makes a call during another call in
+    the same thread uses a separate connection.
     """
 
     def __init__(self, uri: str, timeout: float = 5.0, *, same_host: bool = True) -> None:
-        """Take ``timeout``, the limit in seconds of each wait for bytes, and of connecting, which takes 5 s at most.
+        """Create the client for ``uri``; ``timeout`` limits each wait for bytes, and connecting (5 s at most), in seconds.
 
         ``same_host``: try a Unix socket first.
 
-        Raise RpcUnreachable on a bad URI.
+        Raise RpcUnreachable if the URI is invalid.
         """
         self.uri = uri
         self._host, self._port, self._path = parse_http_uri(uri)
@@ -43,9 +43,11 @@ class RpcClient:
         self._idle: deque[socket.socket] = deque()
 
     def call(self, method: str, *args: object) -> Any:
-        """Return the answer of ``method``.
+        """Call ``method`` and return the value in the response.
 
-        Raise RpcUnreachable, RpcFault, or RpcProtocolError, also on an argument that has no XML-RPC type.
+        Raise RpcUnreachable if the server does not respond, RpcFault if the call fails there, RpcProtocolError if the
+        response is
+        invalid or an argument has no XML-RPC type.
         """
         request = serialize_request(f"{self._host}:{self._port}", self._path, serialize_call(method, args))
         message = self._exchange(request)
@@ -54,7 +56,7 @@ class RpcClient:
         return parse_response(message.body)
 
     def close(self) -> None:
-        """Close the kept connections. Idempotent."""
+        """Close the idle connections. Idempotent."""
         while self._idle:
             self._idle.pop().close()
 
@@ -83,7 +85,7 @@ class RpcClient:
             return unix
         seconds = min(self._timeout, _CONNECT_SECONDS)
         try:
-            # "localhost" may resolve to IPv6 first, where a ROS 1 server listens only with ROS_IPV6.
+            # "localhost" may resolve to an IPv6 address first, on which a ROS 1 server listens only with ROS_IPV6.
             host: Any = sockets.resolvable("127.0.0.1" if self._host == "localhost" else self._host)
             sock = socket.create_connection((host, self._port), seconds)
         except ConnectionRefusedError:
@@ -123,7 +125,7 @@ class RpcClient:
 
 
 def parse_http_uri(uri: str) -> tuple[str, int, str]:
-    """Return (host, port, path) of ``http://host:port/path``. Raise RpcUnreachable."""
+    """Return (host, port, path) of ``http://host:port/path``. Raise RpcUnreachable if the URI is invalid."""
     try:
         return split_uri(uri)
     except ValueError as error:

@@ -1,6 +1,6 @@
-"""The master and the nodes as Python objects: typed calls, unwrapped answers, specific errors.
+"""The master and the nodes as Python objects: typed calls, unwrapped responses, specific errors.
 
-Blocking, without asyncio. Source: http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Slave_API,
+The calls block, and need no asyncio. Source: http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Slave_API,
 http://wiki.ros.org/ROS/Parameter%20Server%20API.
 """
 
@@ -26,7 +26,10 @@ class SystemState(NamedTuple):
 
 
 class BusConnection(NamedTuple):
-    """One connection of a node: ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` are set if the node reports them."""
+    """One of a node's connections.
+
+    ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` are set if the node reports them.
+    """
 
     id: object
     destination: str
@@ -38,7 +41,7 @@ class BusConnection(NamedTuple):
 
 
 def unwrap(method: str, answer: object) -> Any:
-    """Return the value of a ROS API answer. Raise RpcRefused if its status is not 1."""
+    """Return the value in a ROS API response. Raise RpcRefused if its status is not 1."""
     match answer:
         case [1, _, value]:
             return value
@@ -49,7 +52,7 @@ def unwrap(method: str, answer: object) -> Any:
 
 
 def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
-    """Return the error for a failed call of the master: it does not answer, or this process can open no more sockets."""
+    """Return the error for a failed call to the master: it does not respond, or this process can open no more sockets."""
     cause = error.__cause__
     if isinstance(error, RpcTimeout):
         return MasterUnreachableError(error.uri, cause=f"{error.why}; {SUSPENDED}")
@@ -61,9 +64,9 @@ def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
 
 
 class MasterProxy:
-    """The master at ``uri``, called as the node ``caller_id``.
+    """A proxy for the master at ``uri``; calls are made as the node ``caller_id``.
 
-    Each method raises MasterUnreachableError if the master does not answer, RpcRefused if it refuses the call.
+    Each method raises MasterUnreachableError if the master does not respond, RpcRefused if it refuses the call.
     """
 
     def __init__(self, uri: str, caller_id: str, timeout: float = 5.0, *, same_host: bool = True) -> None:
@@ -75,7 +78,7 @@ class MasterProxy:
             raise MasterUnreachableError(uri) from error
 
     def call(self, method: str, *args: object) -> Any:
-        """Call any method of the API; the caller's id is prepended to the arguments."""
+        """Call any API method; the caller's id is prepended to the arguments."""
         try:
             return unwrap(method, self._client.call(method, self.caller_id, *args))
         except RpcUnreachable as error:
@@ -86,7 +89,7 @@ class MasterProxy:
         self._client.close()
 
     def is_online(self) -> bool:
-        """Return whether the master answers."""
+        """Return whether the master responds."""
         try:
             self.get_pid()
         except MasterUnreachableError:
@@ -106,11 +109,11 @@ class MasterProxy:
         return str(self.call("lookupNode", name))
 
     def get_published_topics(self, subgraph: str = "") -> list[tuple[str, str]]:
-        """Return (topic, type) of each published topic at or below ``subgraph``."""
+        """Return (topic, type) for each published topic at or below ``subgraph``."""
         return [(topic, type_) for topic, type_ in self.call("getPublishedTopics", subgraph)]
 
     def get_topic_types(self) -> dict[str, str]:
-        """Return the type of each topic that the master knows."""
+        """Return the type of each topic that is registered with the master."""
         return dict(self.call("getTopicTypes"))
 
     def get_system_state(self) -> SystemState:
@@ -118,7 +121,7 @@ class MasterProxy:
         return SystemState(*(dict(table) for table in self.call("getSystemState")))
 
     def lookup_service(self, name: str) -> str:
-        """Return the URI (rosrpc://host:port) of a service."""
+        """Return a service's URI (rosrpc://host:port)."""
         return str(self.call("lookupService", name))
 
     def register_publisher(self, topic: str, type_: str, caller_api: str) -> list[str]:
@@ -146,7 +149,7 @@ class MasterProxy:
         return int(self.call("unregisterService", name, service_api))
 
     def get_param(self, key: str) -> Any:
-        """Return a parameter, or a dictionary of those below ``key``."""
+        """Return a parameter's value, or a dictionary of the parameters below ``key``."""
         return self.call("getParam", key)
 
     def set_param(self, key: str, value: object) -> None:
@@ -162,7 +165,7 @@ class MasterProxy:
         self.call("deleteParam", key)
 
     def search_param(self, key: str) -> str | None:
-        """Return the closest parameter of this name, upwards from the caller's namespace; None if there is none."""
+        """Search for a parameter from the caller's namespace upwards; return the full name of the first match, or None."""
         try:
             return str(self.call("searchParam", key))
         except RpcRefused:
@@ -173,16 +176,16 @@ class MasterProxy:
         return list(self.call("getParamNames"))
 
     def subscribe_param(self, caller_api: str, key: str) -> object:
-        """Subscribe to changes at or below ``key``; return its present value."""
+        """Subscribe to changes at or below ``key``; return its current value."""
         return self.call("subscribeParam", caller_api, key)
 
     def unsubscribe_param(self, caller_api: str, key: str) -> int:
-        """Unsubscribe from changes of ``key``."""
+        """Unsubscribe from changes to ``key``."""
         return int(self.call("unsubscribeParam", caller_api, key))
 
 
 class SlaveProxy:
-    """A node at ``uri``. Each method raises RpcUnreachable, RpcRefused or another RpcError."""
+    """A proxy for the node at ``uri``. Each method raises RpcUnreachable if it does not respond, or another RpcError."""
 
     def __init__(self, uri: str, caller_id: str, timeout: float = 3.0, *, same_host: bool = True) -> None:
         self.uri = uri
@@ -190,7 +193,7 @@ class SlaveProxy:
         self._client = RpcClient(uri, timeout, same_host=same_host)
 
     def call(self, method: str, *args: object) -> Any:
-        """Call any method of the API; the caller's id is prepended to the arguments."""
+        """Call any API method; the caller's id is prepended to the arguments."""
         return unwrap(method, self._client.call(method, self.caller_id, *args))
 
     def close(self) -> None:
@@ -218,11 +221,11 @@ class SlaveProxy:
         self.call("shutdown", reason)
 
     def get_subscriptions(self) -> list[tuple[str, str]]:
-        """Return (topic, type) of each subscription of the node."""
+        """Return (topic, type) for each topic that the node subscribes to."""
         return [(topic, type_) for topic, type_ in self.call("getSubscriptions")]
 
     def get_publications(self) -> list[tuple[str, str]]:
-        """Return (topic, type) of each publication of the node."""
+        """Return (topic, type) for each topic that the node publishes."""
         return [(topic, type_) for topic, type_ in self.call("getPublications")]
 
     def request_topic(self, topic: str, protocols: list[list[object]]) -> list[object]:

@@ -1,4 +1,4 @@
-"""A queue of answer bytes that a client has not read yet."""
+"""A queue of response bytes that a client has not read yet."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Sequence
 
 __all__ = ["MAX_UNREAD", "Outbox"]
 
-MAX_UNREAD = 256 * 1024  # bytes; a client with more unread answers gets no further ones
+MAX_UNREAD = 256 * 1024  # bytes; a client with more unread bytes gets no further responses
 
 
 class Outbox:
-    """A queue of bytes in front of a non-blocking socket. It is true if it contains bytes."""
+    """A queue of bytes to send on a non-blocking socket. Its truth value is whether it contains bytes."""
 
     __slots__ = ("_pieces", "_sock", "size")
 
@@ -26,7 +26,10 @@ class Outbox:
         return self.size > 0
 
     def write(self, pieces: Sequence[bytes]) -> int:
-        """Send as much as the socket accepts, and queue the rest; return the number of bytes sent. Raise OSError."""
+        """Send as much as the socket accepts, and queue the rest; return the number of bytes sent.
+
+        Raise OSError if the connection has failed.
+        """
         sent = 0
         if not self.size:
             try:
@@ -47,7 +50,10 @@ class Outbox:
         return kept
 
     def flush(self) -> int:
-        """Send as much of the queue as the socket accepts; return the number of bytes sent. Raise OSError."""
+        """Send as much of the queue as the socket accepts; return the number of bytes sent.
+
+        Raise OSError if the connection has failed.
+        """
         sent = 0
         try:
             while self._pieces and sent < MAX_UNREAD:

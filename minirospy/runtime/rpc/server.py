@@ -3,9 +3,9 @@
 Its connections are plain sockets that the loop watches: a master serves thousands of short connections, and an asyncio
 transport for each would cost more than all other work.
 
-No client delays the others: a short request is answered immediately. A long one (a large body, a large answer, many
+No client delays the others: a short request is processed immediately. A long one (a large body, a large response, many
 calls in one) is processed in steps, for a few milliseconds in each loop iteration (``runtime/rpc/turns.py``). Memory
-is limited for all clients together, both for incomplete requests and for unread answers.
+is limited for all clients together, both for incomplete requests and for unread responses.
 """
 
 from __future__ import annotations
@@ -32,40 +32,43 @@ __all__ = ["Dispatch", "RpcServer", "is_address_in_use"]
 
 _log = logging.getLogger(__name__)
 
-# Bytes of requests that are incomplete or being read, of all clients; beyond that the largest are refused
+# Maximum bytes of all clients' requests that are incomplete or being read; beyond that the largest are refused
 _MAX_HELD = 72 * 1024 * 1024
-_LARGE = 32 * 1024  # bytes; requests up to this size are not refused for that
+_LARGE = 32 * 1024  # bytes; requests up to this size are not refused because of that limit
 
-# Unread bytes of all clients; then the client that has read nothing for longest is disconnected
+# Maximum bytes that all clients have not read; then the client that has read nothing for longest is disconnected
 _MAX_UNREAD_OF_ALL = 72 * 1024 * 1024
 
 _BACKLOG = 4096
-"""Connections that wait to be accepted. If the queue is full, the kernel drops a client's first segments, and the client
-resends them after growing delays: 1, 3, 7 s while connecting, up to 25 s for its request after that.
+"""Maximum number of connections that the kernel queues. If the queue is full, the kernel drops a client's first segments, and
+the client resends them after growing delays: 1, 3, 7 s while connecting, up to 25 s for its request after that.
 """
 
 _ACCEPTS_AT_ONCE, _ACCEPT_SECONDS = 1024, 0.015
 _READ_SECONDS = 0.003
-"""Connections to accept per loop iteration, the seconds this may take, and the seconds to read from them immediately.
+"""Maximum connections to accept per loop iteration, the seconds this may take, and the seconds to read from them immediately.
 
-Thousands of clients may connect together; a later one waits until all of them are accepted, 30 us each.
+Thousands of clients may connect together; the server accepts all of them, 30 us each, before it serves a later one.
 """
 
-_ACCEPTS_BETWEEN = 64  # connections to accept before others are read from
+_ACCEPTS_BETWEEN = 64  # connections to accept before reading from others
 
-# Connections to read from, some 1 ms, before accepting new ones: thousands may be readable together
+# Connections to read from, which takes some 1 ms, before accepting new ones: thousands may be readable together
 _READS_AT_ONCE = 16
 
-# Connections to read from per loop iteration, and the seconds this may take; the rest come first in the next one
+# Maximum connections to read from per loop iteration, and the seconds this may take; the rest are read first in the
+# next iteration
 _MAX_READS, _READS_SECONDS = 256, 0.01
 
 
 Dispatch = Callable[[str, list[object]], object]
-"""Takes a method name and arguments; returns the value, an awaitable of it, or steps that compute it; raises RpcFault."""
+"""Called with a method name and arguments; returns the value, an awaitable of it, or steps that compute it, or raises
+RpcFault.
+"""
 
 
 class RpcServer:
-    """Serves ``dispatch`` over HTTP at any path, with keep-alive and pipelining."""
+    """Serves ``dispatch`` over HTTP on any path, with keep-alive and pipelining."""
 
     def __init__(
         self,
@@ -78,9 +81,9 @@ class RpcServer:
         access: Access | None = None,
         known_as: Iterable[str] = (),
     ) -> None:
-        """Listen on ``port``; port 0 means any free port, chosen from ``ports`` if given.
+        """Create a server on ``port``; port 0 means any free port, chosen from ``ports`` if given.
 
-        Processes on this machine that know the server by one of the host names ``known_as`` may connect through a Unix socket.
+        Processes on this machine that use one of the host names ``known_as`` for the server may connect through a Unix socket.
 
         The ``most_idle`` most recently active clients stay connected (None: all). Clients that ``access`` does not allow are
         disconnected.
@@ -90,34 +93,35 @@ class RpcServer:
         self.refused = 0  # number of connections that were not allowed
         self.held = 0  # bytes of requests that are incomplete or being read
         self.holders: dict[Connection, int] = {}  # connection -> its share of ``held``, in bytes
-        self.unread = 0  # bytes of answers that clients have not read yet
+        self.unread = 0  # bytes of responses that clients have not read yet
         self.slow: OrderedDict[Connection, None] = OrderedDict()
-        """The connections with unread answers; those that read most recently are last."""
+        """The connections with unread responses, least recently read first."""
         self.turns = Turns()
         self.connections: OrderedDict[Connection, None] = OrderedDict()
-        """All connections; the most recently active are last."""
+        """All connections, least recently active first."""
 
         self._bind_host = bind_host
         self._ports = ports
         self._most = most_idle
-        # With few places, clients accepted together may displace each other, so each is read from first.
+        # If few clients may stay connected, clients accepted together may displace each other, so read from each
+        # first.
         self._reads_all = most_idle is not None and most_idle <= _ACCEPTS_AT_ONCE
         self._access = access
         self._known_as = dict.fromkeys(known_as)
         self._sock: socket.socket | None = None
         self._listening: list[socket.socket] = []
-        # Sockets that pause accepting for a moment.
+        # Sockets on which accepting is paused for a moment.
         self._resting: set[socket.socket] = set()
-        # Connections read from in this loop iteration, the time limit for reading, and whether it is over.
+        # Connections read from in this loop iteration, the deadline for reading, and whether it has passed.
         self._reads = 0
         self._reads_end = 0.0
         self._reads_over = False
-        # Connections to read in the next iteration: new ones, and ones that have made a request before.
+        # Connections to read from in the next iteration: new ones, and those that have made a request before.
         self._late_new: OrderedDict[Connection, None] = OrderedDict()
         self._late: OrderedDict[Connection, None] = OrderedDict()
 
         self.deadlines: Deadlines[Connection] = Deadlines(Connection.end)
-        """Time limits for receiving a request or sending an answer; idle connections have none."""
+        """Time limits for receiving a request or sending a response; idle connections have none."""
         self._limited_log = RateLimitedLogger(_log)
         self._strangers = RateLimitedLogger(_log, 10)
         self._unaccepted = RateLimitedLogger(_log)
@@ -128,9 +132,9 @@ class RpcServer:
         return len(self.connections)
 
     def listen(self) -> None:
-        """Bind the port exclusively; clients that connect wait until :meth:`start`. Idempotent. Raise OSError.
+        """Bind the port exclusively; clients that connect are queued until :meth:`start`. Idempotent.
 
-        With port 0, ``port`` is set to the chosen port.
+        With port 0, ``port`` is set to the chosen port. Raise OSError if the port cannot be bound.
         """
         if self._sock is not None:
             return
@@ -138,7 +142,7 @@ class RpcServer:
         try:
             # Accepted sockets inherit this option.
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            # Two sockets may be bound to one port as long as neither listens.
+            # Listen here, because two sockets may be bound to one port as long as neither listens.
             sock.listen(_BACKLOG)
         except BaseException:
             sock.close()
@@ -147,7 +151,7 @@ class RpcServer:
         self._sock = sock
 
     async def start(self) -> None:
-        """Serve clients, after :meth:`listen`. Raise OSError."""
+        """Serve clients; calls :meth:`listen` first if necessary. Raise OSError if the port cannot be bound."""
         self.listen()
         assert self._sock
         self._watch(self._sock)
@@ -178,7 +182,7 @@ class RpcServer:
         asyncio.get_running_loop().add_reader(sock, self._accept, sock)
 
     def admit(self, connection: Connection, *, is_new: bool) -> bool:
-        """Return whether to read now from a readable connection; if not, it is read in the next iteration.
+        """Return whether to read from a readable connection now; if not, it is read in the next iteration.
 
         ``is_new``: the connection has made no request yet.
         """
@@ -193,7 +197,7 @@ class RpcServer:
         self._late.pop(connection, None)
 
     def _may_read(self) -> bool:
-        """Return whether one more connection may be read in this loop iteration; accepts new connections in between."""
+        """Return whether one more connection may be read in this loop iteration; accept new connections in between."""
         if self._reads_over:
             return False
         self._reads += 1
@@ -210,12 +214,12 @@ class RpcServer:
         return not self._reads_over
 
     def _start_iteration(self) -> None:
-        """Read the connections left over from the last iteration, before the loop handles any others."""
+        """Read the connections left over from the last iteration before the loop handles any others."""
         self._reads, self._reads_over = 0, False
         number = 0
         while (self._late_new or self._late) and self._may_read():
-            # Alternate, so that many of one kind do not delay the others: long silent connections that disconnect,
-            # new ones, and busy ones.
+            # Alternate between new and other connections, so that many of one kind do not delay the other: new ones,
+            # idle ones that disconnect, and busy ones.
             if self._late_new and (number % 3 or not self._late):
                 connection, _ = self._late_new.popitem(last=number % 2 == 0)
             else:
@@ -240,7 +244,8 @@ class RpcServer:
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError as error:
-                # Out of file descriptors: the longest silent connection is closed to make room; retry a moment later.
+                # There are no free file descriptors: close the connection that has been silent longest, and retry a
+                # moment later.
                 self._unaccepted.error("a connection could not be accepted: %s", explain(error))
                 self._end_longest_silent()
                 loop.remove_reader(sock)
@@ -265,7 +270,7 @@ class RpcServer:
         connection = Connection(self, peer, loop)
         self.connections[connection] = None
         if reads:
-            # Usually the first request has arrived by now.
+            # The first request has usually arrived by now.
             connection.read()
 
     def log_refusal(self, sock: socket.socket, why: str) -> None:
@@ -278,7 +283,7 @@ class RpcServer:
         self._limited_log.warning("a request from %s was refused: %s", name, why)
 
     def limit_held(self, connection: Connection) -> bool:
-        """Refuse the largest requests if their total exceeds the limit; return whether ``connection`` remains."""
+        """Reject the largest requests if their total exceeds the limit; return whether ``connection`` is still open."""
         while self.held > _MAX_HELD:
             largest = max(self.holders, key=self.holders.__getitem__)
             if self.holders[largest] <= _LARGE:
@@ -287,14 +292,14 @@ class RpcServer:
         return not connection.is_refused
 
     def limit_unread(self) -> None:
-        """Disconnect the slowest clients if the total of unread answers exceeds the limit."""
+        """Disconnect the slowest clients if the total of unread responses exceeds the limit."""
         while self.unread > _MAX_UNREAD_OF_ALL and len(self.slow) > 1:
             slowest = next(iter(self.slow))
             slowest.log_refusal("its answers were not read")
             slowest.end()
 
     def _end_longest_silent(self) -> None:
-        """Close a connection that was silent long, preferably an idle one."""
+        """Close a connection that has been silent for long, preferably an idle one."""
         longest_silent = list(islice(self.connections, 20))
         if longest_silent:
             next((each for each in longest_silent if each.is_idle), longest_silent[0]).end()

@@ -1,4 +1,4 @@
-"""Long work on the event loop: a few milliseconds in each loop iteration, so that other work is not delayed."""
+"""Runs long work on the event loop, for a few milliseconds in each iteration, so that other work is not delayed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Turns"]
 
 _log = logging.getLogger(__name__)
 
-_SECONDS = 0.003  # time limit per loop iteration, for all work together
+_SECONDS = 0.003  # time limit per loop iteration for all work together
 
 _PAUSE = 0.005  # seconds to pause while all remaining work waits for something
 
@@ -22,14 +22,14 @@ _MAX_IN_PROGRESS = 16  # number of generators in progress; those not started yet
 
 
 class Turns:
-    """Runs generators concurrently on one event loop, a limited number at a time, with equal shares of time."""
+    """Runs a limited number of generators concurrently on one event loop, with equal shares of time."""
 
     def __init__(self, seconds: float = _SECONDS, clock: Callable[[], float] = time.perf_counter) -> None:
         self._seconds = seconds
         self._clock = clock
         self._queue: deque[Steps[None]] = deque()
         self._backlog: deque[Steps[None]] = deque()
-        # The generator that runs alone because it takes much memory, and those that wait for that.
+        # The generator that runs alone because it uses much memory, and those that are queued to run alone.
         self._alone: Steps[None] | None = None
         self._waiting: deque[Steps[None]] = deque()
         self._running: Steps[None] | None = None
@@ -39,7 +39,7 @@ class Turns:
         return len(self._queue) + len(self._waiting) + len(self._backlog)
 
     def start(self, steps: Steps[None]) -> None:
-        """Run ``steps`` from the next loop iteration on."""
+        """Run ``steps``, starting in the next loop iteration."""
         (self._queue if len(self._queue) < _MAX_IN_PROGRESS else self._backlog).append(steps)
         self._schedule()
 
@@ -49,7 +49,7 @@ class Turns:
             if steps in queue:
                 queue.remove(steps)
         self._release(steps)
-        # A generator that cancels itself is in its last step.
+        # A generator that cancels itself is in its last step and cannot be closed.
         if steps is not self._running:
             steps.close()
 
@@ -106,7 +106,7 @@ class Turns:
         return False
 
     def _claim(self, steps: Steps[None]) -> bool:
-        """Return whether ``steps`` may run alone now; otherwise it waits."""
+        """Return whether ``steps`` may run alone now; if not, queue it."""
         if self._alone is None:
             self._alone = steps
         if self._alone is steps:

@@ -1,1 +1,1 @@
-"""Transport: TCP and Unix sockets, links of topics, the event loop, worker threads, limits."""
+"""Transport: TCP and Unix sockets, topic links, the event loop, worker threads, limits."""

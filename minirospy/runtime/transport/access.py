@@ -1,4 +1,4 @@
-"""Access control: the networks of ``--allow`` and MINIROSPY_ALLOW."""
+"""Access control: the networks in ``--allow`` and MINIROSPY_ALLOW."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from typing import TYPE_CHECKING
 from minirospy.base.errors import UsageError
 
 if TYPE_CHECKING:
-    # Imported only if networks are given, which nearly no node does.
+    # Imported only if networks are given, which is rare.
     from ipaddress import IPv4Network, IPv6Network
 
 __all__ = ["Access", "listening_lines"]
 
 
 class Access:
-    """Allows peers in these networks, and this machine itself; without any network, allows all peers."""
+    """Allows peers in the given networks, and this machine itself; if no network is given, allows all peers."""
 
     def __init__(self, networks: Iterable[str] = ()) -> None:
-        """Take ``networks``, such as 192.168.65.0/24 or a single address. Raise UsageError."""
+        """Allow ``networks``, such as 192.168.65.0/24 or a single address. Raise UsageError if one is invalid."""
         self.networks = tuple(_network(text) for text in networks)
         # A cache: a robot has few peers, and they connect often.
         self._known: dict[str, bool] = {}
 
     @classmethod
     def parse(cls, text: str) -> Access:
-        """Parse networks separated by commas or spaces; "" allows all peers. Raise UsageError."""
+        """Parse networks separated by commas or spaces; "" allows all peers. Raise UsageError if one is invalid."""
         networks = text.replace(",", " ").split()
         if text and not networks:
-            # Perhaps the text came from unset variables, which must not allow all peers.
+            # The text may come from unset variables, which must not result in allowing all peers.
             raise UsageError(f"'{text}' names no network: write as 192.168.65.0/24, or an address")
         return cls(networks)
 
@@ -59,7 +59,7 @@ class Access:
 
 
 def listening_lines(bind_host: str, port: int, access: Access, *, local: bool = False) -> list[str]:
-    """Return lines with the addresses of a server, and a warning if it is reachable from the open internet."""
+    """Return lines with a server's addresses, and a warning if it is reachable from the open internet."""
     import ipaddress
 
     if local:

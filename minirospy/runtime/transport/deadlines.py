@@ -1,4 +1,4 @@
-"""Time limits of many operations that nearly always complete in time, with a single timer of the loop."""
+"""Time limits for many operations that nearly always complete in time, with a single loop timer."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _T = TypeVar("_T")
 class Deadlines(Generic[_T]):
     """The time limit of each operation in progress.
 
-    ``late`` is called, on the loop, with each operation that has passed its limit, in the order of the limits.
+    ``late`` is called on the loop with each operation that has passed its limit, in the order of the limits.
     """
 
     def __init__(self, late: Callable[[_T], object]) -> None:
         self._late = late
         self._ends: dict[_T, float] = {}
         self._timer: asyncio.TimerHandle | None = None
-        # When the timer fires: no later than the earliest limit.
+        # When the timer fires, which is no later than the earliest limit.
         self._next = 0.0
 
     def __len__(self) -> int:
@@ -61,12 +61,12 @@ class Deadlines(Generic[_T]):
         loop = asyncio.get_running_loop()
         now = loop.time()
 
-        # After a stall several may be late: process them in the order of their limits, not in the order of set().
+        # After a stall several limits may have passed: process them in order, not in the order of the calls to set().
         late = sorted(
             (end, number, each) for number, (each, end) in enumerate(self._ends.items()) if end <= now
         )
         for end, _, each in late:
-            # The call for an earlier one may have completed this one, or extended its limit.
+            # The call for an earlier operation may have completed this one, or extended its limit.
             if self._ends.get(each) == end:
                 self.drop(each)
                 self._late(each)

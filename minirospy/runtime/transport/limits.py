@@ -18,11 +18,11 @@ _CGROUP = Path("/sys/fs/cgroup")
 
 @contextlib.contextmanager
 def naming_thread_limit() -> Iterator[None]:
-    """Start threads in the block. Raise ThreadLimitError if the system allows no more, instead of RuntimeError."""
+    """Start threads in the block. Raise ThreadLimitError, not RuntimeError, if the system allows no more threads."""
     try:
         yield
     except RuntimeError as error:
-        # Raised by an exiting Python; since 3.13 with a separate class.
+        # Python raises this while it exits; since 3.13 it raises a separate class.
         if sys.is_finalizing() or type(error) is not RuntimeError:
             raise
         if "interpreter shutdown" in str(error):
@@ -31,12 +31,12 @@ def naming_thread_limit() -> Iterator[None]:
 
 
 def is_file_limit(error: BaseException | None) -> bool:
-    """Return whether an error means that this process, or this machine, can open no more files and sockets."""
+    """Return whether an error means that this process or machine can open no more files and sockets."""
     return isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE)
 
 
 def explain(error: BaseException) -> str:
-    """Return an error's text; for a file limit also which limit it is and how to raise it."""
+    """Return an error's message; for a file limit add which limit it is and how to raise it."""
     if not is_file_limit(error):
         return str(error)
     assert isinstance(error, OSError)

@@ -1,4 +1,4 @@
-"""A publisher's end of a link: the connection that carries a topic's frames after the handshake, written by any thread.
+"""The publisher's end of a link: the connection that carries a topic's frames after the handshake. Any thread may write.
 
 The subscriber's end is in :mod:`minirospy.runtime.transport.readers`.
 """
@@ -20,19 +20,20 @@ from minirospy.runtime.transport.sockets import FAMILIES, is_writable
 __all__ = ["OutLink"]
 
 _GATHER = 64
-_PUSH_SECONDS = 0.005  # during which a publishing thread itself writes a large message into the socket
+_PUSH_SECONDS = 0.005  # during which a publishing thread itself writes a large message to the socket
 _PUSH_WAIT_MS = 1  # for each wait during that time
 
-_Waiting = bytes | list[bytes | memoryview]  # a frame in an outbox: whole, or the buffers not sent yet
+# a frame in an outbox: the whole frame, or the buffers that are not sent yet
+_Waiting = bytes | list[bytes | memoryview]
 
 
 class OutLink:
     """The publisher's end of one connection: sends frames from any thread, in order, without blocking the publisher.
 
-    The sending thread writes a frame immediately. Whatever the socket does not accept waits in the outbox, which the
-    loop sends; beyond ``queue_size`` waiting frames the oldest is dropped (0: no limit). Before dropping, the thread waits
-    a few milliseconds for room, but only if the peer is on this machine and has read since the last wait.
-    ``header`` is sent first, when the link is opened; frames that are published before that wait behind it.
+    The sending thread writes a frame immediately. Data that the socket does not accept is queued in the outbox, which the
+    loop sends; if more than ``queue_size`` frames are queued, the oldest is dropped (0: no limit). Before dropping, the thread
+    waits a few milliseconds for space, but only if the peer is on this machine and has read since the last wait.
+    ``header`` is sent first, when the link is opened; frames that are published before that are queued after it.
     With ``split`` large messages are sent as split frames if possible.
     """
 
@@ -98,11 +99,11 @@ class OutLink:
 
     @property
     def is_sending(self) -> bool:
-        """Return whether a thread is inside :meth:`send`: a signal handler in that thread would deadlock."""
+        """Return whether a thread is inside :meth:`send`, so that a signal handler that publishes could deadlock."""
         return self._lock.locked()
 
     def open(self) -> None:
-        """Send the header, and watch for the peer to disconnect (on the loop)."""
+        """Send the header, and watch for the peer to disconnect. Call this on the loop."""
         self._loop_thread = threading.get_ident()
         self._loop.add_reader(self._sock, self._readable)
         with self._drained:
@@ -110,7 +111,7 @@ class OutLink:
         self._start_writing()
 
     def send(self, frame: bytes | LargeFrame) -> None:
-        """Send ``frame``: immediately, or after the queued ones."""
+        """Send ``frame`` immediately, or queue it after the pending ones."""
         with self._drained:
             if self._closed:
                 return
@@ -136,18 +137,18 @@ class OutLink:
             self._post(self._start_writing)
 
     def wait(self) -> None:
-        """Wait until the queue is sent, or the link is closed (not on the loop)."""
+        """Wait until the queue is sent, or the link is closed. Do not call this on the loop."""
         with self._drained:
             self._drained.wait_for(lambda: not self._outbox or self._closed)
 
     async def drain(self, timeout: float) -> None:
-        """Wait as :meth:`wait` does, but on the loop, and for at most ``timeout`` seconds."""
+        """Do the same as :meth:`wait` on the loop, for at most ``timeout`` seconds."""
         end = self._loop.time() + timeout
         while self._outbox and self._loop.time() < end:
             await asyncio.sleep(0.005)
 
     def close(self) -> None:
-        """Close the connection (on the loop). Idempotent."""
+        """Close the connection. Call this on the loop. Idempotent."""
         with self._drained:
             if self._closed:
                 return
@@ -160,15 +161,15 @@ class OutLink:
         self._on_closed(self)
 
     def _has_to_wait(self, frame: _Waiting) -> bool:
-        """Append ``frame`` to the outbox; return False if the outbox has become empty instead."""
+        """Append ``frame`` to the outbox and return True; return False if the outbox has become empty meanwhile."""
         outbox = self._outbox
         if not self.sent % _GATHER or (self._is_reading and self._is_full()):
-            # A thread that publishes without pause would not let the loop's thread send.
+            # Send from here, because a thread that publishes without pause would not let the loop's thread send.
             self._help()
             if not outbox:
                 return False
         if self._is_full():
-            # The first frame may be partly sent, so it has to stay.
+            # The first frame may be partly sent, so it must not be dropped.
             del outbox[1 if self._begun else 0]
             self.dropped += 1
         outbox.append(frame)
@@ -178,10 +179,10 @@ class OutLink:
         return bool(self.queue_size) and len(self._outbox) - self._begun >= self.queue_size
 
     def _help(self) -> None:
-        """Send as much as the socket accepts; if the outbox is full, wait a little for room."""
+        """Send as much as the socket accepts; if the outbox is full, wait briefly for space."""
         end = time.monotonic() + _PUSH_SECONDS
         while True:
-            # Ignore errors: the loop detects them.
+            # Ignore errors, because the loop detects them.
             with contextlib.suppress(OSError):
                 while self._outbox:
                     self._write_some()
@@ -201,8 +202,8 @@ class OutLink:
         left = size
         end = time.monotonic() + _PUSH_SECONDS
         while True:
-            # No socket accepts a large message in one call, and a peer that reads makes room in microseconds: handing
-            # each step to the loop would cost more than waiting here.
+            # A socket does not accept a large message in one call, and a peer that reads frees space in microseconds:
+            # passing each step to the loop would cost more than waiting here.
             try:
                 left -= self._gather(buffers)
             except (BlockingIOError, InterruptedError):
@@ -220,11 +221,14 @@ class OutLink:
         self._post(self._start_writing)
 
     def _may_stay(self) -> bool:
-        """Return whether this thread may wait a moment: it is not the loop's, and the peer answers in microseconds."""
+        """Return whether this thread may wait briefly: it is not the loop's thread, and the peer reads within microseconds."""
         return self._is_same_host and threading.get_ident() != self._loop_thread
 
     def _gather(self, buffers: list[bytes | memoryview]) -> int:
-        """Send some of ``buffers``, remove the sent bytes, and return their number. Raise OSError."""
+        """Send as much of ``buffers`` as possible, remove the sent bytes, and return the number of bytes sent.
+
+        Raise OSError if the connection has failed.
+        """
         # Windows has no sendmsg.
         gather = getattr(self._sock, "sendmsg", None)
         count: int = gather(buffers) if gather else self._sock.send(buffers[0])
@@ -265,10 +269,10 @@ class OutLink:
             self._drained.release()
 
     def _write_some(self) -> None:
-        """Send some of the queue. Raise OSError."""
+        """Send part of the queue. Raise OSError if the connection has failed."""
         outbox = self._outbox
         if isinstance(outbox[0], list):
-            # A partly sent frame or a large one is sent separately.
+            # A partly sent frame or a large one is sent separately, not together with small ones.
             self._gather(outbox[0])
             self._begun = self._is_reading = True
             if not outbox[0]:
@@ -294,7 +298,7 @@ class OutLink:
             outbox.popleft()
 
     def _readable(self) -> None:
-        """Close the link: a subscriber sends nothing, so a readable socket means end of file."""
+        """Close the link: a subscriber never sends data, so a readable socket means end of file."""
         try:
             if self._sock.recv(4096):
                 return

@@ -1,6 +1,6 @@
-"""Connections between two processes of one machine, through a Unix socket in place of TCP.
+"""Connections between two processes on one machine, through a Unix socket instead of TCP.
 
-Each port of a server has a Linux abstract socket, whose name is made from the server's host and port. It is not a
+Each server port has a Linux abstract socket, whose name is derived from the server's host and port. It is not a
 file, so nothing is left behind when a process is killed. Like the port, it is visible to processes in the same network
 namespace. Source: docs/transports.md.
 """
@@ -24,7 +24,7 @@ _TRUSTED = frozenset({0})  # user ids that are trusted in addition to this proce
 
 
 class UnixAddress(NamedTuple):
-    """A publisher's answer: the socket's name, and the TCPROS address as a fallback."""
+    """A publisher's response: the socket's name, and the TCPROS address as a fallback."""
 
     name: str
     host: str
@@ -43,13 +43,13 @@ def this_host() -> str:
 
 
 def name_of(host: str, port: int) -> str:
-    """Return the name of the socket for ``port`` of a server that is known as ``host``."""
+    """Return the name of the socket for ``port`` on a server known as ``host``."""
     host = host.strip("[]").lower()
     return f"{_PREFIX}{'127.0.0.1' if host == 'localhost' else host}:{port}"
 
 
 def bind(host: str, port: int) -> socket.socket | None:
-    """Return a bound socket for ``port`` of a server that is known as ``host``; None if that is not possible."""
+    """Return a bound socket for ``port`` on a server known as ``host``, or None if that is not possible."""
     if sys.platform != "linux":
         return None
     try:
@@ -59,14 +59,14 @@ def bind(host: str, port: int) -> socket.socket | None:
 
 
 def connect(name: str) -> socket.socket:
-    """Return a connected, non-blocking socket; connecting a Unix socket does not block. Raise OSError."""
+    """Return a connected, non-blocking socket; connecting a Unix socket does not block. Raise OSError if nothing listens."""
     return _open(name, lambda sock, address: sock.connect(address))
 
 
 def reach(host: str, port: int) -> socket.socket | None:
-    """Return a connected, non-blocking socket to the server of ``host`` at ``port``; None if only TCP reaches it.
+    """Return a connected, non-blocking socket to the server at ``host`` and ``port``, or None if only TCP reaches it.
 
-    Another user of this machine could bind the name first, so the server must belong to this user or root.
+    Another user on this machine could bind the name first, so the server must belong to this user or root.
     """
     if sys.platform != "linux":
         return None
@@ -82,9 +82,9 @@ def reach(host: str, port: int) -> socket.socket | None:
 
 
 def parse_answer(answer: object) -> UnixAddress | None:
-    """Return the address from a publisher's answer to requestTopic; None if it is for another protocol."""
+    """Return the address from a publisher's response to requestTopic, or None if it is for another protocol."""
     match answer:
-        # A peer must not be able to choose any other socket of this machine, such as a display's or a message bus's.
+        # A peer must not be able to choose any other socket on this machine, such as a display's or a message bus's.
         case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):
             return UnixAddress(name, host, port)
         case _:
@@ -92,11 +92,12 @@ def parse_answer(answer: object) -> UnixAddress | None:
 
 
 def _open(name: str, use: Callable[[socket.socket, bytes], None]) -> socket.socket:
-    """Return a non-blocking socket, bound or connected to ``name``. Raise OSError."""
+    """Return a non-blocking socket, bound or connected to ``name``. Raise OSError if that fails."""
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         sock.setblocking(False)
-        # A zero byte makes it abstract. Use UTF-8 in any locale, since the two processes may have different ones.
+        # A zero byte makes the socket abstract. Use UTF-8 in any locale, since the two processes may have different
+        # locales.
         use(sock, b"\0" + name.encode(errors="surrogatepass"))
     except BaseException:
         sock.close()

@@ -1,4 +1,4 @@
-"""A connection between a program's threads and the single asyncio loop of the process."""
+"""A connection between a program's threads and the process's single asyncio loop."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class LoopClosedError(RuntimeError):
 
 
 class LoopThread:
-    """An event loop in a daemon thread. Closing is idempotent. Raise ThreadLimitError."""
+    """An event loop in a daemon thread. Closing is idempotent. Raise ThreadLimitError if the thread cannot be started."""
 
     def __init__(self, name: str = "minirospy-loop") -> None:
         self.loop = new_event_loop()
-        # A signal handler may run while its own thread holds the lock.
+        # Use a reentrant lock: a signal handler may run while its own thread holds the lock.
         self._lock = threading.RLock()
         self._is_ending = False
         self._end = asyncio.Event()
@@ -43,22 +43,22 @@ class LoopThread:
             self.loop.close()
             raise
         except BaseException:
-            # Ctrl-C came while the thread started; the thread closes the loop itself.
+            # Ctrl-C arrived while the thread started; the thread closes the loop itself.
             self.post(self._end.set)
             raise
 
     def run(self, coroutine: Coroutine[object, object, _T], timeout: float | None = None) -> _T:
         """Run ``coroutine`` on the loop and wait for its result.
 
-        Raise TimeoutError after ``timeout`` seconds, LoopClosedError if the loop closes before it is done,
-        and RuntimeError on the loop's own thread, which would deadlock.
+        Raise TimeoutError after ``timeout`` seconds, LoopClosedError if the loop closes before the coroutine is done,
+        and RuntimeError in the loop's own thread, which would deadlock.
         """
         return self.start(coroutine)(timeout)
 
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[float | None], _T]:
-        """Start ``coroutine``, as the first half of :meth:`run`; coroutines start in the order of the calls.
+        """Start ``coroutine``, like the first half of :meth:`run`; coroutines start in the order of the calls.
 
-        Return the function that waits for the result, to be called once.
+        Return a function that waits for the result; call it once.
         """
         if threading.current_thread() is self._thread:
             coroutine.close()
@@ -85,8 +85,8 @@ class LoopThread:
         return functools.partial(self._wait, tasks, pending)
 
     def _wait(self, tasks: list[asyncio.Task[_T]], pending: threading.Lock, timeout: float | None) -> _T:
-        # Do not use concurrent.futures.Future: the caller holds its lock for parts of the wait, and the loop needs
-        # it, so a signal handler that waits for the loop at such a moment would deadlock.
+        # Do not use concurrent.futures.Future: the caller holds its lock during parts of the wait, and the loop needs
+        # that lock, so a signal handler that waits for the loop at such a moment would deadlock.
         try:
             if not pending.acquire(timeout=-1 if timeout is None else timeout):
                 raise TimeoutError
@@ -103,10 +103,10 @@ class LoopThread:
             self.loop.call_soon_threadsafe(function, *args)
 
     def close(self) -> None:
-        """Close the loop; tasks that still run are cancelled."""
+        """Close the loop; tasks that are still running are cancelled."""
         if not self._thread.is_alive():
             return
-        # Not loop.stop(): a second one would interrupt the last steps of the thread.
+        # Do not call loop.stop(), because a second call would interrupt the thread's last steps.
         self.post(self._end.set)
         if threading.current_thread() is not self._thread:
             self._thread.join(_CLOSE_SECONDS)
@@ -118,8 +118,8 @@ class LoopThread:
         finally:
             with self._lock:
                 self._is_ending = True
-            # Let posted calls become tasks here, and finished tasks report their result; otherwise callers would wait
-            # forever.
+            # Let posted calls become tasks here, and finished tasks report their results; otherwise callers would
+            # wait forever.
             self.loop.run_until_complete(asyncio.sleep(0))
             tasks = asyncio.all_tasks(self.loop)
             for task in tasks:

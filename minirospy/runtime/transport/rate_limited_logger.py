@@ -27,17 +27,17 @@ class RateLimitedLogger:
         self._end = 0.0  # when the current ten seconds are over
 
     def close(self) -> None:
-        """Log the number of lines omitted last. Idempotent."""
+        """Log the number of lines omitted since the last report. Idempotent."""
         if self._omitted:
             self._log.warning("%d more like the last ones", self._omitted)
             self._omitted = 0
 
     def info(self, text: str, *args: object) -> None:
-        """Log an information, or count it."""
+        """Log an info message, or count it."""
         self._write(logging.INFO, text, args)
 
     def close_later(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Schedule :meth:`close` for the end of the current ten seconds, if the last line was the first one omitted."""
+        """Schedule :meth:`close` for the end of the current ten seconds if the last line was the first one omitted."""
         if self._omitted == 1:
             loop.call_later(max(0.0, self._end - time.monotonic()), self.close)
 

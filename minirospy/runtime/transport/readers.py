@@ -1,6 +1,6 @@
-"""A subscriber's end of a link: the connection that carries a topic's frames after the handshake.
+"""The subscriber's end of a link: the connection that carries a topic's frames after the handshake.
 
-A worker reads the frames (:func:`read_frames`), or the loop (:func:`watch_frames`, :func:`watch_frames_in_turns`).
+Frames are read in a worker (:func:`read_frames`) or on the loop (:func:`watch_frames`, :func:`watch_frames_in_turns`).
 """
 
 from __future__ import annotations
@@ -33,17 +33,18 @@ from minirospy.runtime.transport.sockets import BUSY_POLL_SECONDS, busy_receive,
 
 __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
 
-_TURN_CHUNK = 4096  # bytes per receive, and of each connection's buffer, for frames read in turns
+_TURN_CHUNK = 4096  # bytes per receive, and in each connection's buffer, for frames read in turns
 
 _DRAIN_BYTES = 64 * 1024 * 1024
-_CLAIM = 16 * 1024 * 1024  # bytes per receive: a length prefix must not allocate more before the data arrives
+# bytes per receive, so that a length prefix does not allocate more memory before the data arrives
+_CLAIM = 16 * 1024 * 1024
 
 _WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)
 _log = logging.getLogger(__name__)
 
 
 class QueueSize(Protocol):
-    """The number of frames to keep for a slow receiver; it may change at any time."""
+    """The number of frames to queue for a slow receiver; it may change at any time."""
 
     newest: int
 
@@ -52,7 +53,7 @@ class QueueSize(Protocol):
 class ReaderSet:
     """The readers of a node's topics. A reader that is the only active one may busy-poll for its next message.
 
-    Two readers would wait for each other's GIL, which takes longer than waking up.
+    Two busy-polling readers would wait for each other's GIL, which takes longer than waking up.
     """
 
     last: object = None  # the reader that was active last
@@ -61,10 +62,10 @@ class ReaderSet:
 def read_frames(
     sock: socket.socket, deliver: Callable[[Frame], None], size: QueueSize, readers: ReaderSet
 ) -> None:
-    """Read frames in the calling thread until the peer closes; closes the socket.
+    """Read frames in the calling thread until the peer closes, then close the socket.
 
     If several frames are ready when the thread reads, only the newest ``size.newest`` of them are delivered (0: all), so
-    that a slow receiver gets recent data. Raise OSError or WireError.
+    that a slow receiver gets recent data. Raise OSError if the connection fails, WireError if the data is invalid.
     """
     source = _FrameSource(sock, readers)
     try:
@@ -90,7 +91,7 @@ def watch_frames(
     on_end: Callable[[], None],
     on_fault: Callable[[Exception], None],
 ) -> None:
-    """Read frames on the loop: for receivers so quick that a thread for each would cost more.
+    """Read frames on the loop, for receivers so quick that a thread for each would cost more.
 
     ``on_fault`` is called with the OSError or WireError that closed the connection, before ``on_end``.
     """
@@ -126,7 +127,7 @@ def watch_frames_in_turns(
     most: int,
     on_left_out: Callable[[], None],
 ) -> None:
-    """Read frames on the loop in steps, which ``start_steps`` runs in turns with those of other connections.
+    """Read frames on the loop in steps; ``start_steps`` runs them in turns with those of other connections.
 
     Frames of more than ``most`` bytes are skipped; ``on_left_out`` is called for each.
     """
@@ -163,7 +164,7 @@ def watch_frames_in_turns(
 
 
 class _FrameSource:
-    """Reads frames from a blocking socket: small ones by the bufferful, each large one into separate memory."""
+    """Reads frames from a blocking socket: many small ones into one buffer, each large one into separate memory."""
 
     def __init__(self, sock: socket.socket, readers: ReaderSet) -> None:
         self.sock = sock
@@ -177,11 +178,11 @@ class _FrameSource:
     def read(self) -> Iterable[Frame]:
         """Wait for the next frames. Small ones are valid until the next call, large ones permanently.
 
-        Raise _Ended, OSError, WireError.
+        Raise _Ended if the peer closes, OSError if the connection fails, WireError if the data is invalid.
         """
         reader = self._reader
         if self._was_large:
-            # Another large frame is likely: keep its first bytes out of the buffer for small ones.
+            # Another large frame is likely, so do not read its first bytes into the buffer for small ones.
             word = self._take(LENGTH_BYTES)
             length = parse_length(word)
             if length > CHUNK:
@@ -202,7 +203,8 @@ class _FrameSource:
                 count = busy_receive(self.sock, space)
         if count is None:
             count = self.sock.recv_into(space)
-        # This is also false if bytes were ready but the GIL was not: then other threads of this process need it.
+        # This is also false if bytes were ready but this thread waited for the GIL: then other threads in this
+        # process need it.
         self._is_fast = self._may_busy_poll and time.perf_counter() - start < BUSY_POLL_SECONDS
         self._readers.last = self
         return count
@@ -231,7 +233,7 @@ class _FrameSource:
         return SplitFrame(head, tail)
 
     def _take(self, count: int) -> bytes:
-        """Return exactly ``count`` bytes. Raise _Ended, OSError."""
+        """Return exactly ``count`` bytes. Raise _Ended if the peer closes, OSError if the connection fails."""
         if not self._rest:
             data = self.sock.recv(min(count, _CLAIM), _WAIT_ALL)
             if len(data) == count:
@@ -265,7 +267,7 @@ def _deliver_newest(
     while True:
         for frame in frames:
             total += len(frame)
-            # A small frame is in the reader's buffer, which the next receive reuses.
+            # Copy a small frame: it is in the reader's buffer, which the next receive overwrites.
             kept.append(frame if isinstance(frame, bytes) else bytes(frame))
         if total >= _DRAIN_BYTES or not is_readable(source.sock):
             break

@@ -29,17 +29,18 @@ __all__ = [
 
 FAMILIES = (socket.AF_INET, socket.AF_INET6)  # the address families of TCP sockets
 
-HANDSHAKE_SECONDS = 10.0  # time limit of each handshake: a peer may never answer
+HANDSHAKE_SECONDS = 10.0  # time limit for each handshake, because a peer may never respond
 
-BUSY_POLL_SECONDS = 0.0002  # most answers of a process on the same host arrive within this time
+BUSY_POLL_SECONDS = 0.0002  # most responses from a process on the same host arrive within this time
 
 _KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
-"""Seconds of silence, seconds between probes, number of probes. macOS calls the first one TCP_KEEPALIVE."""
+"""Seconds of silence, seconds between probes, number of probes. On macOS the first one is called TCP_KEEPALIVE."""
 
-# Requested bytes for a Unix socket, as many as TCP buffers; Linux caps it at net.core.wmem_max (208 kB by default)
+# Requested buffer size for a Unix socket in bytes, as much as TCP buffers; Linux limits it to net.core.wmem_max (208
+# kB by default)
 _SEND_BUFFER = 4 * 1024 * 1024
 
-_PEER = struct.Struct("iII")  # layout of the kernel's credentials of a peer, see Peer
+_PEER = struct.Struct("iII")  # layout of the kernel's credentials for a peer, see Peer
 
 
 class Peer(NamedTuple):
@@ -51,7 +52,7 @@ class Peer(NamedTuple):
 
 
 def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
-    """Set TCP_NODELAY as requested, and keepalive, so that a peer that lost power is noticed within a minute.
+    """Set TCP_NODELAY as requested, and keepalive, so that a peer that lost power is detected within a minute.
 
     Sockets of other kinds remain unchanged.
     """
@@ -69,7 +70,7 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
 def enlarge_send_buffer(sock: socket.socket) -> None:
     """Let a Unix socket buffer some megabytes, as far as the kernel allows; TCP enlarges its own buffers.
 
-    Otherwise the receiver of a 1 MB message must run several times, and a busy machine may run another process each time.
+    Otherwise the receiver of a 1 MB message must run several times, and a busy machine may run another process in between.
     """
     if sock.family not in FAMILIES:
         with contextlib.suppress(OSError):
@@ -77,9 +78,9 @@ def enlarge_send_buffer(sock: socket.socket) -> None:
 
 
 def resolvable(host: str) -> bytes:
-    """Return a host name in the form that a resolver accepts. Raise OSError if it is not a host name.
+    """Return a host name in the format that a resolver accepts. Raise OSError if it is not a host name.
 
-    A str would make the resolver import the IDNA codec, which takes a tenth of a command's time.
+    A str would make the resolver import the IDNA codec, which takes a tenth of a command's run time.
     """
     try:
         return host.encode("ascii" if host.isascii() else "idna")
@@ -88,12 +89,12 @@ def resolvable(host: str) -> bytes:
 
 
 def peer(sock: socket.socket) -> Peer:
-    """Return the process at the other end of this Unix socket. Linux only."""
+    """Return the process at the other end of a Unix socket. Linux only."""
     return Peer(*_PEER.unpack(sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size)))
 
 
 def hang_up(sock: socket.socket) -> None:
-    """Shut a connection down; a thread that is blocked in a read of it wakes up and closes it."""
+    """Shut a connection down; a thread that is blocked reading from it wakes up and closes it."""
     with contextlib.suppress(OSError):
         sock.shutdown(socket.SHUT_RDWR)
 
@@ -115,24 +116,27 @@ def is_writable(sock: socket.socket, milliseconds: int) -> bool:
 
 
 def busy_poll(sock: socket.socket) -> None:
-    """Busy-poll for the answer of another process, for up to a fifth of a millisecond.
+    """Busy-poll for another process's response, for up to a fifth of a millisecond.
 
-    Waking up takes as long as such an answer. The processor is yielded to other processes meanwhile, since the peer may
-    need it. Does nothing for a socket that may not be busy-polled.
+    Waking up takes as long as such a response. The processor is yielded to other processes meanwhile, since the peer may
+    need it. Has no effect on a socket that may not be busy-polled.
     """
     if may_busy_poll(sock):
         _busy_poll(sock, select.POLLIN)
 
 
 def may_busy_poll(sock: socket.socket) -> bool:
-    """Return whether the peer is another process on this machine, at a Unix socket; a peer in this process needs the GIL."""
+    """Return whether the peer is another process on this machine, connected by a Unix socket.
+
+    A peer in this process needs the GIL, which busy-polling would occupy.
+    """
     return sys.platform == "linux" and sock.family == socket.AF_UNIX and peer(sock).process != os.getpid()
 
 
 def busy_receive(sock: socket.socket, space: memoryview) -> int:
     """Receive data that another process sends within a fifth of a millisecond, by busy-polling.
 
-    Only for a socket for which ``may_busy_poll`` is true. Raise BlockingIOError if nothing arrives, OSError.
+    Use it only if ``may_busy_poll`` is true. Raise BlockingIOError if nothing arrives, OSError if the connection fails.
     """
     end = time.perf_counter() + BUSY_POLL_SECONDS
     while True:
@@ -149,7 +153,7 @@ def _busy_poll(sock: socket.socket, events: int) -> bool:
     poll = _poll(sock, events)
     end = time.perf_counter() + BUSY_POLL_SECONDS
     while True:
-        # Yield first, since the peer may wait for this processor.
+        # Yield first, because the peer may be waiting for this processor.
         os.sched_yield()
         if poll.poll(0):
             return True

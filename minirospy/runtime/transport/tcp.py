@@ -1,6 +1,6 @@
-"""TCP sockets on the loop: listening, connecting, and the exact reads of a handshake.
+"""TCP sockets on the loop: listening, connecting, and the exact reads in a handshake.
 
-A handshake reads exactly a header's bytes and nothing after them, so the socket can be passed on to a worker or a
+A handshake reads exactly a header's bytes and nothing after them, so that the socket can be passed on to a worker or a
 writer.
 """
 
@@ -31,21 +31,22 @@ __all__ = [
     "send_header",
 ]
 
-# handshakes in progress; one more closes the oldest, since a genuine one takes milliseconds
+# Maximum handshakes in progress; another one closes the oldest, since a genuine one takes milliseconds
 MAX_HANDSHAKES = 200
 
 _AT_HAND = 8192
 _SHORT_HEADER = 64 * 1024
-_MAX_LONG_HEADERS = 16 * 1024 * 1024  # bytes, of all incomplete headers above _SHORT_HEADER of a node's peers
+# bytes in all incomplete headers above _SHORT_HEADER from a node's peers
+_MAX_LONG_HEADERS = 16 * 1024 * 1024
 
 _REFUSALS_LOGGED = 10
 _log = logging.getLogger(__name__)
 
 
 def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
-    """Return a socket that is bound to an address of this machine; port 0 means any free port, from ``ports`` if given.
+    """Return a socket bound to an address on this machine; port 0 means any free port, from ``ports`` if given.
 
-    Raise OSError.
+    Raise OSError if it cannot be bound.
     """
     if port or not ports:
         return _bind(host, port)
@@ -59,7 +60,7 @@ def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
 
 
 async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECONDS) -> socket.socket:
-    """Return a connected, non-blocking socket. Raise OSError, also on a timeout."""
+    """Return a connected, non-blocking socket. Raise OSError if connecting fails or times out."""
     loop = asyncio.get_running_loop()
     last: OSError = OSError(f"{host} has no address")
 
@@ -92,7 +93,7 @@ class HeaderMemory:
         self._most = most
 
     def reserve(self, count: int) -> None:
-        """Reserve memory; return it with :meth:`free`. Raise WireError if the limit is exceeded."""
+        """Reserve memory until :meth:`free` is called. Raise WireError if the limit is exceeded."""
         if self.held + count > self._most:
             raise WireError("too many long connection headers are being received at the same time")
         self.held += count
@@ -105,7 +106,7 @@ class HeaderMemory:
 async def receive_header(
     sock: socket.socket, timeout: float = sockets.HANDSHAKE_SECONDS, *, memory: HeaderMemory | None = None
 ) -> Header:
-    """Return the peer's connection header. Raise WireError or OSError.
+    """Return the peer's connection header. Raise OSError if the connection fails, WireError if the header is invalid.
 
     With ``memory``, a long header is refused if other headers use up the limit.
     """
@@ -120,7 +121,7 @@ async def send_header(sock: socket.socket, fields: Header) -> None:
     """Send a connection header."""
     data = serialize_header(fields)
     try:
-        # Does not block: the header is short, and the buffer of a new socket is empty.
+        # This does not block, because the header is short, and a new socket's buffer is empty.
         sent = sock.send(data)
     except (BlockingIOError, InterruptedError):
         sent = 0
@@ -144,19 +145,19 @@ class Listener:
         self._accept = accept
         self._allows = allows
         self._sock: socket.socket | None = None
-        # Handshake -> the peer's address, in the order in which they started.
+        # Handshake task -> the peer's address, in the order in which the tasks started.
         self._handshakes: dict[asyncio.Task[None], str] = {}
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.port = 0
 
     def open(self, host: str, port: int = 0, ports: range | None = None) -> None:
-        """Listen on ``host``; port 0 means any free port, from ``ports`` if given. Raise OSError."""
+        """Listen on ``host``; port 0 means any free port, from ``ports`` if given. Raise OSError if that fails."""
         sock = bind(host, port, ports)
         self.listen(sock)
         self.port = sock.getsockname()[1]
 
     def listen(self, sock: socket.socket) -> None:
-        """Listen on a bound socket. Raise OSError."""
+        """Listen on a bound socket. Raise OSError if another socket listens on the port."""
         try:
             sock.listen(socket.SOMAXCONN)
         except BaseException:
@@ -186,14 +187,14 @@ class Listener:
             asyncio.get_running_loop().add_reader(self._sock, self._take_one, self._sock)
 
     def _take_one(self, sock: socket.socket) -> None:
-        """Accept one connection; the loop calls this again for the next, so that accepted ones proceed meanwhile."""
+        """Accept one connection; the loop calls this again for the next, so that accepted ones are served in between."""
         try:
             peer, address = sock.accept()
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
-            # Out of file descriptors, or the peer has already disconnected: accepting the next one may succeed a
-            # moment later.
+            # There are no free file descriptors, or the peer has already disconnected: accepting the next connection
+            # may succeed a moment later.
             self.log_refusal(f"a connection could not be accepted: {explain(error)}")
             if is_file_limit(error):
                 self._end_oldest("this process has no file descriptor left")
@@ -210,7 +211,7 @@ class Listener:
             return
         if len(self._handshakes) >= MAX_HANDSHAKES:
             self._end_oldest(f"it sent nothing, and {MAX_HANDSHAKES} others are waiting")
-        # A peer at a Unix socket has no address.
+        # A peer on a Unix socket has no address.
         where = f"{address[0]}:{address[1]}" if isinstance(address, tuple) else "this machine"
         task = asyncio.ensure_future(self._handle(peer, where))
         self._handshakes[task] = where
@@ -227,7 +228,7 @@ class Listener:
         try:
             await self._accept(peer, address)
         except (_NothingSaidError, BrokenPipeError):
-            # A node that exited meanwhile, or a port scan.
+            # The peer is a node that exited meanwhile, or a port scan.
             _log.debug("connection from %s: it disconnected before it was answered", address)
             peer.close()
         except (OSError, WireError) as error:
@@ -249,10 +250,10 @@ def _bind(host: str, port: int) -> socket.socket:
     try:
         sock.setblocking(False)
         if sys.platform != "win32":
-            # On Windows the option would let two servers share a port.
+            # Do not set this on Windows, where it would let two servers share a port.
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if family == socket.AF_INET6:
-            # Peers without ROS_IPV6 connect by IPv4.
+            # Accept IPv4 too, because peers without ROS_IPV6 use it.
             sock.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
         sock.bind((host, port))
     except BaseException:
@@ -262,9 +263,10 @@ def _bind(host: str, port: int) -> socket.socket:
 
 
 async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | int | bytes, ...]]]:
-    """Return (family, address) for each address of a host; an IP address or "localhost" needs no resolver. Raise OSError.
+    """Return (family, address) for each address of a host; an IP address or "localhost" needs no resolver.
 
-    IPv4 comes first: ROS 1 servers listen there, while many resolvers return IPv6 first.
+    IPv4 addresses are first, because ROS 1 servers listen there, while many resolvers return IPv6 first. Raise OSError if
+    the host cannot be resolved.
     """
     if host == "localhost":
         return [(socket.AF_INET, ("127.0.0.1", port)), (socket.AF_INET6, ("::1", port))]
@@ -276,13 +278,13 @@ async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | in
         name = sockets.resolvable(host)
         infos = await asyncio.get_running_loop().getaddrinfo(name, port, type=socket.SOCK_STREAM)
     except RuntimeError as error:
-        # Python starts no threads during interpreter shutdown.
+        # Python does not start threads during interpreter shutdown.
         raise OSError(f"the address of {host} was not looked for: {error}") from error
     return sorted(((info[0], info[4]) for info in infos), key=lambda found: found[0] != socket.AF_INET)
 
 
 def _header_at_hand(sock: socket.socket) -> Header | None:
-    """Return a header that has already arrived completely, as most do; this saves a task and a timer."""
+    """Return a header that has already arrived completely, as most have; this saves a task and a timer."""
     try:
         seen = sock.recv(_AT_HAND, socket.MSG_PEEK)
     except (BlockingIOError, InterruptedError):
@@ -306,7 +308,7 @@ async def _receive_header(sock: socket.socket, memory: HeaderMemory) -> Header:
 async def _receive_exactly(
     sock: socket.socket, count: int, memory: HeaderMemory, nothing: type[WireError] = WireError
 ) -> bytes:
-    """Return ``count`` bytes. Raise WireError, or ``nothing`` if not a single byte arrived."""
+    """Return ``count`` bytes. Raise WireError if the peer closes earlier, or ``nothing`` if not a single byte arrived."""
     loop = asyncio.get_running_loop()
     data = bytearray()
     taken = 0
@@ -326,7 +328,10 @@ async def _receive_exactly(
 
 @contextlib.contextmanager
 def _time_limit(doing: str) -> Iterator[None]:
-    """Convert asyncio's TimeoutError, which is not the built-in one before Python 3.11, into one that names the operation."""
+    """Convert asyncio's TimeoutError into the built-in one, with the name of the operation.
+
+    Before Python 3.11 they are different classes.
+    """
     try:
         yield
     except asyncio.TimeoutError:

@@ -1,4 +1,4 @@
-"""Worker threads, in which user code runs, so that it never runs on the loop."""
+"""Worker threads that run user code, so that it never runs on the loop."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 
 
 class Workers:
-    """A pool of daemon threads that are kept for a while after their work, since starting a thread is expensive.
+    """A pool of daemon threads that remain for a while after their work, because starting a thread is expensive.
 
     Their number is not limited: each connection that waits for bytes uses one, and the number of peers is limited when they
     are accepted.
@@ -26,16 +26,17 @@ class Workers:
 
     def __init__(self) -> None:
         self._work: queue.SimpleQueue[tuple[Callable[..., object], tuple[object, ...]]] = queue.SimpleQueue()
-        # Reentrant: a signal handler may run a shutdown hook, which starts a worker, while the main thread holds the
-        # lock.
+        # Use a reentrant lock: a signal handler may run a shutdown hook, which starts a worker, while the main thread
+        # holds the lock.
         self._lock = threading.RLock()
         self._idle = 0
 
     def start(self, function: Callable[..., object], *args: object) -> None:
-        """Run ``function(*args)`` in a worker; an uncaught exception is logged. Raise ThreadLimitError."""
+        """Run ``function(*args)`` in a worker; log an uncaught exception. Raise ThreadLimitError if no thread can be started."""
         with self._lock:
             if self._idle:
-                # A claimed worker always takes an entry: before exiting it must withdraw itself from the idle ones.
+                # A claimed worker always takes an entry, because a worker that exits first removes itself from the
+                # idle ones.
                 self._idle -= 1
                 self._work.put((function, args))
                 return
@@ -60,12 +61,12 @@ class Workers:
                     if self._idle:
                         self._idle -= 1
                         return
-                # Claimed at the moment of exiting: the entry will arrive immediately.
+                # This worker was claimed just as it was about to exit: the entry will arrive immediately.
                 function, args = self._work.get()
 
 
 class InOrder:
-    """Runs functions in workers, one after the other, in the order in which they were started."""
+    """Runs functions in workers, one at a time, in the order in which they were started."""
 
     def __init__(self, workers: Workers) -> None:
         self._workers = workers
@@ -74,7 +75,7 @@ class InOrder:
         self._is_running = False
 
     def start(self, function: Callable[..., object], *args: object) -> None:
-        """Run ``function(*args)`` after those started before; an uncaught exception is logged."""
+        """Run ``function(*args)`` after the functions that were started before; log an uncaught exception."""
         with self._lock:
             self._waiting.append((function, args))
             if self._is_running:
@@ -83,7 +84,7 @@ class InOrder:
         try:
             self._workers.start(self._run)
         except ThreadLimitError as error:
-            # The queued functions wait for the next call of start().
+            # No thread could be started, so the queued functions stay queued until the next call to start().
             with self._lock:
                 self._is_running = False
             _log.error("a callback is late: %s", error)
