@@ -15,7 +15,7 @@ from minirospy.aio.node import Node
 from minirospy.aio.tasks import ErrorReporter, keep_running
 from minirospy.base.closing import close_all
 from minirospy.base.environment import DISTRO
-from minirospy.base.errors import BridgeError
+from minirospy.base.errors import BridgeError, ROSInterruptException
 from minirospy.introspect.snapshot import fetch
 from minirospy.web.access import Access
 from minirospy.web.foxglove.assets import ALLOWED, Assets
@@ -167,7 +167,10 @@ class Bridge:
                     raise
                 delay = self.options.retry_delay
                 self.node.log.warning("Unable to start server: %s. Retrying in %gs.", error, delay)
-                await asyncio.sleep(delay)
+                with contextlib.suppress(asyncio.TimeoutError):
+                    await asyncio.wait_for(self.node.spin(), delay)
+                if self.node.is_shutdown:
+                    raise ROSInterruptException("shutdown while the port is in use") from None
             else:
                 return listener
 

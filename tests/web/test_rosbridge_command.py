@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import http.client
+import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -43,6 +45,25 @@ def start(master: str) -> Iterator[Start]:
     for process in started:
         process.terminate()
         process.communicate(timeout=60)
+
+
+@pytest.mark.usefixtures("master")
+def test_server_that_waits_for_its_port_ends_at_a_signal() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        words = ("run", "rosbridge_server", "rosbridge_websocket", f"_port:={other.getsockname()[1]}")
+        process = subprocess.Popen(
+            [sys.executable, "-m", "minirospy", *words], stderr=subprocess.PIPE, text=True
+        )
+        try:
+            assert process.stderr
+            while "Retrying in 2s." not in process.stderr.readline():
+                assert process.poll() is None
+            process.send_signal(signal.SIGTERM)
+            process.communicate(timeout=60)
+            assert process.returncode == (1 if sys.platform == "win32" else 0)
+        finally:
+            process.kill()
+            process.communicate()
 
 
 def test_launch_file_starts_rosbridge_and_rosapi(start: Start) -> None:
