@@ -228,6 +228,48 @@ def _least_size(layout: Layout, absent: Side) -> int:
 # --- the generated functions
 
 
+class _Copy(NamedTuple):
+    """Bytes that are read and written."""
+
+    size: int
+
+
+class _Swap(NamedTuple):
+    """Numbers of ``width`` bytes that are read and written with their bytes reversed."""
+
+    width: int
+    size: int
+
+
+class _Skip(NamedTuple):
+    """Bytes that are read and dropped."""
+
+    size: int
+
+
+class _Zeros(NamedTuple):
+    """Zero bytes that are written."""
+
+    size: int
+
+
+class _Constant(NamedTuple):
+    """Bytes that are written."""
+
+    value: bytes
+
+
+class _Length(NamedTuple):
+    """A length that is read into a local variable, and the expression that is written; none if it is not written."""
+
+    local: str
+    written: str | None
+
+
+_Token = Union[_Copy, _Swap, _Skip, _Zeros, _Constant, _Length]  # noqa: UP007 - evaluated
+"""What the generated function does with the next bytes. Do not compare tokens: named tuples of two classes may be equal."""
+
+
 class _Generator:
     """Generates one function. ``end`` is the position in the source, ``at`` the position in the CDR being written."""
 
@@ -238,8 +280,7 @@ class _Generator:
         self._absent = Side.ROS1 if is_cdr_source else Side.ROS2  # items missing in the source message
         self._walk = _Walk()
         self._position = _Position(8, 0)
-        # Pending ``copy``, ``skip`` or ``zeros``, each with a number of bytes
-        self._tokens: list[tuple[str, int]] = []
+        self._tokens: list[_Token] = []  # pending: merged and written as few lines by _flush()
 
     def function(self, layout: Layout) -> str:
         line = self._source.line
@@ -290,13 +331,13 @@ class _Generator:
             self._position = self._position.after(size)
         if item.side is Side.BOTH:
             if self._swaps and item.width > 1:
-                self._tokens += [(f"swap{item.width}", size)]
+                self._tokens.append(_Swap(item.width, size))
             else:
-                self._tokens.append(("copy", size))
+                self._tokens.append(_Copy(size))
         elif self._is_read(item):
-            self._tokens.append(("skip", size))
+            self._tokens.append(_Skip(size))
         else:
-            self._tokens.append(("zeros", size))
+            self._tokens.append(_Zeros(size))
 
     def _text(self, item: Text) -> None:
         has_cdr = item.side is not Side.ROS1
@@ -305,10 +346,10 @@ class _Generator:
             self._position = _UNKNOWN
         if not self._is_read(item):
             # An empty string; in CDR it consists of a NUL.
-            self._tokens.append(("zeros", 4) if self._is_cdr_source else ("bytes 01000000 00", 5))
+            self._tokens.append(_Zeros(4) if self._is_cdr_source else _Constant(b"\1\0\0\0\0"))
             return
 
-        count = self._length(item.side, "text" if has_cdr else "plain")
+        count = self._length(item.side, is_text=True)
         if self._is_cdr_source and has_cdr:
             if item.side is Side.BOTH:
                 self._source.line(f"add(data[end : end + {count} - 1])")
@@ -316,7 +357,7 @@ class _Generator:
         elif item.side is Side.BOTH:
             self._source.line(f"add(data[end : (end := end + {count})])")
             self._source.line(f"at += {count}")
-            self._tokens.append(("zeros", 1))
+            self._tokens.append(_Zeros(1))
         else:
             self._source.line(f"end += {count}")
 
@@ -329,9 +370,9 @@ class _Generator:
                 self._align(4)
                 self._position = self._position.after(4)
             if not self._is_read(item):
-                self._tokens.append(("zeros", 4))
+                self._tokens.append(_Zeros(4))
                 return
-            count = self._length(item.side, "count")
+            count = self._length(item.side, is_text=False)
         self._flush()
 
         block = block_of(item.items)
@@ -389,14 +430,15 @@ class _Generator:
         if padding == 0:
             return
         if padding is not None:
-            self._tokens.append(("skip" if self._is_cdr_source else "zeros", padding))
+            self._tokens.append(_Skip(padding) if self._is_cdr_source else _Zeros(padding))
             return
         mask = width - 1
         if self._is_cdr_source:
             self._flush()
             self._source.line(f"end += {'4 ' if width == 8 else ''}-end & {mask}")
             return
-        if self._tokens[-1:] == [("zeros", 1)]:
+        last = self._tokens[-1] if self._tokens else None
+        if isinstance(last, _Zeros) and last.size == 1:
             # The NUL of a string, and the padding after it.
             self._tokens.pop()
             self._flush()
@@ -407,15 +449,19 @@ class _Generator:
         self._source.line(f"add(_PADDING[-at & {mask}])")
         self._source.line(f"at += -at & {mask}")
 
-    def _length(self, side: Side, kind: str) -> str:
-        """Read a length after the pending tokens, and write it; return its local name."""
+    def _length(self, side: Side, *, is_text: bool) -> str:
+        """Read a length after the pending tokens, and write it if both messages have it; return its local name.
+
+        The length of a text includes the trailing NUL in CDR.
+        """
         count = self._source.local("count")
-        if side is Side.BOTH and kind == "text":
-            self._tokens.append((f"length {count} {'less' if self._is_cdr_source else 'more'}", 4))
-        elif side is Side.BOTH:
-            self._tokens.append((f"length {count} same", 4))
+        if side is not Side.BOTH:
+            written = None
+        elif not is_text:
+            written = count
         else:
-            self._tokens.append((f"length {count} none", 4))
+            written = f"{count} and {count} - 1" if self._is_cdr_source else f"{count} + 1"
+        self._tokens.append(_Length(count, written))
         self._flush()
         return count
 
@@ -427,35 +473,33 @@ class _Generator:
         line = self._source.line
         read, write, targets, values = "", "", [], []
         read_size = write_size = 0
-        for kind, size in tokens:
-            if kind == "copy" or kind.startswith("swap"):
-                piece = self._source.local("piece")
-                read += f"{size}s"
-                write += f"{size}s"
-                targets.append(piece)
-                values.append(f"_swapped({piece}, {kind[4:]})" if kind != "copy" else piece)
-                read_size, write_size = read_size + size, write_size + size
-            elif kind == "skip":
-                read += f"{size}x"
-                read_size += size
-            elif kind == "zeros":
-                write += f"{size}x"
-                write_size += size
-            elif kind.startswith("bytes"):
-                write += f"{size}s"
-                values.append(repr(bytes.fromhex(kind[6:])))
-                write_size += size
-            else:
-                _, count, change = kind.split()
-                read += "I"
-                targets.append(count)
-                read_size += 4
-                if change != "none":
-                    write += "I"
-                    write_size += 4
-                    values.append(
-                        {"same": count, "more": f"{count} + 1", "less": f"{count} and {count} - 1"}[change]
-                    )
+        for token in tokens:
+            match token:
+                case _Copy(size) | _Swap(_, size):
+                    piece = self._source.local("piece")
+                    read += f"{size}s"
+                    write += f"{size}s"
+                    targets.append(piece)
+                    values.append(f"_swapped({piece}, {token.width})" if isinstance(token, _Swap) else piece)
+                    read_size, write_size = read_size + size, write_size + size
+                case _Skip(size):
+                    read += f"{size}x"
+                    read_size += size
+                case _Zeros(size):
+                    write += f"{size}x"
+                    write_size += size
+                case _Constant(value):
+                    write += f"{len(value)}s"
+                    values.append(repr(value))
+                    write_size += len(value)
+                case _Length(local, written):
+                    read += "I"
+                    targets.append(local)
+                    read_size += 4
+                    if written is not None:
+                        write += "I"
+                        write_size += 4
+                        values.append(written)
 
         if read == write and len(targets) == 1 and values == targets and read.endswith("s"):
             line(f"add(data[end : (end := end + {read_size})])")
@@ -485,14 +529,15 @@ _LARGE = 4096
 _SPELLED = 16
 
 
-def _joined(tokens: list[tuple[str, int]]) -> list[tuple[str, int]]:
+def _joined(tokens: list[_Token]) -> list[_Token]:
     """Return the tokens with adjacent ones of the same kind merged."""
-    found: list[tuple[str, int]] = []
-    for kind, size in tokens:
-        if found and found[-1][0] == kind and kind in ("copy", "skip", "zeros"):
-            found[-1] = (kind, found[-1][1] + size)
+    found: list[_Token] = []
+    for token in tokens:
+        last = found[-1] if found else None
+        if isinstance(token, _Copy | _Skip | _Zeros) and isinstance(last, type(token)):
+            found[-1] = token._replace(size=last.size + token.size)
         else:
-            found.append((kind, size))
+            found.append(token)
     return found
 
 

@@ -11,7 +11,6 @@ import contextlib
 import logging
 import socket
 from collections.abc import Awaitable, Generator, Sequence
-from enum import Enum
 from typing import TYPE_CHECKING
 
 from minirospy.base.errors import RpcFault, RpcProtocolError
@@ -27,6 +26,7 @@ from minirospy.core.wire.http import (
 from minirospy.core.wire.xmlrpc import Serialized, parse_call, parse_call_in_steps, serialize_fault
 from minirospy.core.wire.xmlrpc import serialize_response as serialize_value
 from minirospy.core.wire.xmlrpc import serialize_response_in_steps as serialize_value_in_steps
+from minirospy.runtime.rpc.connection_state import READING, TRANSITIONS, Event, State
 from minirospy.runtime.rpc.outbox import MAX_UNREAD, Outbox
 
 if TYPE_CHECKING:
@@ -60,18 +60,7 @@ _END_OF_HEAD = b"\r\n\r\n"
 _ANSWERS_AT_ONCE = 1
 
 
-class State(Enum):
-    """The state of a server's connection to one client."""
-
-    OPEN = "it is served"
-    BUSY = "it requested much together: nothing more is read from it before that is answered"
-    FULL = "it does not read its answers: nothing is read from it"
-    CLOSING = "it ends once it has read its answers"
-    REFUSED = "it is heard out, without an answer"
-    ENDED = "the socket is closed"
-
-
-_OPEN, _BUSY, _FULL, _CLOSING, _REFUSED, _ENDED = State
+_OPEN, _REFUSED, _ENDED = State.OPEN, State.REFUSED, State.ENDED
 
 
 class Connection:
@@ -141,10 +130,24 @@ class Connection:
 
     def end(self) -> None:
         """Close the connection. Idempotent."""
-        if self._state is _ENDED:
-            return
-        self._state = _ENDED
-        self._stop_reading()
+        self._enter(Event.END)
+
+    def _enter(self, event: Event) -> bool:
+        """Change the state if this event does so, and read as the new state requires; return whether it changed."""
+        state = TRANSITIONS[event].get(self._state)
+        if state is None:
+            return False
+        was_reading, self._state = self._state in READING, state
+        if was_reading and state not in READING:
+            self._stop_reading()
+        elif state in READING and not was_reading:
+            self._start_reading()
+        if state is _ENDED:
+            self._release()
+        return True
+
+    def _release(self) -> None:
+        """Close the socket and discard the request and the output."""
         if self._out:
             self._loop.remove_writer(self._fd)
         self._sock.close()
@@ -247,18 +250,14 @@ class Connection:
                 # Python clients send the body right after the head, so usually it has arrived by now.
                 data += self._receive() or b""
             self.received(data)
-        elif self._out and self._state is _OPEN:
-            # The client sends no more requests, but waits for answers.
-            self._state = _CLOSING
-            self._stop_reading()
-        else:
+        elif not self._out or not self._enter(Event.END_OF_FILE):
             self.end()
 
     def _answer_waiting(self) -> None:
         left = _ANSWERS_AT_ONCE
         while self._state is _OPEN and (self._message or self._find_message()):
             if self._is_answering or not left:
-                self._pause()
+                self._enter(Event.PIPELINED)
                 if not self._is_answering:
                     self._start(self._answer_rest())
                 return
@@ -274,17 +273,10 @@ class Connection:
         self._go_on()
 
     def _go_on(self) -> None:
-        if self._state is _BUSY:
-            self._state = _OPEN
-            self._start_reading()
+        """Read and answer further requests if they waited for this answer."""
+        if self._enter(Event.ANSWERED):
             self._answer_waiting()
             self._set_deadline()
-
-    def _pause(self) -> None:
-        """Stop reading until the present requests are answered."""
-        if self._state is _OPEN:
-            self._state = _BUSY
-            self._stop_reading()
 
     def _answer(self, message: HttpMessage) -> None:
         """Answer immediately, or start a task or steps for longer work."""
@@ -438,10 +430,7 @@ class Connection:
         self._drop_request()
         self.log_refusal(text)
         self._write(serialize_error(status, text))
-        if self._state in (_FULL, _BUSY):
-            self._start_reading()
-        if self._state in (_OPEN, _BUSY, _FULL):
-            self._state = _REFUSED
+        if self._enter(Event.REFUSE):
             if not self._out:
                 self._say_end()
             self._limit(_LINGER_SECONDS)
@@ -451,10 +440,8 @@ class Connection:
         self._message = None
         if not self._out:
             self.end()
-        elif self._state in (_OPEN, _BUSY, _FULL):
-            if self._state is _OPEN:
-                self._stop_reading()
-            self._state = _CLOSING
+        else:
+            self._enter(Event.LAST_ANSWER)
 
     def _write(self, *pieces: bytes) -> None:
         """Send as much as the socket accepts, and queue the rest."""
@@ -473,10 +460,9 @@ class Connection:
             self._loop.add_writer(self._fd, self._writable)
         self._count_unread(kept)
         self._set_deadline()
-        if self._state is _OPEN and self._out.size > MAX_UNREAD:
-            # The client does not read its answers: send no more of them, and stop reading its requests.
-            self._state = _FULL
-            self._stop_reading()
+        if self._out.size > MAX_UNREAD:
+            # Send no more answers, and stop reading requests.
+            self._enter(Event.UNREAD)
         self._server.limit_unread()
 
     def _count_unread(self, more: int) -> None:
@@ -505,14 +491,11 @@ class Connection:
             return
 
         self._loop.remove_writer(self._fd)
-        if self._state is _CLOSING:
-            self.end()
-        elif self._state is _REFUSED:
+        if self._state is _REFUSED:
             self._say_end()
-        else:
-            if self._state is _FULL:
-                self._state = _OPEN
-                self._start_reading()
+            return
+        self._enter(Event.DRAINED)
+        if self._state is not _ENDED:
             self._answer_waiting()
             self._set_deadline()
 

@@ -16,7 +16,8 @@ from minirospy.core.bag.records import Connection
 from minirospy.core.bag.timeline import Timeline
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.ros.rosbag.recording.output import CLOCK, Controls
-from minirospy.ros.rosbag.recording.player import Player, PlayerState
+from minirospy.ros.rosbag.recording.playback import PlayerState
+from minirospy.ros.rosbag.recording.player import Player
 from minirospy.ros.rosbag.recording.schedule import PlayOptions
 from minirospy.ros.rosbag.recording.sources import Bags, open_reader
 

@@ -10,8 +10,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
-from unittest.mock import Mock
+from typing import NamedTuple
 
 import pytest
 
@@ -21,8 +20,6 @@ from minirospy.core.wire.framing import Frame
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.streams import ToolNode
-from minirospy.ros.rosbag.recording.player import Player
-from minirospy.ros.rosbag.recording.schedule import PlayOptions
 from tests.ros.rosbag.conftest import GUARD, STRING, Start, Talker, connected, read_until, said
 from tests.waiting import wait_until
 
@@ -223,19 +220,6 @@ def test_keys_pause_and_step(ear: Ear, start: Start, tmp_path: Path) -> None:
     process.communicate(timeout=GUARD)
 
     ear.expect("0", "1", "2", "3", "4")
-
-
-@pytest.mark.parametrize("paused", [False, True])
-def test_pause_requested_while_it_waits_for_subscribers_counts(paused: bool) -> None:
-    """The service is offered before the clock starts."""
-    bags: Any = Mock()
-    player = Player(bags, PlayOptions(paused=paused), output=Mock())
-    assert not player.set_paused(paused)
-    assert player.set_paused(not paused)
-    assert not player.set_paused(not paused)
-    assert player.state().is_paused is not paused
-    player._start((0, SECOND))
-    assert player.state().is_paused is not paused
 
 
 def test_a_service_pauses(ear: Ear, start: Start, tmp_path: Path) -> None:

@@ -1,0 +1,233 @@
+"""The state of `rosbag play` and what requests do in it, as a state machine. Pure: wall times are arguments.
+
+========= ============================================== ===================================================
+phase     meaning                                        left for
+========= ============================================== ===================================================
+OPENING   bags are read, topics advertised; requests     READY by :meth:`Playback.accept_control`; PLAYING by
+          other than a pause have no effect              :meth:`Playback.start`
+READY     waiting for the delay and for subscribers; all PLAYING by :meth:`Playback.start`
+          requests are accepted, and the clock stands
+PLAYING   messages are offered and polled                AT_END by :meth:`Playback.reach_end`
+AT_END    waiting after the last message                 PLAYING by a seek, by resuming, by
+                                                         :meth:`Playback.leave_end`
+========= ============================================== ===================================================
+
+A seek takes two steps, since files are read meanwhile: a request sets it, and interrupts the messages; the reader takes it and
+reports that it has arrived. :mod:`minirospy.ros.rosbag.recording.player` is the shell: it has the lock, the clock and the files.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import NamedTuple
+
+from minirospy.ros.rosbag.recording.schedule import PlayOptions, Schedule, Status
+
+__all__ = ["Phase", "Playback", "PlayerState"]
+
+_LEAD = 10**9 // 500  # ns; delay of the first message, so that starting threads do not make it late
+
+
+class Phase(enum.Enum):
+    """The phase of a playback; the module's text has the transitions."""
+
+    OPENING = enum.auto()
+    READY = enum.auto()
+    PLAYING = enum.auto()
+    AT_END = enum.auto()
+
+
+class PlayerState(NamedTuple):
+    """The state of a player: the bag time in nanoseconds, and the rate at which it advances."""
+
+    time: int
+    rate: float
+    is_paused: bool
+    is_at_end: bool
+
+
+class Playback:
+    """The rules of a playback. Only :meth:`end` is thread-safe: the caller locks the other methods."""
+
+    def __init__(self, options: PlayOptions) -> None:
+        self.phase = Phase.OPENING
+        self.is_fresh = True  # no message has been published since the start or the last seek
+        self.is_ended = False  # the shutdown was requested: possible in each phase, and set without the lock
+        self.options = options  # control() changes whether it loops and publishes /clock
+        self.seek_to: int | None = None  # the requested bag time, until the reader takes it
+        self._span = (0, 0)  # bag times of the first and last message; set in OPENING
+        self._starts_paused = options.paused  # used until PLAYING
+        self._schedule: Schedule | None = None  # None in OPENING
+
+    # --- transitions
+
+    def set_span(self, first: int, last: int) -> None:
+        """Store the bag times of the first and last message. Called in OPENING."""
+        self._span = first, last
+
+    def accept_control(self, wall: int) -> None:
+        """Enter READY: from now on seeks and other requests have an effect."""
+        self.phase = Phase.READY
+        # A paused schedule: its clock must not advance until playing starts.
+        self._schedule = Schedule(self.options._replace(paused=True), *self._span, wall)
+
+    def start(self, wall: int) -> None:
+        """Enter PLAYING, applying the requests made before."""
+        self.phase = Phase.PLAYING
+        if self._schedule is None:
+            options = self.options._replace(paused=self._starts_paused)
+            self._schedule = Schedule(options, *self._span, wall + _LEAD)
+        elif not self._starts_paused:
+            self._schedule.set_paused(False, wall)
+
+    def restart(self, wall: int, *, keeps_schedule: bool) -> None:
+        """Return to the first message, for ``--loop``. ``keeps_schedule``: keep the rate, which may have been changed."""
+        if keeps_schedule:
+            self._running.seek(self._span[0], wall)
+        else:
+            self._schedule = Schedule(self.options, *self._span, wall + _LEAD)
+
+    def reach_end(self) -> None:
+        """Enter AT_END, unless a seek is requested."""
+        if self.seek_to is None:
+            self.phase = Phase.AT_END
+
+    def leave_end(self) -> None:
+        """Enter PLAYING again after :attr:`stays_at_end` has become False."""
+        self.phase = Phase.PLAYING
+
+    def end(self) -> None:
+        """Stop playing. Safe in any thread and in signal handlers."""
+        self.is_ended = True
+
+    # --- requests
+
+    def control(
+        self,
+        wall: int,
+        *,
+        is_paused: bool | None = None,
+        rate: float | None = None,
+        seek: int | None = None,
+        is_looping: bool | None = None,
+        has_clock: bool | None = None,
+    ) -> None:
+        """Pause or resume, set the rate, seek to a bag time, loop, or publish /clock. None leaves a setting as it is.
+
+        Resuming at the end without a seek returns to the first message.
+        """
+        if (schedule := self._schedule) is None:
+            return
+        if is_looping is not None:
+            self.options = self.options._replace(loop=is_looping)
+        if has_clock is not None and has_clock != self.options.clock:
+            self.options = self.options._replace(clock=has_clock)
+            schedule.set_clock(self.options.clock_hz if has_clock else 0.0, wall)
+        if rate is not None and rate != schedule.rate:
+            schedule.set_rate(rate, wall)
+        if seek is not None:
+            self.seek_to = min(max(seek, self._span[0]), self._span[1])
+            self.is_fresh = True
+            # state() reports this time until the files have been read from there.
+            schedule.seek(self.seek_to, wall)
+        if is_paused is not None:
+            self.set_paused(is_paused, wall)
+        if self.phase is Phase.AT_END:
+            if is_paused is False and seek is None:
+                self.seek_to = self._span[0]
+            if self.seek_to is not None:
+                self.phase = Phase.PLAYING
+
+    def set_paused(self, paused: bool, wall: int) -> bool:
+        """Pause or resume; return whether that changed the state."""
+        if self._is_started:
+            return self._running.set_paused(paused, wall)
+        changed = paused != self._starts_paused
+        self._starts_paused = paused
+        return changed
+
+    def press(self, key: str, wall: int) -> None:
+        """Perform the command of a key: space toggles paused, s steps, t toggles the topics to pause at."""
+        if not (schedule := self._schedule):
+            return
+        if key == " ":
+            schedule.set_paused(not schedule.is_paused, wall)
+        elif key == "s":
+            schedule.step()
+        elif key == "t":
+            schedule.toggle_pause_topics()
+
+    def step(self, count: int) -> None:
+        """Publish the next ``count`` messages, if paused."""
+        for _ in range(count if self._schedule else 0):
+            self._running.step()
+
+    def control_rate(self, stamp: int) -> None:
+        """Store the stamp of the last message on the rate control topic."""
+        if self._schedule:
+            self._schedule.control_rate(stamp)
+
+    # --- messages
+
+    def take_seek(self) -> int | None:
+        """Return the requested bag time and forget the request; None if there is none."""
+        start, self.seek_to = self.seek_to, None
+        return start
+
+    def arrive(self, start: int, wall: int) -> None:
+        """Continue at ``start``, where the files have been read, unless another seek has been requested meanwhile."""
+        if self.seek_to is None:
+            # Keep the steps that were requested meanwhile.
+            self._running.seek(start, wall, keeps_steps=True)
+
+    def offer(self, time: int, topic: str, wall: int) -> None:
+        """See :meth:`Schedule.offer`."""
+        schedule = self._schedule
+        assert schedule
+        schedule.offer(time, topic, wall)
+
+    def poll(self, wall: int) -> int | None:
+        """See :meth:`Schedule.poll`."""
+        schedule = self._schedule
+        assert schedule
+        wait = schedule.poll(wall)
+        if wait is None:
+            # Set together with the new time: a client that sees this time counts its steps from here.
+            self.is_fresh = False
+        return wait
+
+    def tick(self, wall: int) -> int | None:
+        """See :meth:`Schedule.tick`."""
+        return self._running.tick(wall)
+
+    def run_on(self, wall: int) -> int:
+        """See :meth:`Schedule.run_on`."""
+        return self._running.run_on(wall)
+
+    # --- what it is
+
+    def state(self, wall: int) -> PlayerState:
+        """Return the state for a client."""
+        schedule = self._schedule
+        if schedule is None:
+            return PlayerState(self._span[0], self.options.rate, self._starts_paused, False)
+        is_paused = schedule.is_paused if self._is_started else self._starts_paused
+        return PlayerState(schedule.status(wall).time, schedule.rate, is_paused, self.phase is Phase.AT_END)
+
+    def status(self, wall: int) -> Status:
+        """See :meth:`Schedule.status`."""
+        return self._running.status(wall)
+
+    @property
+    def stays_at_end(self) -> bool:
+        """Return whether there is still nothing to do after the last message."""
+        return not self.is_ended and self.seek_to is None and not self.options.loop
+
+    @property
+    def _is_started(self) -> bool:
+        return self.phase in (Phase.PLAYING, Phase.AT_END)
+
+    @property
+    def _running(self) -> Schedule:
+        assert self._schedule
+        return self._schedule
