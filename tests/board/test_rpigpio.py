@@ -143,7 +143,7 @@ def _prepare(gpio: Gpio) -> None:
             "Bouncetime must be greater than 0",
         ),
         (
-            # In seconds, but the unit is milliseconds.
+            # bouncetime is in milliseconds; this value would fit seconds.
             lambda g: g.add_event_detect(11, GPIO.RISING, bouncetime=0.2),
             TypeError,
             NO_INTEGER.format("float"),

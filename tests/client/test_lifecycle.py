@@ -53,7 +53,7 @@ def start(script: str, *arguments: str) -> subprocess.Popen[str]:
     return process
 
 
-# At the start of a slow program: on a busy machine it would report what it waits for.
+# First line of a slow program: disables the report of what a shutdown waits for, which a busy machine triggers.
 NO_REPORT = "from minirospy.client import shutdown; shutdown._REPORT_SECONDS = 1000.0\n"
 
 

@@ -345,7 +345,7 @@ def test_gateways_of_two_masters_pass_these_keys_without_loops(
             await each.publish(f"try of {name}")
         return all(set(messages) == {"try of one", "try of two"} for messages in received("try"))
 
-    # Repeat until all are connected to all.
+    # Repeat until every place receives the messages of all places.
     fleet.until(reaches_all)
     for turn in ("first", "second"):
         for name, each in said.items():

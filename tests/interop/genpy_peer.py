@@ -1,4 +1,4 @@
-"""Real genpy behind a pipe: a program for Debian's Python that answers what real generated classes do.
+"""Real genpy behind a pipe: a program for Debian's Python that returns the results of real generated classes.
 
 It reads pickled requests ``(command, argument)`` from stdin and writes pickled answers to stdout, each after four
 bytes of length. Its arguments are a folder to write to and folders of definitions: where there are some, real genpy

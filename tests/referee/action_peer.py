@@ -58,12 +58,12 @@ class Story:
             self._changed.notify_all()
 
     def wait(self, count, seconds=30):
-        """Return whether callbacks make so many entries, counted since the last tell, in time."""
+        """Return whether callbacks add ``count`` entries in time, counted since the last tell()."""
         with self._changed:
             return self._changed.wait_for(lambda: self._said >= count, seconds)
 
     def wait_log(self, text, seconds=30):
-        """Return whether a line with this text is logged in time, or has been since the last tell."""
+        """Return whether a line with this text is logged in time, or has been since the last tell()."""
         with self._changed:
             return self._changed.wait_for(lambda: any(text in line for line in self._lines), seconds)
 
@@ -134,7 +134,7 @@ class RawClient:
             return self._changed.wait_for(lambda: self.statuses.get(id) == status, seconds)
 
     def wait_told(self, id, name, seconds=30):
-        """Return whether status lists come to report this status of a goal, or have since the last tell."""
+        """Return whether status lists report this status of a goal in time, or have since the last tell()."""
         with self._changed:
             return self._changed.wait_for(
                 lambda: any(said.startswith(f"{name}(") for said in self.seen.get(id, ())), seconds

@@ -190,7 +190,7 @@ def test_oldest_work_is_dropped_beyond_the_bounds() -> None:
     done: list[int] = []
     dropped = [jobs.add(lambda number=number: done.append(number), bytes(400)) for number in range(4)]  # type: ignore[misc]
     assert dropped == [0, 0, 1, 1]
-    # A single one may be larger.
+    # A single job may be larger than the limit.
     assert jobs.add(lambda: done.append(9), bytes(50_000)) == 2
     jobs.pop()()
     assert done == [9]
