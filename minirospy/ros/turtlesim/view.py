@@ -130,7 +130,7 @@ def _rgb(color: Color) -> str:
 class Screen:
     """Draws a world ten times a second while it changes, below the log lines. A context manager.
 
-    Drawing has its own thread, so that a stopped (Ctrl-S) or slow terminal does not stop the turtles.
+    A separate thread draws, so that a stopped (Ctrl-S) or slow terminal does not stop the turtles.
     """
 
     def __init__(self, world: World, lock: threading.Lock) -> None:

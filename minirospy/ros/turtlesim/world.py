@@ -131,7 +131,7 @@ class World:
 
     @property
     def names(self) -> list[str]:
-        """The names of the turtles, sorted."""
+        """The turtles' names, sorted."""
         return sorted(self._turtles)
 
     def pose(self, name: str) -> Pose:
@@ -174,7 +174,7 @@ class World:
         del self._turtles[name]
 
     def set_pen(self, name: str, color: Color, width: int, *, is_off: bool) -> None:
-        """Set a turtle's pen; width 0 is drawn as one pixel. Turning a pen off keeps its colour and width."""
+        """Set a turtle's pen; width 0 is drawn as one pixel. Turning a pen off does not change its colour and width."""
         turtle = self._turtle(name)
         turtle.is_drawing = not is_off
         if not is_off:

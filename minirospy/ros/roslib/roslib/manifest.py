@@ -67,7 +67,7 @@ class Manifest:
         self.versioncontrol: VersionControl | None = None
 
     def get_export(self, tag: str, attr: str) -> list[str | None]:
-        """Return the values of an attribute of the exports with this tag."""
+        """Return an attribute's values in the exports with this tag."""
         return [export.get(attr) for export in self.exports if export.tag == tag and attr in export.attrs]
 
 
@@ -86,7 +86,7 @@ def folders_with(file: str, path: str) -> Iterator[str]:
 
 
 def manifest_file(package: str, required: bool = True, env: Mapping[str, str] | None = None) -> str:
-    """Return the path of a package's manifest.xml; if not ``required``, the file need not exist.
+    """Return the path to a package's manifest.xml; if not ``required``, the file need not exist.
 
     Raise InvalidROSPkgException if the package, or a required file, does not exist.
     """

@@ -99,7 +99,7 @@ def rosmsg_md5(mode: str, type_: str) -> str:
 
 
 def rosmsg_search(rospack: object, mode: str, base_type: str) -> Iterator[str]:
-    """Yield the full names of the types whose name without package is ``base_type``."""
+    """Yield the full name of each type whose name without the package is ``base_type``."""
     with contextlib.suppress(NotFoundError):
         yield from _interfaces(_kind(mode)).find(base_type)
 

@@ -280,7 +280,7 @@ def _export(line: _Line, tree: Dependencies) -> None:
 
 
 def _exported(line: _Line, tree: Dependencies, package: str, tag: str, attribute: str) -> list[str]:
-    """Return the distinct values of an attribute in the exports of a package and of all its dependencies."""
+    """Return an attribute's distinct values in the exports of a package and of all its dependencies."""
     own = [] if "deps-only" in line.options else [package]
     found: dict[str, None] = {}
     for name in [*own, *reversed(tree.all(package))]:

@@ -272,7 +272,7 @@ FAMILY = Family(
         ),
         Verb("list", "list parameter names", _list_parser, _list),
     ),
-    # ROS exits with 0 for an unknown verb, so scripts would not notice the error.
+    # ROS exits with 0 for an unknown verb, so that scripts do not notice the error.
     help_status=HelpStatus(none=0, short=0, long=0, unknown=64),
     shows_help_on_error=True,
 )

@@ -217,7 +217,7 @@ def _message_class(type_: str) -> type[Message]:
 
 
 def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> list[object]:
-    """Return the values of the first message.
+    """Return the first message's values.
 
     Raise WordedError if the file does not exist, Misuse if an argument is not YAML.
     """

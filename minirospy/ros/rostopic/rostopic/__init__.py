@@ -283,7 +283,7 @@ def publish_message(
 
 
 def rostopicmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command; ``argv`` starts with its name. Exit the program on failure, as ROS's function does."""
+    """Run the command; ``argv`` starts with its name. Exit the program on failure, as in ROS."""
     _command(list(sys.argv if argv is None else argv)[1:])
 
 

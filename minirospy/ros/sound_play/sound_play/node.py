@@ -42,7 +42,7 @@ Key = tuple[int, str, str]
 
 
 class SoundError(Exception):
-    """A sound cannot be played; the message gives the reason and a remedy."""
+    """A sound cannot be played; the message states the reason and a remedy."""
 
 
 class PlayingSound:

@@ -46,7 +46,7 @@ def main() -> int:
 
 
 class Demux:
-    """Forwards the messages of a topic to the selected output, unchanged."""
+    """Forwards a topic's messages to the selected output, unchanged."""
 
     def __init__(self, source: str, targets: Sequence[str]) -> None:
         self._lock = threading.RLock()
