@@ -1,7 +1,7 @@
-"""The /rosout node: collects the log messages of all nodes, republishes them on /rosout_agg and writes them to a file.
+"""The /rosout node: collects log messages from all nodes, republishes them on /rosout_agg and writes them to a file.
 
-Like every ROS node, it lists its loggers and sets their levels: here those of the master, which runs in the same process.
-Source: http://wiki.ros.org/rosout.
+Like every ROS node, it lists its loggers and sets their levels: here the master's loggers, because the master runs in the
+same process. Source: http://wiki.ros.org/rosout.
 """
 
 from __future__ import annotations
@@ -44,12 +44,12 @@ _MAX_BYTES = 256 * 1024
 """Bytes; longer messages are dropped, so that no node can fill the memory of the master's process."""
 
 _MAX_SUBSCRIBERS = 200
-"""Maximum number of subscribers to /rosout_agg, as each may have a message of maximum size queued."""
+"""Maximum number of subscribers to /rosout_agg, because each may have a message of maximum size queued."""
 
 _LARGE, _MAX_LARGE = 16 * 1024, 100
-"""Bytes, messages: a subscriber with this many queued messages receives no larger ones until it has read some."""
+"""Bytes, messages: a subscriber with this many queued messages receives no larger messages until it has read some."""
 
-_STEP_LETTERS = 1024  # characters of text that are written per step; escaping one may take a microsecond
+_STEP_LETTERS = 1024  # characters of text written per step; escaping one may take a microsecond
 
 
 class RosoutNode:
@@ -69,7 +69,10 @@ class RosoutNode:
         self._limited_log = RateLimitedLogger(_log)
 
     async def start(self) -> None:
-        """Register with the master. Raise OSError, MasterUnreachableError."""
+        """Register with the master.
+
+        Raise OSError if the node's port cannot be opened, MasterUnreachableError if the master does not respond.
+        """
         prefer_ros1()
         from rosgraph_msgs.msg import Log
 
@@ -97,7 +100,7 @@ class RosoutNode:
     async def close(self) -> None:
         """Unregister from the master. Idempotent."""
         await self.node.close()
-        # A read in progress ends when its connection is closed.
+        # A pending read completes when its connection is closed.
         while self._turns:
             await asyncio.sleep(0)
         self._limited_log.close()
@@ -174,7 +177,7 @@ class RosoutNode:
         )
 
         parts: list[str] = []
-        # A message may have several lines, as in the real file; the other fields may not.
+        # A message may have several lines, as in the real log file; the other fields may not.
         for text, keep in ((head, ""), (message.msg, "\n\t")):
             for at in range(0, len(text), _STEP_LETTERS):
                 parts.append(escaped(text[at : at + _STEP_LETTERS], keep))
@@ -190,7 +193,7 @@ def _bytes_of(message: Message) -> bytes:
 
 
 def _ros_name(name: str) -> str:
-    """Return the ROS name of a Python logger: ``ros`` and its children, as in roscpp nodes."""
+    """Return a Python logger's ROS name: ``ros`` and its children, as in roscpp nodes."""
     return "ros" + name.removeprefix("minirospy")
 
 

@@ -1,6 +1,7 @@
-"""The ROS package teleop_twist_keyboard: Twists from the keys of a terminal. Source: http://wiki.ros.org/teleop_twist_keyboard."""
+"""The ROS package teleop_twist_keyboard: Twists from terminal keys. Source: http://wiki.ros.org/teleop_twist_keyboard."""
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# Its modules import messages of ROS 1, which are not the first of their names if ROS 2 is sourced.
+# Its modules import ROS 1 messages, and if ROS 2 is sourced, its packages of the same names would be imported
+# instead.
 prefer_ros1()

@@ -52,7 +52,7 @@ _QUIT = "\x03"
 
 
 class Direction(NamedTuple):
-    """The signs of the motion: forward, left and up, and of the turn to the left."""
+    """The signs of the motion: forward, left and up, and the turn to the left."""
 
     x: int = 0
     y: int = 0
@@ -105,7 +105,7 @@ class KeyTeleop:
 
     @property
     def motion(self) -> Motion:
-        """The motion that results from the keys so far."""
+        """The motion that results from all keys so far."""
         x, y, z, turn = self._direction
         return Motion(x * self._speed, y * self._speed, z * self._speed, turn * self._turn)
 
@@ -115,7 +115,7 @@ class KeyTeleop:
         return f"currently:\tspeed {self._speed}\tturn {self._turn} "
 
     def press(self, key: str) -> list[str] | None:
-        """Process a key ("": timeout without a key); return the lines to print, None if there is nothing to publish."""
+        """Process a key ("": no key before the timeout); return the lines to print, or None if there is nothing to publish."""
         if key in _MOVES:
             self._direction = _MOVES[key]
             return []
@@ -147,7 +147,7 @@ class _ParameterError(MinirospyError):
 
 
 class _Output:
-    """Publishes each motion, and repeats the last one at ``rate`` Hz (0: never)."""
+    """Publishes each motion, and repeats the last motion at ``rate`` Hz (0: never)."""
 
     def __init__(self, rate: float) -> None:
         self._is_stamped = bool(rospy.get_param("~stamped", False))
@@ -225,7 +225,7 @@ def main() -> int:
         rospy.logerr("%s", error)
         return 1
     except OSError:
-        # The terminal window was closed: there will be no more keys.
+        # The terminal window was closed, so no more keys can arrive.
         rospy.signal_shutdown("the terminal is closed")
     except rospy.ROSInterruptException:
         pass
@@ -251,7 +251,7 @@ def _run() -> None:
     rospy.on_shutdown(output.close)
     output.set(teleop.motion)
 
-    # Set up the terminal before printing the help: keys typed before that are discarded.
+    # Set up the terminal before printing the help, because the setup discards earlier input.
     with Keys(end=_QUIT) as keys:
         print(HELP)
         print(teleop.speeds, flush=True)
@@ -268,7 +268,7 @@ def _run() -> None:
 
 
 def _next_key(keys: Keys, timeout: float) -> str:
-    """Return a key, or "" if none is typed within ``timeout`` seconds."""
+    """Return a key, or "" if none is pressed within ``timeout`` seconds."""
     end = time.monotonic() + timeout
     while not (key := keys.next()) and time.monotonic() < end and not rospy.is_shutdown():
         pass

@@ -1,9 +1,10 @@
-"""Turtlesim in pure Python: the window with the turtles, and the programs of its tutorials.
+"""Turtlesim in pure Python: the window with the turtles, and the programs for its tutorials.
 
 Source: http://wiki.ros.org/turtlesim.
 """
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# The modules below import messages of ROS 1; if ROS 2 is sourced, its packages of the same names would come first.
+# The modules below import ROS 1 messages; if ROS 2 is sourced, its packages of the same names would be imported
+# instead.
 prefer_ros1()

@@ -1,4 +1,4 @@
-"""The canvas under the turtles: draws pen strokes, and returns the colour of a pixel. Pure."""
+"""The canvas under the turtles: draws pen strokes, and returns pixel colours. Pure."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Color(NamedTuple):
 
 
 class Canvas:
-    """The pixels; (x, y) is the centre of a pixel, y grows downwards."""
+    """The pixels; (x, y) is a pixel's centre, y increases downwards."""
 
     def __init__(self, background: Color) -> None:
         self.pixels: NDArray[np.uint8] = np.empty((PIXELS, PIXELS, 3), np.uint8)
@@ -43,12 +43,12 @@ class Canvas:
     def stroke(
         self, start: tuple[float, float], end: tuple[float, float], color: Color, width: float
     ) -> None:
-        """Draw a straight line with square ends that extend ``width`` / 2 beyond its points; clip it to the canvas."""
+        """Draw a straight line with square ends that extend ``width`` / 2 beyond its end points; clip it to the canvas."""
         (x0, y0), (x1, y1) = start, end
         length = math.hypot(x1 - x0, y1 - y0)
         along_x, along_y = ((x1 - x0) / length, (y1 - y0) / length) if length else (1.0, 0.0)
         half = width / 2
-        # A corner of the line is at most sqrt(2) * half away from one of its points.
+        # A corner of the line is at most sqrt(2) * half away from one of the end points.
         rows = _range(min(y0, y1) - 2 * half, max(y0, y1) + 2 * half)
         columns = _range(min(x0, x1) - 2 * half, max(x0, x1) + 2 * half)
         if not len(rows) or not len(columns):

@@ -25,7 +25,7 @@ def main() -> int:
         twist = Twist()
         twist.linear.x, twist.angular.z = pose.linear_velocity, pose.angular_velocity
         with contextlib.suppress(rospy.ROSException):
-            # Raises if the node is shutting down.
+            # publish() raises an exception if the node is shutting down.
             publisher.publish(twist)
 
     subscriber = rospy.Subscriber(join(rospy.resolve_name("input"), "pose"), Pose, copy, queue_size=1)

@@ -66,13 +66,16 @@ def main() -> int:
 
 
 def _has_terminal() -> bool:
-    """Return whether stdin and stdout are a terminal. A launch file's nodes have no stdin, and share its terminal."""
+    """Return whether stdin and stdout are a terminal.
+
+    A node started by roslaunch has no stdin, and shares roslaunch's terminal.
+    """
     streams = sys.stdin, sys.stdout
     return all(stream is not None and stream.isatty() for stream in streams)
 
 
 def _background() -> Color:
-    """Return the background from the parameters; a value that is not an integer is replaced by ROS's default."""
+    """Return the background colour from the parameters; ROS's default replaces a value that is not an integer."""
     values = [rospy.get_param(f"~background_{part}", usual) for part, usual in BACKGROUND._asdict().items()]
     chosen = [
         value & 255 if isinstance(value, int) and not isinstance(value, bool) else usual
@@ -82,7 +85,7 @@ def _background() -> Color:
 
 
 class Simulator:
-    """The world as a node: the services for all turtles, and the topics and services of each turtle."""
+    """The world as a node: the services for all turtles, and each turtle's topics and services."""
 
     def __init__(self) -> None:
         self.lock = threading.Lock()  # guards the world
@@ -90,7 +93,7 @@ class Simulator:
             if not rospy.has_param(f"~background_{part}"):
                 rospy.set_param(f"~background_{part}", usual)
         self.world = World(_background())
-        # Serialises changes to the set of turtles; the world keeps stepping in the meantime.
+        # Serialises changes to the set of turtles; meanwhile the world continues to step.
         self._changing = threading.Lock()
         self._ends: dict[str, _Ends] = {}
         self._services: list[rospy.Service[object]] = []
@@ -112,7 +115,7 @@ class Simulator:
         due = time.monotonic()
         while not rospy.is_shutdown():
             with contextlib.suppress(rospy.ROSException):
-                # Raises if the node is shutting down.
+                # _step() raises an exception if the node is shutting down.
                 self._step()
             due += STEP_SECONDS
             late = time.monotonic() - due
@@ -162,7 +165,7 @@ class Simulator:
         with self._changing:
             with self.lock:
                 self.world.remove_all()
-            # Keep the topics of a turtle with the same name, so that its subscribers miss nothing.
+            # Reuse the topics of a turtle with the same name, so that their subscribers receive every message.
             first = self._add(self.world.spawn_first)
             for name in set(self._ends) - {first}:
                 self._remove(name)
@@ -173,7 +176,7 @@ class Simulator:
         def spawn() -> str:
             spaces = {rospy.resolve_name(name) for name in self.world.names}
             if request.name and rospy.resolve_name(request.name) in spaces:
-                # The new name may be another form of an existing one: /turtle1.
+                # The new name may be another spelling of an existing one: /turtle1.
                 raise WorldError(f"A turtled named [{request.name}] already exists")
             return self.world.spawn(request.name, request.x, request.y, request.theta)
 
@@ -189,7 +192,7 @@ class Simulator:
 
 
 def refusing(request: Callable[[], _T]) -> _T:
-    """Return the result of a request to the world; if it is refused, log the error and raise ServiceException."""
+    """Return the result of a request to the world; if the world refuses it, log the error and raise ServiceException."""
     try:
         return request()
     except WorldError as error:
@@ -198,12 +201,12 @@ def refusing(request: Callable[[], _T]) -> _T:
 
 
 class _Ends:
-    """The topics and services of one turtle."""
+    """One turtle's topics and services."""
 
     def __init__(self, name: str, simulator: Simulator) -> None:
         self._name = name
         self._world, self._lock = simulator.world, simulator.lock
-        # Resolve it as a namespace, so that remappings and ~ apply.
+        # Resolve the name as a namespace, so that remappings and ~ apply.
         space = rospy.resolve_name(name)
         self._poses = rospy.Publisher(join(space, "pose"), PoseMessage, queue_size=1)
         self._colors = rospy.Publisher(join(space, "color_sensor"), ColorMessage, queue_size=1)

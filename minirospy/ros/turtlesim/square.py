@@ -1,4 +1,4 @@
-"""Steers a turtle along the sides of a square: poses in, velocities and log lines out. Pure.
+"""Steers a turtle along the sides of a square: input poses, output velocities and log lines. Pure.
 
 Source: the behaviour of draw_square in turtlesim 0.10.2.
 """
@@ -31,7 +31,7 @@ class _Phase(Enum):
 
 
 class Square:
-    """Moves to one goal after the other: each is two metres ahead, or a quarter turn to the left."""
+    """Moves to one goal after another: each goal is two metres ahead, or a quarter turn to the left."""
 
     def __init__(self) -> None:
         self._goal: Pose | None = None

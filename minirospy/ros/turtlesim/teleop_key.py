@@ -1,4 +1,4 @@
-"""turtle_teleop_key: publishes `turtle1/cmd_vel` from the arrow keys of a terminal.
+"""turtle_teleop_key: publishes `turtle1/cmd_vel` from a terminal's arrow keys.
 
 Parameters: scale_linear (2 m/s), scale_angular (2 rad/s); they are in the node's namespace, not private. Source:
 http://wiki.ros.org/turtlesim.
@@ -50,7 +50,7 @@ def main() -> int:
 def _run() -> None:
     linear, angular = _scale("scale_linear"), _scale("scale_angular")
     publisher = rospy.Publisher("turtle1/cmd_vel", Twist, queue_size=1)
-    # Set up the terminal before the help is shown: earlier input is discarded.
+    # Set up the terminal before the help is shown, because the setup discards earlier input.
     with Keys(end=_QUIT) as keys:
         print(_HELP, flush=True)
         while not rospy.is_shutdown():

@@ -1,4 +1,4 @@
-"""The turtles' world: commands, teleports and pens in; poses, colours and wall hits out. Pure: no sockets, no clock.
+"""The turtles' world: input commands, teleports and pens; output poses, colours and wall hits. Pure: no sockets, no clock.
 
 Lengths are in metres, angles in radians; the origin is the lower left corner. Source: http://wiki.ros.org/turtlesim, and the
 behaviour of turtlesim 0.10.2.
@@ -16,7 +16,7 @@ from minirospy.ros.turtlesim.canvas import PIXELS, Canvas, Color
 
 __all__ = ["BACKGROUND", "SIZE", "STEP_SECONDS", "Pen", "Pose", "Reading", "Velocity", "World", "WorldError"]
 
-BACKGROUND = Color(69, 86, 255)  # used if no parameter sets another
+BACKGROUND = Color(69, 86, 255)  # used if the parameters set no other colour
 
 STEP_SECONDS = 0.016  # seconds between two steps
 
@@ -26,12 +26,12 @@ _PIXELS_PER_METRE = 45.0
 
 
 def _float32(value: float) -> float:
-    """Return the number rounded to the precision of float32."""
+    """Return the number rounded to float32 precision."""
     return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
 SIZE = _float32((PIXELS - 1) / _PIXELS_PER_METRE)
-"""The width and height of the world, in metres: 11.088889."""
+"""The world's width and height, in metres: 11.088889."""
 
 
 class WorldError(MinirospyError):
@@ -62,13 +62,13 @@ class Pose(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """A turtle's data to publish after a step."""
+    """A turtle's data, published after a step."""
 
     name: str
     pose: Pose
     linear: float  # metres per second
     angular: float  # radians per second
-    color: Color  # colour of the canvas under the turtle, before the turtle drew on it
+    color: Color  # canvas colour under the turtle, before the turtle drew on it
     warning: str  # log line about a wall that the turtle hit, or ""
 
 
@@ -122,7 +122,7 @@ class _Turtle:
 
 
 class World:
-    """The turtles by name, and their canvas. There are none at first."""
+    """The turtles by name, and their canvas. Initially there are no turtles."""
 
     def __init__(self, background: Color = BACKGROUND) -> None:
         self.canvas = Canvas(background)
@@ -131,15 +131,15 @@ class World:
 
     @property
     def names(self) -> list[str]:
-        """The names of the turtles, sorted."""
+        """The turtles' names, sorted."""
         return sorted(self._turtles)
 
     def pose(self, name: str) -> Pose:
-        """Return the pose of a turtle. Raise WorldError if it does not exist."""
+        """Return a turtle's pose. Raise WorldError if the turtle does not exist."""
         return self._turtle(name).pose
 
     def clear(self, background: Color) -> None:
-        """Clear the canvas; turtles stay."""
+        """Clear the canvas without removing the turtles."""
         self.canvas.fill(background)
 
     def remove_all(self) -> None:
@@ -148,7 +148,10 @@ class World:
         self._last_number = 0
 
     def spawn(self, name: str, x: float, y: float, theta: float) -> str:
-        """Add a turtle; return its name, a generated one if empty. Raise WorldError if the name is in use or invalid."""
+        """Add a turtle; return its name, a generated one if ``name`` is empty.
+
+        Raise WorldError if the name is in use or invalid.
+        """
         _check_finite(x=x, y=y, theta=theta)
         if not is_legal_name(name):
             raise WorldError(f"[{name}] is not a legal name of a turtle: letters, digits, _ and /")
@@ -165,13 +168,13 @@ class World:
         return self.spawn("", SIZE / 2, SIZE / 2, 0.0)
 
     def kill(self, name: str) -> None:
-        """Remove a turtle. Raise WorldError if it does not exist."""
+        """Remove a turtle. Raise WorldError if the turtle does not exist."""
         if name not in self._turtles:
             raise WorldError(f"Tried to kill turtle [{name}], which does not exist")
         del self._turtles[name]
 
     def set_pen(self, name: str, color: Color, width: int, *, is_off: bool) -> None:
-        """Set a turtle's pen; width 0 is drawn as one pixel. Turning a pen off keeps its colour and width."""
+        """Set a turtle's pen; width 0 is drawn as one pixel. Turning a pen off does not change its colour and width."""
         turtle = self._turtle(name)
         turtle.is_drawing = not is_off
         if not is_off:
@@ -188,13 +191,16 @@ class World:
         self._turtle(name).teleports.append(_Teleport(True, linear, 0.0, angular))
 
     def command(self, name: str, velocity: Velocity, now: float) -> None:
-        """Set a turtle's velocity for one second after ``now`` (seconds). Raise WorldError if it is not finite."""
+        """Set a turtle's velocity for one second after ``now`` (seconds). Raise WorldError if the velocity is not finite."""
         _check_finite(**velocity._asdict())
         turtle = self._turtle(name)
         turtle.velocity, turtle.command_time = velocity, now
 
     def step(self, now: float) -> list[Reading]:
-        """Advance by 16 ms; return each turtle's data, sorted by name. ``now``: seconds on the clock of the commands."""
+        """Advance by 16 ms; return each turtle's data, sorted by name.
+
+        ``now``: seconds on the clock that :meth:`command` uses.
+        """
         return [self._step(name, self._turtles[name], now) for name in self.names]
 
     def _step(self, name: str, turtle: _Turtle, now: float) -> Reading:

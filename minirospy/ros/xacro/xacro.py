@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`rosrun xacro xacro`, and `command="$(find xacro)/xacro ..."` of launch files; see http://wiki.ros.org/xacro."""
+"""`rosrun xacro xacro`, and `command="$(find xacro)/xacro ..."` in launch files; see http://wiki.ros.org/xacro."""
 
 import os
 import sys

@@ -18,12 +18,12 @@ __all__ = ["COMMAND", "get_run_id", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0. If no master answers, print the folder of all runs and return 2, as ROS does."""
+    """Run the command; return 0. If no master responds, print the folder for all runs and return 2, as ROS does."""
     return COMMAND.main(argv)
 
 
 def get_run_id() -> str | None:
-    """Return the current run's id, or None if no master answers or the master has no run id."""
+    """Return the current run's id, or None if no master responds or the master has no run id."""
     master = MasterProxy(Environment.read().master_uri, "/roslaunch")
     try:
         return str(master.get_param("/run_id"))

@@ -1,4 +1,4 @@
-"""The roslaunch on another machine: started by ssh, it runs the nodes that its parent sends, and exits with its parent.
+"""The roslaunch process on another machine: ssh starts it, it runs the nodes that its parent sends, and exits with its parent.
 
 Source: http://wiki.ros.org/roslaunch/Architecture.
 """

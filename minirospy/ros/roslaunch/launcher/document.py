@@ -1,4 +1,4 @@
-"""Parse the text of a launch file into tags with line numbers. Pure.
+"""Parse a launch file's text into tags with line numbers. Pure.
 
 Source: http://wiki.ros.org/roslaunch/XML.
 """

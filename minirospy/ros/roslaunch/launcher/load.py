@@ -50,7 +50,7 @@ class _TooManyIncludesError(LaunchError):
 
 
 class LaunchSource(NamedTuple):
-    """A launch file, its content (None: read the file), and the values of its args."""
+    """A launch file, its content (None: read the file), and its args' values."""
 
     file: str
     text: bytes | None

@@ -66,7 +66,7 @@ class LaunchMaster:
         Raise MasterUnreachableError if the master URI names another machine, MinirospyError if the process cannot be started.
         """
         if not self._environment.master_is_local:
-            # The call is made for its error, which gives the reason: an unknown host name, a suspended master.
+            # Make the call for its error, which states the reason: an unknown host name, a suspended master.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
         self._output.print("auto-starting new master")

@@ -72,7 +72,7 @@ class NodeStarter:
         return folder
 
     def _uses_screen(self, node: NodeSpec) -> bool:
-        """Return whether a node's output goes to the terminal instead of a file."""
+        """Return whether a node's output is printed on the terminal instead of written to a file."""
         if not self._master.has_logs:
             return True
         return (self._options.screen or node.output == "screen") and not self._options.log

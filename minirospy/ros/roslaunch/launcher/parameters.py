@@ -120,7 +120,7 @@ def _output_of(tag: Tag, command: str) -> str:
 
 
 def _run(words: list[str]) -> tuple[int, bytes, str]:
-    """Run a command; return its status, its output, and the line in its stderr that gives the reason.
+    """Run a command; return its status, its output, and the line in its stderr that states the reason.
 
     Its stderr is copied to the terminal as it arrives. A command that writes more than _MAX_VALUE bytes is killed.
     """
@@ -147,7 +147,7 @@ def _run(words: list[str]) -> tuple[int, bytes, str]:
             process.stdout.close()
     finally:
         os.close(writing)
-        # Processes that the command left running may keep the pipe open.
+        # Wait only briefly, because processes that the command left running may hold the pipe open.
         reader.join(_ERRORS_SECONDS)
     return status, output, _reason(_STYLE.sub("", bytes(end).decode("utf-8", "replace")))
 

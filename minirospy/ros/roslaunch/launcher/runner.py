@@ -133,7 +133,7 @@ class Launcher:
         if not had_master:
             self._output.print(f"setting /run_id to {self.run_id}", bold=True)
             self._output.print("started core service [/rosout]")
-            # In ROS, the first process started by a roslaunch that runs the master is /rosout.
+            # Skip the first number: in ROS, a roslaunch that starts the master uses it for /rosout.
             next(self._numbers)
 
         self.set_parameters()

@@ -32,7 +32,7 @@ _VERBS = (*_ONE, "optenv", "dirname", "eval")
 
 
 class SubstitutionError(ValueError):
-    """A substitution cannot be resolved; the message gives the reason."""
+    """A substitution cannot be resolved; the message states the reason."""
 
 
 @dataclass

@@ -103,7 +103,7 @@ class Supervisor:
         return bool(self.processes) or self.master is not None or self._is_remote_running()
 
     def add(self, process: Process) -> None:
-        """Watch the process of a node."""
+        """Watch a node's process."""
         self.processes.append(process)
         self._attend(process)
         self.on_change()

@@ -57,7 +57,7 @@ class ROSLaunchConfig:
 
     @property
     def resolved_node_names(self) -> list[str]:
-        """The global names of the nodes."""
+        """The nodes' global names."""
         return [node.spec.name for node in (*self.nodes, *self.nodes_core) if node.name]
 
     def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> None:

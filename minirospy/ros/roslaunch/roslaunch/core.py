@@ -393,7 +393,7 @@ def _quoted(value: object) -> str:
 
 
 class _Handler:
-    """Receives the lines of one kind: either errors or all others."""
+    """Receives one kind of lines: either errors or all others."""
 
     def __init__(self, function: Callable[[str], object], *, errors: bool) -> None:
         self._function = function

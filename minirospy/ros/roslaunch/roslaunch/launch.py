@@ -97,7 +97,7 @@ class ROSLaunchRunner:
     def launch(self) -> tuple[list[str], list[str]]:
         """Start everything; return the names of the started processes and of the nodes that failed to start.
 
-        Raise RLException if the master or the parameters fail.
+        Raise RLException if there is no usable master, or if a parameter cannot be set.
         """
         monitor = self._monitor()
         replacement_of("roslaunch.pmon", "_init_signal_handlers", init_signal_handlers)()

@@ -25,7 +25,7 @@ __all__ = [
 
 
 def get_node_list(config: ROSLaunchConfig) -> list[str]:
-    """Return the names of the nodes, sorted."""
+    """Return the nodes' names, sorted."""
     return sorted(config.resolved_node_names)
 
 
@@ -47,7 +47,7 @@ def create_local_process_args(node: Node, machine: Machine | None, env: object =
 
 
 def print_node_list(roslaunch_files: Sequence[LaunchFile]) -> None:
-    """Print the names of the nodes."""
+    """Print the nodes' names."""
     print("\n".join(load_config_default(roslaunch_files, None).resolved_node_names))
 
 

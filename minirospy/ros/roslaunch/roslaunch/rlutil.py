@@ -45,7 +45,7 @@ def print_file_list(roslaunch_files: Sequence[LaunchFile]) -> None:
 
 
 def change_terminal_name(args: Sequence[str], is_core: bool) -> None:
-    """Set the terminal's title to the names of the launch files."""
+    """Set the terminal's title to the launch files' names."""
     Output().title("roscore" if is_core else ",".join(args))
 
 

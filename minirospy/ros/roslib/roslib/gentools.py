@@ -1,6 +1,6 @@
 """roslib.gentools: md5sums and full texts of definition files, computed from their dependencies.
 
-The functions pass a dict of a definition's dependencies: ``package``, ``spec``, ``deps``, ``uniquedeps`` and ``files``.
+The functions exchange a dict of a definition's dependencies: ``package``, ``spec``, ``deps``, ``uniquedeps`` and ``files``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = [
 
 
 class Dependencies(TypedDict):
-    """The dependencies of a definition."""
+    """A definition's dependencies."""
 
     files: dict[str, str]
     deps: list[str]
@@ -38,7 +38,7 @@ class Dependencies(TypedDict):
 def get_file_dependencies(
     f: str, stdout: object = sys.stdout, stderr: object = sys.stderr, rospack: object = None
 ) -> Dependencies:
-    """Return the dependencies of a definition file in a package. Raise Exception if it is not a definition file."""
+    """Return the dependencies of a package's definition file. Raise Exception if the file is not a definition file."""
     path = Path(f)
     folder = next((each for each in path.resolve().parents if (each / "package.xml").is_file()), None)
     package = folder.name if folder else None
@@ -63,7 +63,7 @@ def get_dependencies(
     stderr: object = sys.stderr,
     rospack: object = None,
 ) -> Dependencies:
-    """Return the dependencies of a definition in a package. Raise genmsg.MsgNotFound."""
+    """Return the dependencies of a package's definition. Raise genmsg.MsgNotFound if a definition does not exist."""
     context = _context(spec)
     parts = [spec.request, spec.response] if isinstance(spec, SrvSpec) else [spec]
     needed = list(dict.fromkeys(name for part in parts for name in context.get_all_depends(part.full_name)))
@@ -72,7 +72,7 @@ def get_dependencies(
 
 
 def compute_md5(get_deps_dict: Dependencies, rospack: object = None) -> str:
-    """Return the md5sum of a definition."""
+    """Return a definition's md5sum."""
     return gentools.compute_md5(_context(get_deps_dict["spec"]), get_deps_dict["spec"])
 
 
@@ -82,12 +82,12 @@ def compute_md5_text(get_deps_dict: Dependencies, spec: MsgSpec, rospack: object
 
 
 def compute_full_text(get_deps_dict: Dependencies) -> str:
-    """Return the text of a definition, with the definitions that it depends on."""
+    """Return a definition's text, followed by the definitions on which it depends."""
     return gentools.compute_full_text(_context(get_deps_dict["spec"]), get_deps_dict["spec"])
 
 
 def _context(spec: MsgSpec | SrvSpec) -> msg_loader.MsgContext:
-    """Return a context with all dependencies of a definition."""
+    """Return a context that contains all of a definition's dependencies."""
     context = msg_loader.MsgContext.create_default()
     search = {name: [str(folder / "msg")] for name, folder in Packages().folders().items()}
     msg_loader.load_depends(context, spec, search)

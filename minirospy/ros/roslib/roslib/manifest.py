@@ -1,4 +1,4 @@
-"""roslib.manifest: reads the manifest.xml of packages of rosbuild, the build system before catkin.
+"""roslib.manifest: reads the manifest.xml of packages for rosbuild, the build system before catkin.
 
 For a package.xml, use rospkg.RosPack().get_manifest(). Source: http://wiki.ros.org/Manifest.
 """
@@ -49,14 +49,14 @@ class Depend(NamedTuple):
 
 
 class VersionControl(NamedTuple):
-    """The location of the source repository."""
+    """The source repository's location."""
 
     type: str
     url: str
 
 
 class Manifest:
-    """The content of a manifest.xml; a new object is empty."""
+    """The content of a manifest.xml; initially empty."""
 
     def __init__(self) -> None:
         self.description = self.brief = self.license = self.author = self.url = self.status = self.notes = ""
@@ -67,12 +67,12 @@ class Manifest:
         self.versioncontrol: VersionControl | None = None
 
     def get_export(self, tag: str, attr: str) -> list[str | None]:
-        """Return the values of an attribute of the exports with this tag."""
+        """Return an attribute's values in the exports with this tag."""
         return [export.get(attr) for export in self.exports if export.tag == tag and attr in export.attrs]
 
 
 def folders_with(file: str, path: str) -> Iterator[str]:
-    """Yield the folders below a path that have a manifest of this name; skip folders below a manifest."""
+    """Yield the folders below a path that contain a manifest with this name; skip folders below a manifest."""
     for folder, subfolders, files in os.walk(path, followlinks=True):
         if file in files:
             yield folder
@@ -86,9 +86,9 @@ def folders_with(file: str, path: str) -> Iterator[str]:
 
 
 def manifest_file(package: str, required: bool = True, env: Mapping[str, str] | None = None) -> str:
-    """Return the path of a package's manifest.xml; if not ``required``, the file need not exist.
+    """Return the path to a package's manifest.xml; if not ``required``, the file need not exist.
 
-    Raise InvalidROSPkgException.
+    Raise InvalidROSPkgException if the package, or a required file, does not exist.
     """
     for path in (os.environ if env is None else env).get("ROS_PACKAGE_PATH", "").split(os.pathsep):
         for folder in folders_with(MANIFEST_FILE, path) if path else ():
@@ -102,12 +102,15 @@ def manifest_file(package: str, required: bool = True, env: Mapping[str, str] | 
 
 
 def load_manifest(package: str) -> Manifest:
-    """Return the manifest of a package. Raise InvalidROSPkgException, ManifestException."""
+    """Return a package's manifest.
+
+    Raise InvalidROSPkgException if the package does not exist, ManifestException if the manifest is invalid.
+    """
     return parse_file(manifest_file(package))
 
 
 def parse_file(file: str) -> Manifest:
-    """Return the manifest in a file. Raise ValueError if the file does not exist, ManifestException."""
+    """Return the manifest in a file. Raise ValueError if the file does not exist, ManifestException if it is invalid."""
     if not file:
         raise ValueError("Missing manifest file argument")
     if not os.path.isfile(file):
@@ -117,7 +120,7 @@ def parse_file(file: str) -> Manifest:
 
 
 def parse(string: str, filename: str = "string") -> Manifest:
-    """Return the manifest in a string. Raise ManifestException."""
+    """Return the manifest in a string. Raise ManifestException if it is invalid."""
     from xml.dom.minidom import parseString
 
     try:

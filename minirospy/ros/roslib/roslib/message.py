@@ -1,4 +1,4 @@
-"""roslib.message: genpy's names under their former module."""
+"""roslib.message: genpy's names, in their former module."""
 
 from minirospy.ros.genpy.genpy.message import (
     DeserializationError,

@@ -1,4 +1,4 @@
-"""roslib.msgs: queries about types, with genmsg's functions under their former names."""
+"""roslib.msgs: queries about types, and genmsg's functions under their former names."""
 
 from minirospy.core.idl.load import Catalogue
 from minirospy.ros.genmsg.genmsg.msgs import (
@@ -45,5 +45,5 @@ class MsgSpecException(Exception):
 
 
 def list_msg_types(package: str, include_depends: bool) -> list[str]:
-    """Return the names of a package's message files, without the package; ``include_depends`` is for rosbuild."""
+    """Return the names of a package's message files, without the package; ``include_depends`` applies only to rosbuild."""
     return sorted(Catalogue({package: Packages().find(package)}).files(package, "msg"))

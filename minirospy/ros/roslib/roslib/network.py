@@ -1,4 +1,4 @@
-"""roslib.network: rosgraph's names under their former module."""
+"""roslib.network: rosgraph's names, in their former module."""
 
 from minirospy.ros.rosgraph.rosgraph.network import (
     ROS_HOSTNAME,

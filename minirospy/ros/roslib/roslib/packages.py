@@ -43,17 +43,17 @@ class ROSPkgException(Exception):
 
 
 class InvalidROSPkgException(ROSPkgException):
-    """There is no package of this name."""
+    """There is no package with this name."""
 
 
 class MultipleNodesException(ROSPkgException):
-    """A package has several nodes of this name."""
+    """A package has several nodes with this name."""
 
 
 def get_pkg_dir(
     package: str, required: bool = True, ros_root: str | None = None, ros_package_path: str | None = None
 ) -> str | None:
-    """Return the folder of a package. If there is none, raise InvalidROSPkgException if ``required``, else return None."""
+    """Return a package's folder. If there is none, raise InvalidROSPkgException if ``required``, else return None."""
     paths = [path for path in (ros_package_path or "").split(os.pathsep) if path]
     rospack = RosPack([*paths, *RosPack().get_ros_paths()])
     try:
@@ -65,7 +65,7 @@ def get_pkg_dir(
 
 
 def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
-    """Return (folder, name) of the package that contains a path; (None, None) if there is none."""
+    """Return (folder, name) of the package that contains a path, or (None, None) if there is none."""
     name = get_package_name(d)
     place = Path(d).absolute()
     folder = next((each for each in (place, *place.parents) if package_name(each) is not None), None)
@@ -77,7 +77,8 @@ def get_pkg_subdir(
 ) -> str | None:
     """Return a folder in a package.
 
-    If it is missing, create it if ``required``, else return None. Raise InvalidROSPkgException.
+    If the folder is missing, create it if ``required``, else return None. Raise InvalidROSPkgException if the package does not
+    exist.
     """
     folder = get_pkg_dir(package, required)
     if folder is None:
@@ -89,12 +90,15 @@ def get_pkg_subdir(
 
 
 def resource_file(package: str, subdir: str, resource_name: str) -> str:
-    """Return the path of a file in a package's folder, whether it exists or not. Raise InvalidROSPkgException."""
+    """Return the path to a file in a package's folder; the file need not exist.
+
+    Raise InvalidROSPkgException if the package does not exist.
+    """
     return os.path.join(str(get_pkg_dir(package)), subdir, resource_name)
 
 
 def find_node(pkg: str, node_type: str, rospack: RosPack | None = None) -> list[str]:
-    """Return the programs of this name in a package. Raise ResourceNotFound."""
+    """Return the programs with this name in a package. Raise ResourceNotFound if the package does not exist."""
     return find_resource(pkg, node_type, _is_program, rospack)
 
 
@@ -104,7 +108,10 @@ def find_resource(
     filter_fn: Callable[[str], bool] | None = None,
     rospack: RosPack | None = None,
 ) -> list[str]:
-    """Return the files of this name in a package and in its workspace's build output. Raise ResourceNotFound."""
+    """Return the files with this name in a package and in its workspace's build output.
+
+    Raise ResourceNotFound if the package does not exist.
+    """
     folder = Path((rospack or RosPack()).get_path(pkg))
     if len(Path(resource_name).parts) > 1:
         found: Iterator[Path] = filter(Path.is_file, [folder / resource_name])
@@ -134,8 +141,8 @@ def _files(folder: Path, package: str, name: str) -> Iterator[Path]:
 
 
 def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] | None = None) -> list[str]:
-    """Return the files of this name below a folder; follow links, and skip folders whose name starts with a dot."""
-    # On Windows, programs may be named without suffix, and case is ignored.
+    """Return the files with this name below a folder; follow links, and skip folders whose name starts with a dot."""
+    # On Windows, programs may be named without a suffix, and case is ignored.
     suffixes = ("", ".exe", ".bat", ".py") if os.name == "nt" else ("",)
     wanted = [os.path.normcase(resource_name + suffix) for suffix in suffixes]
     found, seen = [], set()
@@ -143,7 +150,7 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
     for path, folders, names in os.walk(d, followlinks=True):
         real = os.path.realpath(path)
         if real in seen:
-            # A link to a parent folder would never end.
+            # Following a link to a parent folder would never end.
             folders.clear()
             continue
         seen.add(real)
@@ -156,7 +163,10 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
 def _get_pkg_subdir_by_dir(
     package_dir: str, subdir: str, required: bool = True, env: Mapping[str, str] | None = None
 ) -> str:
-    """Return a folder of a package, given the package's path; create it if it is missing and ``required``. Raise OSError."""
+    """Return a folder in a package, given the package's path; create it if it is missing and ``required``.
+
+    Raise OSError if it cannot be created.
+    """
     path = os.path.join(package_dir, subdir)
     if required:
         os.makedirs(path, exist_ok=True)

@@ -36,7 +36,7 @@ ROS_LOG_DIR = "ROS_LOG_DIR"
 
 
 class ROSEnvException(ROSLibException):
-    """A required variable is not set."""
+    """A required environment variable is not set."""
 
 
 def get_ros_root(required: bool = True, env: Mapping[str, str] | None = None) -> str | None:
@@ -57,17 +57,17 @@ def get_master_uri(
 
 
 def get_ros_home(env: Mapping[str, str] | None = None) -> str:
-    """Return ROS's folder for its own files: ROS_HOME, or ~/.ros."""
+    """Return the folder for ROS's own files: ROS_HOME, or ~/.ros."""
     return environment.get_ros_home(env)
 
 
 def get_log_dir(env: Mapping[str, str] | None = None) -> str:
-    """Return the folder of log files."""
+    """Return the folder for log files."""
     return environment.get_log_dir(env)
 
 
 def get_test_results_dir(env: Mapping[str, str] | None = None) -> str:
-    """Return the folder of test results."""
+    """Return the folder for test results."""
     return environment.get_test_results_dir(env)
 
 

@@ -1,4 +1,4 @@
-"""roslib.rostime: genpy's names under their former module."""
+"""roslib.rostime: genpy's names, in their former module."""
 
 from minirospy.base.times import Duration, Time, TVal
 

@@ -1,4 +1,4 @@
-"""roslib.scriptutil: the master's proxy for old scripts."""
+"""roslib.scriptutil: the master proxy for old scripts."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ __all__ = ["get_master", "get_param_server", "script_resolve_name"]
 
 
 def get_master() -> ServerProxy:
-    """Return the master from the environment.
+    """Return a proxy for the environment's master.
 
-    Each method's first argument is the caller id; it returns (code, status message, value).
+    Each method's first argument is the caller id; each returns (code, status message, value).
     """
     return ServerProxy(get_master_uri())
 

@@ -1,4 +1,4 @@
-"""roslib.srvs: the service types of packages, and their definitions."""
+"""roslib.srvs: packages' service types, and their definitions."""
 
 from __future__ import annotations
 
@@ -48,18 +48,21 @@ def is_verbose() -> bool:
 
 
 def set_verbose(v: bool) -> None:
-    """Store a value for :func:`is_verbose`; nothing is printed here."""
+    """Store a value for :func:`is_verbose`; the value has no other effect here."""
     _Verbosity.is_on = bool(v)
 
 
 def list_srv_types(package: str, include_depends: bool) -> list[str]:
-    """Return the names of a package's service files, without the package; ``include_depends`` is for rosbuild."""
+    """Return the names of a package's service files, without the package; ``include_depends`` applies only to rosbuild."""
     folder = Path(packages.get_pkg_dir(package) or "", "srv")
     return sorted(path.stem for path in folder.glob(f"*{EXT}"))
 
 
 def srv_file(package: str, type_: str) -> str:
-    """Return the path of a service's definition file, whether it exists or not. Raise InvalidROSPkgException."""
+    """Return the path to a service's definition file, which need not exist.
+
+    Raise InvalidROSPkgException if the package does not exist.
+    """
     return packages.resource_file(package, "srv", type_ + EXT)
 
 
@@ -77,14 +80,17 @@ def get_pkg_srv_specs(package: str) -> tuple[list[tuple[str, SrvSpec]], list[str
 def load_from_string(
     text: str, package_context: str = "", full_name: str = "", short_name: str = ""
 ) -> SrvSpec:
-    """Return the service spec from a definition's text. Raise genmsg.InvalidMsgSpec."""
+    """Return the service spec parsed from a definition's text. Raise genmsg.InvalidMsgSpec if the definition is invalid."""
     return load_srv_from_string(
         MsgContext.create_default(), text, full_name or f"{package_context}/{short_name}"
     )
 
 
 def load_from_file(file_name: str, package_context: str = "") -> tuple[str, SrvSpec]:
-    """Return the full name and spec of a service from its definition file. Raise genmsg.InvalidMsgSpec, OSError."""
+    """Return the full name and spec of a service from its definition file.
+
+    Raise genmsg.InvalidMsgSpec if the definition is invalid, OSError if the file cannot be read.
+    """
     short_name = Path(file_name).stem
     full_name = f"{package_context}/{short_name}" if package_context else short_name
     text = Path(file_name).read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""roslib.stacks: the stacks of rosbuild, which are folders with a stack.xml; catkin has metapackages instead.
+"""roslib.stacks: rosbuild's stacks, which are folders with a stack.xml; catkin uses metapackages instead.
 
 Source: http://wiki.ros.org/Stacks.
 """
@@ -37,7 +37,7 @@ class ROSStackException(Exception):
 
 
 class InvalidROSStackException(ROSStackException):
-    """There is no stack of this name."""
+    """There is no stack with this name."""
 
 
 def list_stacks_by_path(
@@ -59,7 +59,7 @@ def list_stacks(env: Mapping[str, str] | None = None) -> list[str]:
 
 
 def get_stack_dir(stack: str, env: Mapping[str, str] | None = None) -> str:
-    """Return the folder of a stack or metapackage. Raise InvalidROSStackException."""
+    """Return the folder of a stack or metapackage. Raise InvalidROSStackException if there is none."""
     folders = _stacks(env)
     if stack in folders:
         return folders[stack]
@@ -70,12 +70,18 @@ def get_stack_dir(stack: str, env: Mapping[str, str] | None = None) -> str:
 
 
 def get_stack_version(stack: str, env: Mapping[str, str] | None = None) -> str | None:
-    """Return the version of a metapackage; None for a stack, which has no version. Raise ResourceNotFound."""
+    """Return a metapackage's version, or None for a stack, which has no version.
+
+    Raise ResourceNotFound if neither exists.
+    """
     return None if stack in _stacks(env) else RosStack(_paths(env)).get_stack_version(stack)
 
 
 def stack_of(pkg: str, env: Mapping[str, str] | None = None) -> str | None:
-    """Return the stack that contains a package; None if none does. Raise InvalidROSPkgException."""
+    """Return the stack that contains a package, or None if none does.
+
+    Raise InvalidROSPkgException if there is no such package.
+    """
     folder = _packages(env).get(pkg) or str(get_pkg_dir(pkg))
     while os.path.dirname(folder) != folder:
         if os.path.exists(os.path.join(folder, STACK_FILE)):
@@ -87,7 +93,7 @@ def stack_of(pkg: str, env: Mapping[str, str] | None = None) -> str | None:
 def expand_to_packages(
     names: Sequence[str], env: Mapping[str, str] | None = None
 ) -> tuple[list[str], list[str]]:
-    """Return (packages, unknown names); stacks and metapackages are replaced by their packages."""
+    """Return (packages, unknown names), with stacks and metapackages replaced by their packages."""
     stacks, known = _stacks(env), _packages(env)
     packages: list[str] = []
     unknown = []
@@ -104,7 +110,7 @@ def expand_to_packages(
 
 
 def _paths(env: Mapping[str, str] | None) -> list[str] | None:
-    """Return the folders to search; None: use this process's."""
+    """Return the folders to search; None means the folders of this process's environment."""
     return None if env is None else _folders(env)
 
 
@@ -121,6 +127,6 @@ def _stacks(env: Mapping[str, str] | None) -> dict[str, str]:
 
 
 def _packages(env: Mapping[str, str] | None) -> dict[str, str]:
-    """Return the folders of rosbuild packages."""
+    """Return the folders of all rosbuild packages."""
     folders = (folder for path in _folders(env) for folder in folders_with(MANIFEST_FILE, path))
     return {os.path.basename(folder): folder for folder in folders}

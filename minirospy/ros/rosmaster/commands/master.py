@@ -286,7 +286,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
 
 
 def _announce(master: Master, where: Sequence[str], log_file: Path | None, *, quiet: bool) -> None:
-    """Print and log the master's URI, the recovered state, and the path of its log."""
+    """Print and log the master's URI, the recovered state, and the path to its log."""
     listening, *warnings = where
     if not quiet:
         logs = f"log file {log_file}" if log_file else "no log file"

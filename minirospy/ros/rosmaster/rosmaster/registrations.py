@@ -128,7 +128,7 @@ class NodeRef:
         self.clear()
 
     def clear(self) -> None:
-        """Remove all registrations; keep the name and API."""
+        """Remove all registrations, but not the name and API."""
         self.param_subscriptions: list[str] = []
         self.topic_subscriptions: list[str] = []
         self.topic_publications: list[str] = []

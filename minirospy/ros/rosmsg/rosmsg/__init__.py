@@ -56,27 +56,30 @@ class ROSMsgException(Exception):
 
 
 def get_msg_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """Return the text of a message type: expanded, or as in its file if ``raw``. Raise ROSMsgException."""
+    """Return a message type's text: expanded, or as in its file if ``raw``. Raise ROSMsgException if the type is unknown."""
     return _text(type_, raw, Kind.MESSAGE)
 
 
 def get_srv_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """Return the text of a service type: expanded, or as in its file if ``raw``. Raise ROSMsgException."""
+    """Return a service type's text: expanded, or as in its file if ``raw``. Raise ROSMsgException if the type is unknown."""
     return _text(type_, raw, Kind.SERVICE)
 
 
 def list_msgs(package: str, rospack: object = None) -> list[str]:
-    """Return the message types of a package. Raise rospkg.ResourceNotFound."""
+    """Return a package's message types. Raise rospkg.ResourceNotFound if the package does not exist."""
     return list_types(package, MODE_MSG)
 
 
 def list_srvs(package: str, rospack: object = None) -> list[str]:
-    """Return the service types of a package. Raise rospkg.ResourceNotFound."""
+    """Return a package's service types. Raise rospkg.ResourceNotFound if the package does not exist."""
     return list_types(package, MODE_SRV)
 
 
 def list_types(package: str, mode: str = MODE_MSG, rospack: object = None) -> list[str]:
-    """Return the types of a package. Raise rospkg.ResourceNotFound, ValueError on an unknown mode."""
+    """Return a package's types.
+
+    Raise rospkg.ResourceNotFound if the package does not exist, ValueError if the mode is unknown.
+    """
     from minirospy.ros.rospkg.rospkg.common import ResourceNotFound
 
     if not isinstance(package, str):
@@ -88,7 +91,7 @@ def list_types(package: str, mode: str = MODE_MSG, rospack: object = None) -> li
 
 
 def rosmsg_md5(mode: str, type_: str) -> str:
-    """Return the md5sum of a type. Raise ROSMsgException."""
+    """Return a type's md5sum. Raise ROSMsgException if the type is unknown."""
     try:
         return _interfaces(_kind(mode)).md5sum(type_)
     except (NotFoundError, DefinitionError) as error:
@@ -96,13 +99,13 @@ def rosmsg_md5(mode: str, type_: str) -> str:
 
 
 def rosmsg_search(rospack: object, mode: str, base_type: str) -> Iterator[str]:
-    """Yield the full names of the types whose name without package is ``base_type``."""
+    """Yield the full name of each type whose name without the package is ``base_type``."""
     with contextlib.suppress(NotFoundError):
         yield from _interfaces(_kind(mode)).find(base_type)
 
 
 def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
-    """Yield (name, folder of its definitions) for each package that has definitions."""
+    """Yield (name, folder with its definitions) for each package that contains definitions."""
     packages = Packages()
     for name in Interfaces(packages, _kind(mode)).packages():
         yield name, str(packages.find(name) / mode.removeprefix("."))
@@ -111,7 +114,7 @@ def iterate_packages(rospack: object, mode: str) -> Iterator[tuple[str, str]]:
 def spec_to_str(msg_context: MsgContext, spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
     """Return a genmsg spec as `rosmsg show` prints it, indented by ``indent``; also write it to the stream ``buff``.
 
-    Raise KeyError if a message that it depends on is not in the context.
+    Raise KeyError if a message on which it depends is not in the context.
     """
     from minirospy.ros.genmsg.genmsg.msg_loader import lookup_in, parsed_message
 
@@ -175,7 +178,7 @@ def _run(mode: str, words: Sequence[str]) -> int:
 
 
 def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) -> list[str]:
-    """Return the names in a folder for which ``rfilter`` of their path is true; none if the folder does not exist."""
+    """Return the names in a folder for whose path ``rfilter`` is true; none if the folder does not exist."""
     if not os.path.isdir(path):
         return []
     return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]
@@ -201,13 +204,13 @@ def _plain(value: object) -> object:
 
 
 def _width(plain: object) -> int:
-    """Return the number of entries of the longest dictionary or list."""
+    """Return the number of entries in the longest dictionary or list."""
     inner = list(plain.values()) if isinstance(plain, dict) else plain if isinstance(plain, list) else []
     return max(len(inner), *map(_width, inner), 0)
 
 
 def _get_package_paths(pkgname: str, rospack: RosPack) -> list[str]:
-    """Return the folders of a package's definitions, for programs that load them with genmsg."""
+    """Return the folders with a package's definitions, for programs that load them with genmsg."""
     return [rospack.get_path(pkgname)]
 
 

@@ -88,14 +88,14 @@ def _ping(node: str | None, all: bool, count: int) -> int:
 
 
 def _no_node_to_ping() -> Misuse:
-    """Return the error for a missing node name; it lists the nodes if a master answers."""
+    """Return the error for a missing node name; it lists the nodes if a master responds."""
     try:
         with Graph.open("rosnode") as graph:
             nodes = list_nodes(graph)
     except MasterUnreachableError:
         return Misuse("please enter a node to ping", "Please enter a node to ping")
     available = "".join(f"\n{name}" for name in nodes)
-    # ROS prints the error twice, because its list of nodes is an error inside the error.
+    # ROS prints the error twice, because its list of nodes contains the error message.
     ros = f"Please enter a node to ping. Available nodes are:{available}\n{_ping_parser().usage_line()}\n\n"
     return Misuse(
         f"please enter a node to ping: {' '.join(nodes) or 'there are none'}",
@@ -136,7 +136,7 @@ def _ping_all(graph: Graph) -> int:
 
 
 def _no_answer(error: NodeUnreachableError) -> str:
-    """Return ROS's error message for a node that does not answer."""
+    """Return ROS's error message for a node that does not respond."""
     if is_unknown_host(error):
         return f"ERROR: Unknown host [{node_host(error.uri)}] for node [{error.name}]"
     if is_timeout(error):
@@ -145,7 +145,7 @@ def _no_answer(error: NodeUnreachableError) -> str:
 
 
 def _ping_once(graph: Graph, node: NodeAddress, times: list[float]) -> None:
-    """Ping and print; append the milliseconds to ``times`` before the line is printed, in case Ctrl-C arrives."""
+    """Ping and print; append the milliseconds to ``times`` before the line is printed, in case Ctrl-C is pressed."""
     times.append(ping_node(graph, node, _PING_SECONDS) * 1000.0)
     print(f"xmlrpc reply from {node.uri}\ttime={times[-1]:f}ms", flush=True)
 
@@ -287,7 +287,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """Return the existing nodes of ``names``; print an error for each of the others."""
+    """Return those of ``names`` that exist as nodes; print an error for each of the others."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:

@@ -61,23 +61,26 @@ class ROSNodeException(Exception):
 
 
 class ROSNodeIOException(ROSNodeException):
-    """The master or the node does not answer."""
+    """The master or the node does not respond."""
 
 
 def get_node_names(namespace: str | None = None) -> list[str]:
-    """Return the names of the nodes at or below ``namespace``. Raise ROSNodeIOException."""
+    """Return the names of the nodes at or below ``namespace``. Raise ROSNodeIOException if the master does not respond."""
     with _graph() as graph:
         return nodes.list_nodes(graph, graph.resolve(namespace) if namespace else "/")
 
 
 def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = False) -> str | None:
-    """Return the URI of a node; None if the master does not know it. The master is always queried."""
+    """Return a node's URI, or None if the node is not registered. The master is always queried."""
     with _graph(master) as graph:
         return graph.node_uri(caller_id)
 
 
 def get_node_info_description(node_name: str) -> str:
-    """Return the master's information about a node, as `rosnode info` prints it. Raise ROSNodeIOException."""
+    """Return the master's information about a node, as `rosnode info` prints it.
+
+    Raise ROSNodeIOException if the master does not respond.
+    """
     with _graph() as graph:
         name = graph.resolve(node_name)
         try:
@@ -89,7 +92,7 @@ def get_node_info_description(node_name: str) -> str:
 def get_node_connection_info_description(node_api: str, master: masterapi.Master) -> str:
     """Return the process id and connections of the node at the URI ``node_api``, as `rosnode info` prints them.
 
-    Raise ROSNodeIOException if the node does not answer.
+    Raise ROSNodeIOException if the node does not respond.
     """
     with _graph(master) as graph:
         try:
@@ -101,9 +104,11 @@ def get_node_connection_info_description(node_api: str, master: masterapi.Master
 def rosnode_ping(
     node_name: str, max_count: int | None = None, verbose: bool = False, skip_cache: bool = False
 ) -> bool:
-    """Return whether a node answers ``max_count`` pings (None: until one fails). Raise ROSNodeIOException.
+    """Return whether a node responds to ``max_count`` pings (None: until one fails).
 
-    The reason of a failure is printed to stderr; everything else only with ``verbose``.
+    Raise ROSNodeIOException if the master does not respond. The reason for a failure is printed to stderr; everything
+    else only
+    with ``verbose``.
     """
     with _graph() as graph:
         name = graph.resolve(node_name)
@@ -127,7 +132,7 @@ def rosnode_ping(
 
 
 def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[list[str], list[str]]:
-    """Return (nodes that answer, nodes that do not). Raise ROSNodeIOException."""
+    """Return (nodes that respond, nodes that do not). Raise ROSNodeIOException if the master does not respond."""
     answering: list[str] = []
     silent: list[str] = []
     with _graph() as graph:
@@ -143,7 +148,7 @@ def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[l
 
 
 def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
-    """Request nodes to shut down; return (notified, unknown or unreachable). Without a master, all are unknown."""
+    """Request that nodes shut down; return (notified nodes, unknown or unreachable nodes). Without a master, all are unknown."""
     notified: list[str] = []
     unknown: list[str] = []
     try:
@@ -165,7 +170,7 @@ def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
 def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str]) -> None:
     """Unregister the nodes in ``blacklist`` from the master, and print their names.
 
-    Raise ConnectionRefusedError if no master answers, as in ROS.
+    Raise ConnectionRefusedError if no master responds, as in ROS.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         # Called even if the list is empty, because an unreachable master is an error.
@@ -178,7 +183,7 @@ def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str])
 def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str]) -> None:
     """Unregister all nodes except those in ``whitelist`` from the master.
 
-    Raise ConnectionRefusedError if no master answers, as in ROS.
+    Raise ConnectionRefusedError if no master responds, as in ROS.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         for node in graph.addresses(name for name in nodes.list_nodes(graph) if name not in whitelist):
@@ -212,7 +217,10 @@ def rosnode_listnodes(namespace: str | None = None, list_uri: bool = False, list
 
 
 def rosnode_info(node_name: str, quiet: bool = False) -> None:
-    """Print the output of `rosnode info`; ``quiet``: do not query the node. Raise ROSNodeIOException."""
+    """Print the output of `rosnode info`; ``quiet``: do not query the node.
+
+    Raise ROSNodeIOException if the master does not respond.
+    """
     print(f"{_RULE}\n{get_node_info_description(node_name)}")
     if quiet:
         return
@@ -227,7 +235,7 @@ def rosnode_info(node_name: str, quiet: bool = False) -> None:
 
 
 def rosnode_cleanup() -> None:
-    """Run `rosnode cleanup` with its confirmation prompt. Raise ROSNodeIOException."""
+    """Run `rosnode cleanup` with its confirmation prompt. Raise ROSNodeIOException if the master does not respond."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     with _graph() as graph:
@@ -276,7 +284,7 @@ def _sub_rosnode_listnodes(
 
 
 def _succeed(args: Sequence[object]) -> object:
-    """Return the value of an answer (code, status message, value). Raise ROSNodeException if it is an error."""
+    """Return the value in a response (code, status message, value). Raise ROSNodeException if the response is an error."""
     code, text, value = args
     if code != 1:
         raise ROSNodeException(f"remote call failed: {text}")
@@ -288,7 +296,7 @@ def _announce(name: str) -> None:
 
 
 def _ping(graph: Graph, node: NodeAddress, verbose: bool) -> float | None:
-    """Return the seconds that a ping takes; print an error and return None if the node does not answer."""
+    """Return the duration of a ping in seconds; print an error and return None if the node does not respond."""
     try:
         seconds = nodes.ping_node(graph, node, _PING_SECONDS)
     except NodeUnreachableError as error:
@@ -310,7 +318,7 @@ def _address(host: str) -> str | None:
 def _graph(
     master: masterapi.Master | None = None, unreachable: type[Exception] = ROSNodeIOException
 ) -> Iterator[Graph]:
-    """Yield the graph of ``master``, or by default the environment's; raise errors as this module's exceptions."""
+    """Yield the graph of ``master`` (default: the environment's master); convert errors to this module's exceptions."""
     # Old scripts pass a ServerProxy, which returns an object for any attribute, but never a string.
     uri = getattr(master, "master_uri", None)
     try:

@@ -1,10 +1,9 @@
 """rospack, rosstack: find packages and their dependencies.
 
-rosstack treats metapackages as packages; rospack does not. Output, error messages and exit
-statuses are theirs: http://docs.ros.org/api/rospack/html/commandline.html. Parsed without argparse, for speed, since
-shells and
-scripts call `rospack find` often. Intended differences: an invalid package.xml is an error only for packages that depend on
-it, conditions are evaluated, and a dependency cycle is an error only for the packages in it.
+rosstack treats metapackages as packages; rospack does not. Output, error messages and exit statuses are the same as
+those of ROS: http://docs.ros.org/api/rospack/html/commandline.html. The command line is parsed without argparse, for
+speed, because shells and scripts call `rospack find` often. Intended differences: an invalid package.xml is an error only
+for packages that depend on it, conditions are evaluated, and a dependency cycle is an error only for the packages in it.
 """
 
 from __future__ import annotations
@@ -146,7 +145,7 @@ def _parse(words: list[str], tool: _Tool) -> _Line:
 
 
 def _checked(line: _Line, tool: _Tool) -> _Verb:
-    """Return the verb of a command line. Raise _RospackError if it does not exist or does not support the options."""
+    """Return a command line's verb. Raise _RospackError if it does not exist or does not support the options."""
     verb = tool.verbs.get(line.verb)
     if verb is None:
         raise _RospackError(f"command {line.verb} not implemented{did_you_mean(line.verb, tool.verbs)}")
@@ -169,9 +168,9 @@ def _not_found(tool: _Tool, verb: str, error: NotFoundError) -> str:
 
 
 def _package(line: _Line, *others: str, said: str = "package") -> str:
-    """Return the package of a command line, or the current folder's.
+    """Return the package given on a command line, or the current folder's package.
 
-    Raise _RospackError if there is none, or it is in ``others``.
+    Raise _RospackError if there is none, or if it is in ``others``.
     """
     package = line.package or _package_here()
     if not package or not all(line.options.get(name) for name in others):
@@ -233,7 +232,7 @@ def _depends_manifests(line: _Line, tree: Dependencies) -> None:
 
 
 def _depends_msgsrv(line: _Line, tree: Dependencies) -> None:
-    # rosbuild created these files when it generated messages; catkin packages do not have them.
+    # rosbuild created these files when it generated messages; catkin packages do not contain them.
     tree.all(_package(line))
     print()
 
@@ -257,7 +256,7 @@ def _rosdep0(line: _Line, tree: Dependencies) -> None:
 
 
 def _vcs(line: _Line, tree: Dependencies) -> None:
-    # <versioncontrol> is a tag of manifest.xml that package.xml does not have.
+    # <versioncontrol> is a tag in manifest.xml that does not exist in package.xml.
     tree.folder(_package(line))
 
 
@@ -281,7 +280,7 @@ def _export(line: _Line, tree: Dependencies) -> None:
 
 
 def _exported(line: _Line, tree: Dependencies, package: str, tag: str, attribute: str) -> list[str]:
-    """Return the distinct values of an attribute in the exports of a package and all of its dependencies."""
+    """Return an attribute's distinct values in the exports of a package and of all its dependencies."""
     own = [] if "deps-only" in line.options else [package]
     found: dict[str, None] = {}
     for name in [*own, *reversed(tree.all(package))]:

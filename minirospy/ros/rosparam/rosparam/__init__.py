@@ -65,7 +65,7 @@ class RosParamException(Exception):
 
 
 class RosParamIOException(RosParamException):
-    """The master does not answer."""
+    """The master does not respond."""
 
 
 class _YamlError(RosParamException, yaml.YAMLError):
@@ -75,7 +75,7 @@ class _YamlError(RosParamException, yaml.YAMLError):
 def get_param(param: str) -> Any:
     """Return a parameter's value, with bytes and dates in xmlrpc.client's wrappers, as in ROS.
 
-    Raise rosgraph.MasterError if it is not set, or if the name is empty.
+    Raise rosgraph.MasterError if the parameter is not set, or if the name is empty.
     """
     with _graph() as graph:
         name = _resolve(graph, param)
@@ -86,7 +86,7 @@ def get_param(param: str) -> Any:
 
 
 def set_param(param: str, value: str, verbose: bool = False) -> None:
-    """Set a parameter from a YAML string. Raise RosParamException, also if it is not YAML."""
+    """Set a parameter from a YAML string. Raise RosParamException if the string is not YAML or the parameter cannot be set."""
     try:
         parsed = parse_value(value)
     except ValueTextError as error:
@@ -95,7 +95,7 @@ def set_param(param: str, value: str, verbose: bool = False) -> None:
 
 
 def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
-    """Set a parameter to a value; a dictionary does not delete other parameters of the namespace."""
+    """Set a parameter to a value; a dictionary does not delete the namespace's other parameters."""
     with _graph() as graph:
         target = graph.resolve(param) if isinstance(param, str) else _resolve(graph, param)
         for name, single in parameters.set_parameter(graph, target, _with_bytes(value)):
@@ -123,7 +123,7 @@ def upload_params(ns: str, values: object, verbose: bool = False) -> None:
 
 
 def delete_param(param: str, verbose: bool = False) -> None:
-    """Delete a parameter. Raise rosgraph.MasterError if it is not set, or if the name is empty."""
+    """Delete a parameter. Raise rosgraph.MasterError if the parameter is not set, or if the name is empty."""
     with _graph() as graph:
         name = _resolve(graph, param)
         try:
@@ -158,10 +158,10 @@ def list_params(ns: str) -> list[str]:
 def load_file(
     filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[tuple[object, str]]:
-    """Return [(values, namespace)] for each document in a YAML file; values may be of types that parameters cannot have.
+    """Return [(values, namespace)] for each document in a YAML file; values may have types that parameters do not support.
 
-    ``-`` or an empty name means stdin.
-    Raise RosParamException if it cannot be read; invalid YAML raises one that is also a yaml.YAMLError.
+    ``-`` or an empty name means stdin. Raise RosParamException if the file cannot be read; for invalid YAML, the exception
+    is also a yaml.YAMLError.
     """
     if not filename or filename == "-":
         if verbose:
@@ -200,7 +200,10 @@ def load_str(
 
 
 def dump_params(filename: str, param: str, verbose: bool = False) -> None:
-    """Write the parameters below a name to a file. Raise OSError, or rosgraph.MasterError if there are none."""
+    """Write the parameters below a name to a file.
+
+    Raise OSError if the file cannot be written, rosgraph.MasterError if there are no parameters.
+    """
     values = get_param(param)
     if verbose:
         print_params(values, param)
@@ -236,10 +239,10 @@ def _fullusage() -> NoReturn:
 
 
 def _resolve(graph: Graph, param: str) -> str:
-    """Return the global name of a parameter. An empty name would mean the namespace, and so all parameters in it.
+    """Return a parameter's global name. An empty name would mean the namespace, and therefore all parameters in it.
 
-    A value that is not a string raises the same error as in ROS, which sends it to the master: TypeError if XML-RPC has
-    no such type.
+    A value that is not a string raises the same error as in ROS, which sends the value to the master: TypeError if XML-RPC
+    does not support its type.
     """
     if not isinstance(param, str):
         check_sendable(param)

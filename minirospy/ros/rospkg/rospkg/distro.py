@@ -1,4 +1,4 @@
-"""rospkg.distro: the ROS distribution of the environment."""
+"""rospkg.distro: the environment's ROS distribution."""
 
 from __future__ import annotations
 
@@ -10,5 +10,5 @@ __all__ = ["current_distro_codename"]
 
 
 def current_distro_codename(env: Mapping[str, str] | None = None) -> str:
-    """Return ROS_DISTRO, or the last distribution of ROS 1 if it is not set."""
+    """Return ROS_DISTRO, or the last ROS 1 distribution if it is not set."""
     return folders.distro_codename(env)

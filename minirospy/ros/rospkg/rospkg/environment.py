@@ -47,27 +47,27 @@ def _compute_package_paths(ros_root: str | None, ros_package_path: str | None) -
 
 
 def _resolve_path(p: str) -> str:
-    """Return a path from a variable, with ``~`` at its start expanded."""
+    """Return a path from an environment variable, with ``~`` at its start expanded."""
     return os.path.expanduser(p) if p and p[0] == "~" else p
 
 
 def _resolve_paths(paths: str) -> str:
-    """Return the paths from a variable, with ``~`` at the start of each expanded."""
+    """Return the paths from an environment variable, with ``~`` at the start of each path expanded."""
     return os.pathsep.join(_resolve_path(path) for path in paths.split(os.pathsep) if path)
 
 
 def get_ros_root(env: Environ | None = None) -> str | None:
-    """Return ROS_ROOT, or None."""
+    """Return ROS_ROOT, or None if it is not set."""
     return _environ(env).get("ROS_ROOT")
 
 
 def get_ros_package_path(env: Environ | None = None) -> str | None:
-    """Return ROS_PACKAGE_PATH, or None."""
+    """Return ROS_PACKAGE_PATH, or None if it is not set."""
     return _environ(env).get("ROS_PACKAGE_PATH")
 
 
 def get_ros_paths(env: Environ | None = None) -> list[str]:
-    """Return the folders of ROS_PACKAGE_PATH, and those of minirospy's own packages."""
+    """Return the folders in ROS_PACKAGE_PATH, and those that contain minirospy's own packages."""
     named = _compute_package_paths(get_ros_root(env), get_ros_package_path(env))
     return list(dict.fromkeys([*named, *map(str, built_in_roots())]))
 
@@ -88,13 +88,13 @@ def get_test_results_dir(env: Environ | None = None) -> str:
 
 
 def get_etc_ros_dir(env: Environ | None = None) -> str:
-    """Return ROS_ETC_DIR, or the system's folder of ROS settings."""
+    """Return ROS_ETC_DIR, or the system's folder for ROS settings."""
     default = r"C:\opt\ros\etc" if sys.platform == "win32" else "/etc/ros"
     return _environ(env).get("ROS_ETC_DIR") or default
 
 
 def on_ros_path(p: str, env: Environ | None = None) -> bool:
-    """Return whether a path is in one of the folders in which packages are searched."""
+    """Return whether a path is in one of the folders that are searched for packages."""
     place = Path(p).resolve()
     return any(place.is_relative_to(Path(root).resolve()) for root in get_ros_paths(env))
 

@@ -1,4 +1,4 @@
-"""rospkg.manifest: the content of a package.xml in rospkg's form."""
+"""rospkg.manifest: a parsed package.xml, with rospkg's attributes."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class RosDep(NamedTuple):
 
 
 class Export:
-    """A tag in the exports of a package."""
+    """A tag in a package's exports."""
 
     def __init__(self, tag: str, attrs: Mapping[str, str], str: str) -> None:
         self.tag = tag
@@ -48,12 +48,12 @@ class Export:
         self.str = str
 
     def get(self, attr: str) -> str | None:
-        """Return the value of an attribute, or None."""
+        """Return an attribute's value, or None if the tag does not have the attribute."""
         return self.attrs.get(attr)
 
 
 class Manifest:
-    """The content of a package.xml in rospkg's form. ``filename`` is its path."""
+    """A parsed package.xml, with rospkg's attributes. ``filename`` is its path."""
 
     is_catkin = True
     brief = license_url = status = notes = ""
@@ -75,7 +75,7 @@ class Manifest:
         self.unknown_tags: list[str] = []
 
     def get_export(self, tag: str, attr: str, convert: bool = True) -> list[str]:
-        """Return the values of an attribute of the exports with this tag; if ``convert``, replace ``${prefix}`` by the folder."""
+        """Return an attribute's values in the exports with this tag; if ``convert``, replace ``${prefix}`` with the folder."""
         values = [export.attrs[attr] for export in self.exports if export.tag == tag and attr in export.attrs]
         folder = os.path.dirname(self.filename)
         return [value.replace("${prefix}", folder) if convert else value for value in values]
@@ -91,7 +91,10 @@ def _people(read: manifest.Manifest) -> str:
 
 
 def parse_manifest_file(dirpath: str, manifest_name: str = PACKAGE_FILE, rospack: object = None) -> Manifest:
-    """Return the package.xml in a folder; every dependency counts as a package. Raise InvalidManifest."""
+    """Return a folder's parsed package.xml; every dependency counts as a package.
+
+    Raise InvalidManifest if it cannot be parsed.
+    """
     from minirospy.workspace.manifest import read_manifest
 
     try:

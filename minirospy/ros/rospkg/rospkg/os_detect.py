@@ -1,7 +1,7 @@
 """rospkg.os_detect: detects the operating system's name, version and codename.
 
 All Linux distributions specify them in /etc/os-release, so one class replaces rospkg's detectors for single distributions.
-``ROS_OS_OVERRIDE`` (``ubuntu:22.04:jammy``) takes precedence.
+The environment variable ``ROS_OS_OVERRIDE`` (``ubuntu:22.04:jammy``) takes precedence.
 """
 
 from __future__ import annotations
@@ -93,11 +93,11 @@ _OF_FDO = {
 
 
 class OsNotDetected(Exception):
-    """This operating system is not the detector's."""
+    """The running operating system is not the one that the detector detects."""
 
 
 def read_os_release(filename: str | None = None) -> dict[str, str] | None:
-    """Return the values of an os-release file; None if the file does not exist."""
+    """Return the values in an os-release file, or None if the file does not exist."""
     for path in (filename,) if filename else ("/etc/os-release", "/usr/lib/os-release"):
         try:
             with open(path, encoding="utf-8", errors="replace") as file:
@@ -109,7 +109,7 @@ def read_os_release(filename: str | None = None) -> dict[str, str] | None:
 
 
 def read_issue(filename: str = "/etc/issue") -> list[str] | None:
-    """Return the words of /etc/issue; None if the file does not exist."""
+    """Return the words in /etc/issue, or None if the file does not exist."""
     try:
         with open(filename, encoding="utf-8", errors="replace") as file:
             return file.read().split()
@@ -130,11 +130,11 @@ class OsDetector:
         raise NotImplementedError("is_os unimplemented")
 
     def get_version(self) -> str:
-        """Return the system's version. Raise OsNotDetected."""
+        """Return the system's version. Raise OsNotDetected if another system is running."""
         raise NotImplementedError("get_version unimplemented")
 
     def get_codename(self) -> str:
-        """Return the system's codename. Raise OsNotDetected."""
+        """Return the system's codename. Raise OsNotDetected if another system is running."""
         raise NotImplementedError("get_codename unimplemented")
 
 
@@ -150,11 +150,11 @@ class FdoDetect(OsDetector):
         return self.release_info is not None
 
     def get_version(self) -> str:
-        """Return VERSION_ID. Raise OsNotDetected."""
+        """Return VERSION_ID. Raise OsNotDetected if another system is running."""
         return self._info().get("VERSION_ID", "")
 
     def get_codename(self) -> str:
-        """Return VERSION_CODENAME. Raise OsNotDetected."""
+        """Return VERSION_CODENAME. Raise OsNotDetected if another system is running."""
         release = self._info()
         codename = release.get("VERSION_CODENAME", "")
         if not codename and "(" in (version := release.get("VERSION", "")):
@@ -168,7 +168,7 @@ class FdoDetect(OsDetector):
 
 
 class LsbDetect(FdoDetect):
-    """Detects a Linux distribution by its name from `lsb_release`, which os-release has in lower case."""
+    """Detects a Linux distribution by its name from `lsb_release`, which os-release contains in lower case."""
 
     def __init__(self, lsb_name: str, get_version_fn: object = None) -> None:
         self.lsb_name = lsb_name
@@ -183,7 +183,7 @@ class Debian(LsbDetect):
 
 
 class _Platform(OsDetector):
-    """Detects a system by the name in Python's ``platform``."""
+    """Detects a system by the name that Python's ``platform`` module returns."""
 
     system = ""
 
@@ -192,13 +192,13 @@ class _Platform(OsDetector):
         return platform.system() == self.system
 
     def get_version(self) -> str:
-        """Return the system's version. Raise OsNotDetected."""
+        """Return the system's version. Raise OsNotDetected if another system is running."""
         if not self.is_os():
             raise OsNotDetected("called in incorrect OS")
         return self._version()
 
     def get_codename(self) -> str:
-        """Return an empty codename. Raise OsNotDetected."""
+        """Return an empty codename. Raise OsNotDetected if another system is running."""
         if not self.is_os():
             raise OsNotDetected("called in incorrect OS")
         return ""
@@ -238,7 +238,7 @@ class FreeBSD(_Platform):
 
 
 class OsDetect:
-    """Detects the operating system with a list of detectors; the first that matches wins."""
+    """Detects the operating system with a list of detectors; the first one that matches wins."""
 
     default_os_list: list[tuple[str, OsDetector]] = []
 
@@ -252,7 +252,7 @@ class OsDetect:
         OsDetect.default_os_list.append((os_name, os_detector))
 
     def detect_os(self, env: Mapping[str, str] | None = None) -> tuple[str, str, str]:
-        """Return name, version and codename. Raise OsNotDetected."""
+        """Return the system's name, version and codename. Raise OsNotDetected if no detector matches."""
         override = (os.environ if env is None else env).get("ROS_OS_OVERRIDE")
         if override:
             name, version, codename = (*override.split(":"), "", "")[:3]
@@ -267,7 +267,10 @@ class OsDetect:
         return self._found[:3]
 
     def get_detector(self, name: str | None = None) -> OsDetector | None:
-        """Return the detector with this name, or the one that matched. Raise KeyError, OsNotDetected."""
+        """Return the detector with this name, or the one that matched.
+
+        Raise KeyError if the name is unknown, OsNotDetected if no detector matches.
+        """
         if name is None:
             self.detect_os()
             return self._found[3] if self._found else None
@@ -281,15 +284,15 @@ class OsDetect:
         self._os_list.append((name, detector))
 
     def get_name(self) -> str:
-        """Return the name. Raise OsNotDetected."""
+        """Return the system's name. Raise OsNotDetected if no detector matches."""
         return (self._found or self.detect_os())[0]
 
     def get_version(self) -> str:
-        """Return the version. Raise OsNotDetected."""
+        """Return the system's version. Raise OsNotDetected if no detector matches."""
         return (self._found or self.detect_os())[1]
 
     def get_codename(self) -> str:
-        """Return the codename. Raise OsNotDetected."""
+        """Return the system's codename. Raise OsNotDetected if no detector matches."""
         return (self._found or self.detect_os())[2]
 
 

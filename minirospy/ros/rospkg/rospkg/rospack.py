@@ -1,7 +1,7 @@
 """rospkg's classes and functions, implemented with Packages and Dependencies; `import rospkg` re-exports them.
 
-Source: http://docs.ros.org/independent/api/rospkg/html/python_api.html. To tell packages from rosdep keys, rospkg reads
-rosdep's database; this module counts the names of packages that it finds as packages, and all others as rosdep keys.
+Source: http://docs.ros.org/independent/api/rospkg/html/python_api.html. To distinguish packages from rosdep keys, rospkg reads
+rosdep's database; this module treats names of packages that it finds as packages, and all other names as rosdep keys.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _Manager = TypeVar("_Manager", bound="ManifestManager")
 
 
 class ManifestManager:
-    """Packages or stacks below given folders. Results are cached: create a new object to see changes on disk."""
+    """Packages or stacks below the given folders. Results are cached: create a new object to see changes on disk."""
 
     def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
         self._ros_paths = get_ros_paths() if ros_paths is None else list(ros_paths)
@@ -67,20 +67,23 @@ class ManifestManager:
         return list(self._folders())
 
     def get_path(self, name: str) -> str:
-        """Return the folder of a package or stack. Raise ResourceNotFound."""
+        """Return the folder of a package or stack. Raise ResourceNotFound if it does not exist."""
         folders = self._folders()
         if name not in folders:
             raise ResourceNotFound(name, self._ros_paths, nearest(name, folders))
         return str(folders[name])
 
     def get_manifest(self, name: str) -> Manifest:
-        """Return the manifest of a package or stack. Raise ResourceNotFound, InvalidManifest."""
+        """Return the manifest of a package or stack.
+
+        Raise ResourceNotFound if it does not exist, InvalidManifest if its manifest cannot be parsed.
+        """
         return Manifest(self._read(name), *self._split(name))
 
     def get_depends(self, name: str, implicit: bool = True) -> Names:
-        """Return the direct dependencies of a package; with ``implicit``, also the indirect ones.
+        """Return a package's direct dependencies; with ``implicit``, also the indirect ones.
 
-        Raise ResourceNotFound, InvalidManifest.
+        Raise ResourceNotFound if a package does not exist, InvalidManifest if a manifest cannot be parsed.
         """
         if not implicit:
             return self._split(name)[0]
@@ -90,7 +93,7 @@ class ManifestManager:
         return list(found)
 
     def get_depends_on(self, name: str, implicit: bool = True) -> Names:
-        """Return the packages that depend on this one directly; with ``implicit``, also those that do so indirectly."""
+        """Return the packages that depend on this one directly; with ``implicit``, also those that depend on it indirectly."""
         found = []
         for other in self._folders():
             try:
@@ -124,7 +127,7 @@ class ManifestManager:
             raise InvalidManifest(str(error)) from error
 
     def _split(self, name: str) -> tuple[Names, Names]:
-        """Return the dependencies in a manifest: those that are packages, and those that are not."""
+        """Return a manifest's dependencies: those that are packages, and those that are not."""
         from minirospy.workspace.manifest import Kind
 
         left_out = {Kind.DOC, Kind.BUILDTOOL_EXPORT}
@@ -137,7 +140,7 @@ class ManifestManager:
             if each not in found:
                 found[each] = None
                 self._visit(each, found)
-                # Move the package behind its dependencies.
+                # Move the package after its dependencies.
                 found[each] = found.pop(each)
 
 
@@ -145,15 +148,15 @@ class RosPack(ManifestManager):
     """Finds packages."""
 
     def get_rosdeps(self, package: str, implicit: bool = True) -> Names:
-        """Return a package's dependencies that are not packages; with ``implicit``, also those of its dependencies.
+        """Return a package's dependencies that are not packages; with ``implicit``, also the dependencies of its dependencies.
 
-        Raise ResourceNotFound, InvalidManifest.
+        Raise ResourceNotFound if a package does not exist, InvalidManifest if a manifest cannot be parsed.
         """
         names = [package, *(self.get_depends(package) if implicit else [])]
         return list(dict.fromkeys(key for name in names for key in self._split(name)[1]))
 
     def stack_of(self, package: str) -> str | None:
-        """Return None, because catkin has no stacks. Raise ResourceNotFound."""
+        """Return None, because catkin has no stacks. Raise ResourceNotFound if the package does not exist."""
         self.get_path(package)
         return None
 
@@ -165,11 +168,17 @@ class RosStack(ManifestManager):
     """Finds metapackages."""
 
     def packages_of(self, stack: str) -> Names:
-        """Return the packages in a metapackage. Raise ResourceNotFound, InvalidManifest."""
+        """Return a metapackage's packages.
+
+        Raise ResourceNotFound if it does not exist, InvalidManifest if its manifest cannot be parsed.
+        """
         return self.get_depends(stack, implicit=False)
 
     def get_stack_version(self, stack: str) -> str:
-        """Return the version of a metapackage. Raise ResourceNotFound, InvalidManifest."""
+        """Return a metapackage's version.
+
+        Raise ResourceNotFound if it does not exist, InvalidManifest if its manifest cannot be parsed.
+        """
         return self._read(stack).version
 
     def _folders(self) -> dict[str, Path]:
@@ -190,7 +199,7 @@ def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[s
 
 
 def get_package_name(path: str) -> str | None:
-    """Return the package that contains a path; None if there is none."""
+    """Return the package that contains a path, or None if there is none."""
     place = Path(path).absolute()
     return next(filter(None, map(package_name, (place, *place.parents))), None)
 
@@ -198,7 +207,7 @@ def get_package_name(path: str) -> str | None:
 def expand_to_packages(
     names: Sequence[str], rospack: RosPack, rosstack: RosStack
 ) -> tuple[list[str], list[str]]:
-    """Return (packages, unknown names); metapackages are replaced by their packages."""
+    """Return (packages, unknown names), with metapackages replaced by their packages."""
     packages, unknown = [], []
     for name in dict.fromkeys(names):
         if name in rospack.list():
@@ -211,5 +220,5 @@ def expand_to_packages(
 
 
 def get_stack_version_by_dir(stack_dir: str) -> str:
-    """Return the version in a folder's package.xml. Raise InvalidManifest."""
+    """Return the version in a folder's package.xml. Raise InvalidManifest if the file cannot be parsed."""
     return parse_manifest_file(stack_dir).version

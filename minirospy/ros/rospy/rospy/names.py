@@ -111,7 +111,7 @@ def initialize_mappings(node_name: str) -> None:
 
 
 def resolve_name_without_node_name(name: str) -> str:
-    """Return the global name of a topic before init_node. Raise ValueError if the name is private."""
+    """Return a topic's global name before init_node. Raise ValueError if the name is private."""
     if is_private(name):
         raise ValueError("~name topics cannot be created before init_node() has been called")
     return current_session().identity.resolve_topic(name or "")

@@ -21,7 +21,10 @@ def convert_json_to_ros_message(
     check_types: bool = True,
     log_level: str = "error",
 ) -> object:
-    """Convert a JSON object to a message of the given type. Raise ValueError, TypeError, NotFoundError."""
+    """Convert a JSON object to a message of the given type.
+
+    Raise ValueError or TypeError if it does not match the type, NotFoundError if the type is unknown.
+    """
     return convert_dictionary_to_ros_message(
         message_type,
         json.loads(json_message),

@@ -1,6 +1,6 @@
 """rospy_message_converter.message_converter: converts messages to dicts, and back.
 
-Arrays of bytes (uint8[], char[]) are base64 strings in dicts, as in JSON; times have ``secs`` and ``nsecs``.
+Byte arrays (uint8[], char[]) are base64 strings in dicts, as in JSON; times have ``secs`` and ``nsecs``.
 """
 
 from __future__ import annotations
@@ -48,8 +48,7 @@ def convert_dictionary_to_ros_message(
 
     ``kind``: "message", or "request" or "response" of a service. Unknown fields raise ValueError; without ``strict_mode``
     they are only logged. With ``check_missing_fields``, a field without a value raises ValueError; with ``check_types``,
-    a value of
-    another type raises TypeError. Raise NotFoundError if the type is unknown.
+    a value of another type raises TypeError. Raise NotFoundError if the type is unknown.
     """
     if kind == "message":
         message = message_class(message_type)()
@@ -85,7 +84,7 @@ def convert_ros_message_to_dictionary(
 
 
 def _to_ros(name: str, type_: str, value: Any, options: tuple[bool, bool, bool, str]) -> object:
-    """Convert a value of a dict to a field's value. Raise TypeError, ValueError."""
+    """Convert a dict's value to a field's value. Raise TypeError if its type is wrong, ValueError if it is invalid."""
     if array := _ARRAY.match(type_):
         if array[1] in _BINARY:
             return _bytes_of(name, value)

@@ -29,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _service_parser(verb: str, description: str, missing: str = "service must be specified") -> Parser:
-    """Return the parser of a verb that needs a service name."""
+    """Return the parser for a verb that needs a service name."""
     parser = Parser(
         f"rosservice {verb}",
         description,
@@ -164,7 +164,7 @@ def _call(
 
 
 def _as_ros_shows(error: ServiceException, service: str) -> str:
-    """Return ROS's message for an error; an error of the service's handler is shown as bytes."""
+    """Return ROS's message for an error; an error from the service's handler is shown as bytes."""
     cause = error.__cause__
     if isinstance(cause, CallFailed):
         return f"service [{service}] responded with an error: {cause.text!r}"
@@ -172,7 +172,7 @@ def _as_ros_shows(error: ServiceException, service: str) -> str:
 
 
 def _incorrect_type(type_: str, error: MessageException) -> WordedError:
-    """Return the error for a request whose values do not fit, in ROS's words, which end with the definition."""
+    """Return the error for a request whose values do not match the type, in ROS's wording, which ends with the definition."""
     from minirospy.introspect.interfaces import Interfaces, Kind
     from minirospy.workspace.packages import Packages
 

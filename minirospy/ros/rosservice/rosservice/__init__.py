@@ -58,13 +58,13 @@ class ROSServiceException(Exception):
 
 
 class ROSServiceIOException(ROSServiceException):
-    """The master or the service does not answer."""
+    """The master or the service does not respond."""
 
 
 def get_service_list(
     node: str | None = None, namespace: str | None = None, include_nodes: bool = False
 ) -> list[Any]:
-    """Return the names of the services (of a node, below a namespace); with ``include_nodes``, as [name, [nodes]]."""
+    """Return the services' names (of a node, below a namespace); with ``include_nodes``, [name, [nodes]] for each."""
     with _graph() as graph:
         found = services.list_services(graph, graph.resolve(namespace) if namespace else "/")
         owner = _resolved(graph, node) if node else None
@@ -73,7 +73,7 @@ def get_service_list(
 
 
 def get_service_type(service_name: str) -> str | None:
-    """Return the type of a service; None if it does not exist. Raise ROSServiceIOException if it does not answer."""
+    """Return a service's type, or None if the service does not exist. Raise ROSServiceIOException if it does not respond."""
     with _graph() as graph:
         try:
             return services.service_type(graph, _sent(graph, service_name))
@@ -82,7 +82,7 @@ def get_service_type(service_name: str) -> str | None:
 
 
 def get_service_uri(service_name: str) -> str | None:
-    """Return the URI of a service; None if it does not exist."""
+    """Return a service's URI, or None if the service does not exist."""
     with _graph() as graph:
         try:
             return services.service_uri(graph, _sent(graph, service_name))
@@ -91,20 +91,23 @@ def get_service_uri(service_name: str) -> str | None:
 
 
 def get_service_node(service_name: str) -> str | None:
-    """Return the node that provides a service; None if it does not exist."""
+    """Return the node that provides a service, or None if the service does not exist."""
     with _graph() as graph:
         nodes = graph.state().services.get(_resolved(graph, service_name))
     return nodes[0] if nodes else None
 
 
 def get_service_args(service_name: str) -> str:
-    """Return the field names of a service's request, separated by spaces. Raise ROSServiceException."""
+    """Return the field names of a service's request, separated by spaces.
+
+    Raise ROSServiceException if the service or its type is not found.
+    """
     with _graph() as graph:
         return " ".join(services.service_arguments(services.service_type(graph, graph.resolve(service_name))))
 
 
 def get_service_class_by_name(service_name: str) -> ServiceClass:
-    """Return the class of a running service. Raise ROSServiceException if it does not exist or is not installed."""
+    """Return a running service's class. Raise ROSServiceException if the service does not exist or its type is not installed."""
     from minirospy.core.idl.load import service_class
 
     with _graph() as graph:
@@ -112,7 +115,7 @@ def get_service_class_by_name(service_name: str) -> ServiceClass:
 
 
 def rosservice_find(service_type: str) -> list[str]:
-    """Return the services of a type."""
+    """Return the services that have this type."""
     with _graph() as graph:
         if service_type:
             return services.find_services_of_type(graph, service_type)
@@ -124,7 +127,10 @@ def rosservice_find(service_type: str) -> list[str]:
 def call_service(
     service_name: str, service_args: Sequence[object], service_class: ServiceClass | None = None
 ) -> tuple[Message, Any]:
-    """Call a service; return (request, response), with the request filled with the values. Raise ROSServiceException."""
+    """Call a service; return (request, response), with the request built from the values.
+
+    Raise ROSServiceException if the call fails.
+    """
     with _graph() as graph:
         name = _sent(graph, service_name)
         type_ = service_class._type if service_class else services.service_type(graph, name)
@@ -133,7 +139,7 @@ def call_service(
 
 
 def get_service_headers(service_name: str, service_uri: str) -> dict[str, str]:
-    """Return the connection header of a service's answer. Raise ROSServiceIOException if it does not answer."""
+    """Return the connection header of a service's response. Raise ROSServiceIOException if the service does not respond."""
     if not isinstance(service_uri, str):
         raise ROSServiceException(
             f"Unable to communicate with service [{service_name}], address [{service_uri}]"
@@ -167,18 +173,18 @@ def _fullusage() -> None:
 
 
 def _resolved(graph: Graph, name: str) -> str:
-    """Return the global name. A value that is not a string is converted to one, which names nothing, as in ROS."""
+    """Return the global name. A value that is not a string is converted to one, which matches no service, as in ROS."""
     return graph.resolve(name) if isinstance(name, str) else str(name)
 
 
 def _sent(graph: Graph, name: str) -> str:
-    """Return the global name for a call to the master. Raise TypeError if XML-RPC has no such type."""
+    """Return the global name for a call to the master. Raise TypeError if XML-RPC does not support the value's type."""
     check_sendable(name)
     return _resolved(graph, name)
 
 
 def _get_master() -> masterapi.Master:
-    """Return the master with rosservice's caller id."""
+    """Return the master proxy with rosservice's caller id."""
     return masterapi.Master("/rosservice")
 
 

@@ -1,4 +1,4 @@
-"""`rostest` and `rosunit`: run the tests of a launch file or of a unit test file, and report the results.
+"""`rostest` and `rosunit`: run the tests in a launch file or a unit test file, and report the results.
 
 Source: http://wiki.ros.org/rostest/Commandline, http://wiki.ros.org/rosunit.
 """
@@ -96,7 +96,7 @@ def _rostest(
     from minirospy.ros.rostest.runner.runner import RosTest
 
     base = _base(results_base_dir)
-    # Delete the boards of the test's nodes at their exit, such as MINIROSPY_BOARD=$(anon test).
+    # Delete the test nodes' boards, such as MINIROSPY_BOARD=$(anon test), when the nodes exit.
     os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
     test = RosTest(
         package=package,
@@ -205,7 +205,10 @@ def _base(folder: str | None) -> Path:
 
 
 def _file(what: list[str], packages: Packages) -> Path:
-    """Return the launch file named on the command line. Raise MinirospyError."""
+    """Return the launch file named on the command line.
+
+    Raise MinirospyError if it does not exist or the arguments are invalid.
+    """
     if len(what) == 1:
         if Path(what[0]).is_file():
             return Path(what[0]).resolve()
@@ -222,7 +225,7 @@ def _file(what: list[str], packages: Packages) -> Path:
 
 
 def _package_of(file: Path, command: str, options: str) -> tuple[str, Path]:
-    """Return the package that contains a file, and the package's folder. Raise MinirospyError."""
+    """Return the package that contains a file, and the package's folder. Raise MinirospyError if no package contains it."""
     for folder in file.resolve().parents:
         name = package_name(folder)
         if name:

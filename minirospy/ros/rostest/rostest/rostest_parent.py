@@ -1,4 +1,4 @@
-"""rostest.rostest_parent: runs a launch file's nodes for its tests, one test after the other."""
+"""rostest.rostest_parent: runs a launch file's nodes for its tests, one test after another."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ __all__ = ["ROSTestLaunchParent"]
 
 
 class ROSTestLaunchParent(ROSLaunchParent):
-    """Runs the nodes of a configuration with a new master on a free port, and runs tests with them.
+    """Runs a configuration's nodes with a new master on a free port, and runs tests with them.
 
-    ``reuse_master``: use the master of ROS_MASTER_URI instead; ``clear`` first deletes its parameters. ``port`` has no effect.
+    ``reuse_master``: use the master at ROS_MASTER_URI instead; ``clear`` first deletes its parameters. ``port`` has no effect.
     """
 
     def __init__(
@@ -39,7 +39,10 @@ class ROSTestLaunchParent(ROSLaunchParent):
         self._open = ExitStack()
 
     def setUp(self) -> None:
-        """Start or connect to the master. Raise RLException, or MasterUnreachableError if a reused master does not answer."""
+        """Start or connect to the master.
+
+        Raise RLException if it cannot be started, MasterUnreachableError if a reused master does not respond.
+        """
         environment = self._open.enter_context(
             master_of_tests(Environment.read(), self.run_id, reuse=self.reuse_master, clear=self.clear)
         )
@@ -55,7 +58,10 @@ class ROSTestLaunchParent(ROSLaunchParent):
         return self.runner.launch()
 
     def run_test(self, test: Test) -> bool:
-        """Run a test until it exits; return whether its status is 0. Raise RLTestTimeoutException."""
+        """Run a test until it exits; return whether its exit status is 0.
+
+        Raise RLTestTimeoutException if the test exceeds its time limit.
+        """
         assert self.runner
         return self.runner.run_test(test)
 
@@ -65,4 +71,4 @@ class ROSTestLaunchParent(ROSLaunchParent):
         self._open.close()
 
     def _load_config(self) -> None:
-        """Keep the given configuration."""
+        """Use the configuration that was passed to the constructor."""

@@ -55,5 +55,5 @@ def printlogerr(msg: str, *args: object) -> None:
 
 
 def printRostestSummary(result: unittest.TestResult, rostest_results: Result) -> None:
-    """Print the summary of a run: the runner's result, and the results of its nodes."""
+    """Print a run's summary: the runner's result, and the results that the test nodes reported."""
     print_runner_summary(result, rostest_results, "ROSTEST")

@@ -1,4 +1,4 @@
-"""rostest.runner: the tests of a launch file as a class for unittest. Source: http://wiki.ros.org/rostest."""
+"""rostest.runner: a launch file's tests as a class for unittest. Source: http://wiki.ros.org/rostest."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _DEFAULT_TEST_PORT = 22422
 
 
 class _Run:
-    """The state of this process's tests."""
+    """The state of the tests in this process."""
 
     def __init__(self) -> None:
         self.results = Result("rostest")
@@ -71,7 +71,7 @@ def getResults() -> Result:
 
 
 def getConfig() -> ROSLaunchConfig | None:
-    """Return the configuration of the last test; None before the first test."""
+    """Return the last test's configuration, or None before the first test."""
     return _run.config
 
 
@@ -81,7 +81,7 @@ def getRostestParents() -> list[ROSTestLaunchParent]:
 
 
 def setTextMode(val: bool) -> None:
-    """Set whether tests print their results and write no result files."""
+    """Set whether tests print their results instead of writing result files."""
     _run.is_text = val
 
 
@@ -96,7 +96,7 @@ def failRunner(testName: str, message: str) -> TestMethod:
 
 
 def failDuplicateRunner(testName: str) -> TestMethod:
-    """Return a test method that fails because several tests have this name."""
+    """Return a test method that fails because several tests have the same name."""
 
     def fn(self: RosTestCase) -> None:
         print(f"Duplicate tests named [{testName}] in rostest suite")
@@ -108,7 +108,7 @@ def failDuplicateRunner(testName: str) -> TestMethod:
 def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None) -> TestMethod:
     """Return a test method that launches the nodes and runs a ``<test>``, with as many retries as its tag allows.
 
-    The results are read from its XML file, in the package's folder in ``results_base_dir``.
+    The test method reads the results from the test's XML file, in the package's folder in ``results_base_dir``.
     """
 
     def fn(self: RosTestCase) -> None:
@@ -159,7 +159,7 @@ def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None
 
 
 def setUp(self: RosTestCase) -> None:
-    """Prepare the launch of a test; used as a method of its class."""
+    """Prepare to launch a test; becomes the setUp method of the class that createUnitTest() returns."""
     self.test_parent = ROSTestLaunchParent(
         self.config, [self.test_file], reuse_master=self.reuse_master, clear=self.clear
     )
@@ -171,7 +171,7 @@ def setUp(self: RosTestCase) -> None:
 
 
 def tearDown(self: RosTestCase) -> None:
-    """Terminate the launch of a test; used as a method of its class."""
+    """Terminate a test's launch; becomes the tearDown method of the class that createUnitTest() returns."""
     printlog("tearDown[%s]", self.test_file)
     if self.test_parent:
         self.test_parent.tearDown()
@@ -185,7 +185,7 @@ def createUnitTest(
     clear: bool = False,
     results_base_dir: str | None = None,
 ) -> type[unittest.TestCase]:
-    """Return the TestCase class of a launch file's tests. Raise RLException if the file cannot be read."""
+    """Return the TestCase class for a launch file's tests. Raise RLException if the file cannot be read."""
     config = load_config_default([test_file], None)
     methods: dict[str, TestMethod] = {}
     for test in config.tests:

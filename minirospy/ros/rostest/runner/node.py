@@ -1,4 +1,4 @@
-"""The functions with which a test queries the graph and runs; ``import rostest`` re-exports this.
+"""The functions with which a test queries the graph and runs itself; ``import rostest`` re-exports them.
 
 Source: http://wiki.ros.org/rostest/Writing, http://wiki.ros.org/rospy/Overview.
 """
@@ -24,9 +24,9 @@ def rosrun(
     test: type[unittest.TestCase] | str,
     sysargs: Sequence[str] | None = None,
 ) -> None:
-    """Run a TestCase that is a node, as the main function of the file that a ``<test>`` names.
+    """Run a TestCase that is a node; called as the main function of the file that a ``<test>`` names.
 
-    Like rosunit.unitrun, but afterwards the node is shut down. Raise SystemExit(1) if a test fails.
+    Works like rosunit.unitrun, but then shuts the node down. Raise SystemExit(1) if a test fails.
     """
     try:
         unit.unitrun(package, test_name, test, sysargs)
@@ -42,7 +42,7 @@ def run(
     test: type[unittest.TestCase] | str,
     sysargs: Sequence[str] | None = None,
 ) -> None:
-    """Call rosrun. This is its old name."""
+    """Call rosrun; ``run`` is its old name."""
     rosrun(package, test_name, test, sysargs)
 
 
@@ -53,7 +53,7 @@ def unitrun(
     sysargs: Sequence[str] | None = None,
     coverage_packages: Sequence[str] | None = None,
 ) -> None:
-    """Call rosunit.unitrun. This is its old name."""
+    """Call rosunit.unitrun; this is an alias."""
     warnings.warn("rostest.unitrun is called rosunit.unitrun now", DeprecationWarning, stacklevel=2)
     unit.unitrun(package, test_name, test, sysargs, coverage_packages)
 
@@ -64,12 +64,12 @@ def get_master() -> MasterProxy:
 
 
 def is_publisher(topic: str, publisher_id: str) -> bool:
-    """Return whether a node publishes a topic; both are given by their global names."""
+    """Return whether a node publishes a topic; both are global names."""
     return publisher_id in _state().publishers.get(topic, ())
 
 
 def is_subscriber(topic: str, subscriber_id: str) -> bool:
-    """Return whether a node subscribes to a topic; both are given by their global names."""
+    """Return whether a node subscribes to a topic; both are global names."""
     return subscriber_id in _state().subscribers.get(topic, ())
 
 

@@ -31,13 +31,13 @@ _Item: TypeAlias = dict[str, Any]  # an item in a list parameter: a name, and th
 def main(name: str) -> None:
     """Run one of the test nodes, as the main function of its program."""
     test = _TESTS[name]
-    # In ROS the program defines the class itself, so the results have this module name.
+    # In ROS the program defines the class itself, so the results contain this module name.
     test.__module__ = "__main__"
     rosrun("rostest", name, test)
 
 
 class _NodeTest(unittest.TestCase):
-    """The base class of the tests: a node and its private parameters."""
+    """The base class for the tests: a node and its private parameters."""
 
     node: str
 
@@ -50,7 +50,7 @@ class _NodeTest(unittest.TestCase):
             self.fail(text)
 
     def param(self, name: str, default: object = _UNSET) -> Any:
-        """Return a private parameter; fail the test if it has neither value nor default."""
+        """Return a private parameter; fail the test if it has neither a value nor a default."""
         value = rospy.get_param(f"~{name}", None)
         if value is None and default is _UNSET:
             self.fail(
@@ -75,7 +75,7 @@ class _NodeTest(unittest.TestCase):
         return [{**each, "name": rospy.resolve_name(str(each["name"]))} for each in value]
 
     def limits(self, name: str) -> list[tuple[str, float, bool, _Item]]:
-        """Return (name, timeout, negative, item) for each item of a list parameter, the shortest timeout first."""
+        """Return (name, timeout, negative, item) for each item in a list parameter, the shortest timeout first."""
         found = [
             (each["name"], float(each.get("timeout", _WAIT_SECONDS)), bool(each.get("negative")), each)
             for each in self.listed(name)

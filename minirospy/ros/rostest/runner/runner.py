@@ -98,7 +98,7 @@ class RosTest:
                 return
 
     def _why_not(self, test: TestSpec) -> str:
-        """Return the reason why a test cannot run; empty if it can."""
+        """Return the reason why a test cannot run, or an empty string if it can run."""
         node = f"{test.node.package}/{test.node.type}"
         try:
             self.packages.find_executable(test.node.package, test.node.type)
@@ -180,7 +180,7 @@ class RosTest:
 
     @property
     def run_id(self) -> str:
-        """The name of the folder of the nodes' log files."""
+        """The name of the folder for the nodes' log files."""
         return f"rostest-{os.getpid()}"
 
     def _results_file(self, test: TestSpec) -> Path:
@@ -210,7 +210,7 @@ def master_of_tests(
     """Yield the environment with a new master on a free port, which has this run_id and is stopped after the block.
 
     ``reuse``: use the master that the environment specifies; ``clear`` deletes its parameters first.
-    Raise MasterUnreachableError if it does not answer.
+    Raise MasterUnreachableError if that master does not respond.
     """
     if reuse:
         with contextlib.closing(MasterProxy(environment.master_uri, "/rostest")) as master:

@@ -43,7 +43,7 @@ _CLOCK_SECONDS = 5.0
 
 
 class _PubParser(Parser):
-    """Accepts negative numbers as values although there is an option `-1`."""
+    """Accepts negative numbers as values, even though there is an option `-1`."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name, with the negative numbers among the values."""
@@ -155,7 +155,7 @@ class _Publishing(NamedTuple):
 
 def _publish(options: _Publishing, arguments: Arguments | None) -> None:
     """Publish, with the remapping arguments from the command line."""
-    # Imported here because the other verbs do not need message classes.
+    # Import it here because the other verbs do not need message classes.
     from minirospy.introspect.echo import fill_message
     from minirospy.introspect.publishing import publish_all, values_to_publish
 
@@ -163,7 +163,7 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
     with Graph.open("rostopic", arguments=arguments) as graph:
         topic = graph.resolve(options.topic)
         all_values = values_to_publish(cls.__slots__, options.args, options.file)
-        # Parse before the node is started, so that a typing error is reported immediately.
+        # Parse the values before the node is started, so that a typing error is reported immediately.
         values = _first_values(all_values, options)
         message = _filled(cls, values)
         state = graph.state()
@@ -174,7 +174,7 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
             raise UsageError(f"topic [{topic}]: {why}")
         else:
             warn_no_subscribers(topic, state.subscribers.keys() - {"/rosout"})
-    # A single message is latched for late subscribers; a stream of messages only on request.
+    # Latch a single message for late subscribers; latch a stream of messages only on request.
     from_documents = bool(not options.args and (cls.__slots__ or options.file))
     lasting = options.once or options.latch or (options.rate is None and not from_documents)
     with tool_node("rostopic", arguments, ros_time=options.use_rostime) as node:
@@ -191,7 +191,7 @@ def _publish(options: _Publishing, arguments: Arguments | None) -> None:
             return
         messages: Iterable[Message] = itertools.repeat(message)
         if from_documents:
-            # The first messages of a file would be lost before subscribers have connected.
+            # Wait for subscribers to connect; otherwise the first messages from a file would be lost.
             seconds = _REGISTERED_CONNECT_SECONDS if awaited else _CONNECT_SECONDS
             publisher.wait_for_subscriber(node.wait, seconds)
             messages = itertools.chain([message], map(filled, all_values))
@@ -217,7 +217,10 @@ def _message_class(type_: str) -> type[Message]:
 
 
 def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> list[object]:
-    """Return the values of the first message. Raise WordedError, or Misuse if an argument is not YAML."""
+    """Return the first message's values.
+
+    Raise WordedError if the file does not exist, Misuse if an argument is not YAML.
+    """
     try:
         return next(all_values)
     except NotFoundError as error:
@@ -229,7 +232,7 @@ def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> l
 
 
 def _ros_argument_error(text: str) -> str:
-    """Return ROS's error message for an argument that is not YAML, which comes from PyYAML's own parser."""
+    """Return ROS's error message for an argument that is not YAML; it contains the error of PyYAML's own parser."""
     import yaml
 
     try:

@@ -163,7 +163,7 @@ def _measure(
 
 
 def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list[str]:
-    """Return the global names of topics, even if one of their fields is given; warn of topics without a publisher."""
+    """Return the global names of topics, even if one of their fields is given; warn about topics without a publisher."""
     found = []
     with Graph.open("rostopic", arguments=arguments) as graph:
         for name in map(graph.resolve, names):

@@ -79,19 +79,19 @@ class ROSTopicException(Exception):
 
 
 class ROSTopicIOException(ROSTopicException):
-    """The master does not answer."""
+    """The master does not respond."""
 
 
 class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
-    """Also a socket error, as programs expect from ROS's get_topic_list."""
+    """Also a socket error, because programs expect one from ROS's get_topic_list."""
 
 
 def get_topic_type(
     topic: str, blocking: bool = False
 ) -> tuple[str | None, str | None, Callable[[Message], object] | None]:
-    """Return (type, topic, function that extracts the field from a message); three times None without such a topic.
+    """Return (type, topic, function that extracts the field from a message), or three times None if there is no such topic.
 
-    ``topic`` may include a field of the messages. ``blocking`` waits until the topic exists or the node shuts down.
+    ``topic`` may include a field of the messages. With ``blocking``, wait until the topic exists or the node shuts down.
     """
     with _graph() as graph:
         name = graph.resolve(topic)
@@ -111,7 +111,7 @@ def get_topic_type(
 def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
-    """Return get_topic_type()'s result, with the message class as type. Raise ROSTopicException if it is not installed."""
+    """Return get_topic_type()'s result, but with the message class as type. Raise ROSTopicException if it is not installed."""
     from minirospy.core.idl.load import get_message_class
 
     type_, real_topic, function = get_topic_type(topic, blocking)
@@ -132,15 +132,15 @@ def get_topic_list(master: masterapi.Master | None = None) -> tuple[list[_TopicR
 
 
 def find_by_type(topic_type: str) -> list[str]:
-    """Return the topics of a type."""
+    """Return the topics that have this type."""
     with _graph() as graph:
         return topics.find_topics_of_type(graph, topic_type)
 
 
 def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
-    """Return a function that extracts the field at a path (``/pose/x``) from a message; None for the whole message.
+    """Return a function that extracts the field at a path (``/pose/x``) from a message, or None for the whole message.
 
-    Also return None if a bracket in the path is invalid; print this error, and a message's missing field, to stderr.
+    Also return None if a bracket in the path is invalid. Print this error, and the error for a missing field, to stderr.
     """
     fields = [each for each in pattern.split("/") if each]
     try:
@@ -149,7 +149,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
         if faults := list(filter(None, map(_slice_fault, fields))):
             print(faults[0], file=sys.stderr)
             return None
-        # Treat it as a field name, which no message has.
+        # Treat the step as a field name, which no message has.
         steps = tuple(Step(each, None) for each in fields)
 
     def value(message: Message) -> object:
@@ -165,7 +165,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
 
 
 def _slice_fault(field: str) -> str:
-    """Return the error in the brackets of a field, in ROS's words; empty if there is none."""
+    """Return the error in a field's brackets, in ROS's wording, or an empty string if there is none."""
     name, bracket, rest = field.partition("[")
     if not bracket:
         return ""
@@ -185,7 +185,10 @@ def _slice_fault(field: str) -> str:
 
 
 def get_info_text(topic: str) -> str:
-    """Return a topic's type, publishers and subscribers, as `rostopic info` prints them. Raise ROSTopicException."""
+    """Return a topic's type, publishers and subscribers, as `rostopic info` prints them.
+
+    Raise ROSTopicException if the topic does not exist.
+    """
     from minirospy.introspect.texts import topic_text
 
     if topic is not None and not isinstance(topic, str):
@@ -198,7 +201,7 @@ def get_info_text(topic: str) -> str:
 
 
 def get_api(master: masterapi.Master, caller_id: str) -> str:
-    """Return a node's URI, or `unknown address` and its name. Raise ROSTopicIOException."""
+    """Return a node's URI, or `unknown address` with its name. Raise ROSTopicIOException if the master does not respond."""
     try:
         return master.lookupNode(caller_id)
     except masterapi.MasterException:
@@ -210,7 +213,7 @@ def get_api(master: masterapi.Master, caller_id: str) -> str:
 def create_publisher(
     topic_name: str, topic_type: str, latch: bool, disable_rostime: bool = True
 ) -> tuple[Publisher[Message], type[Message]]:
-    """Return (publisher, message class) for a topic and a type's name; call init_node if there is no node.
+    """Return (publisher, message class) for a topic and a type name; call init_node if this process is not a node yet.
 
     Raise ROSTopicException if the type is not installed.
     """
@@ -239,10 +242,10 @@ def publish_message(
     verbose: bool = False,
     substitute_keywords: bool = False,
 ) -> None:
-    """Publish a message of YAML values: ``rate`` times a second, else ``once`` for 3 seconds, else until shutdown.
+    """Publish a message built from YAML values: ``rate`` times a second, else ``once`` for 3 seconds, else until shutdown.
 
-    ``substitute_keywords``: replace `now` and `auto` in each message. Raise ROSTopicException if the values do
-    not fit.
+    ``substitute_keywords``: replace `now` and `auto` in each message. Raise ROSTopicException if the values do not
+    match the message's fields.
     """
     import rospy
 
@@ -280,7 +283,7 @@ def publish_message(
 
 
 def rostopicmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command; ``argv`` starts with its name. Exit the program on failure, as ROS's does."""
+    """Run the command; ``argv`` starts with its name. Exit the program on failure, as in ROS."""
     _command(list(sys.argv if argv is None else argv)[1:])
 
 
@@ -301,7 +304,7 @@ def _fullusage() -> NoReturn:
 def _rostopic_list_group_by_host(
     master: masterapi.Master, pubs: Sequence[_Topic], subs: Sequence[_Topic]
 ) -> tuple[dict[str, list[_Topic]], dict[str, list[_Topic]]]:
-    """Return host -> rows for the publishers, and the same for the subscribers; a row is (topic, type, nodes)."""
+    """Return host -> rows for the publishers, and the same for the subscribers; each row is (topic, type, nodes)."""
     hosts: dict[str, str] = {}
 
     def grouped(rows: Sequence[_Topic]) -> dict[str, list[_Topic]]:
@@ -317,18 +320,18 @@ def _rostopic_list_group_by_host(
 
 
 def _check_master() -> None:
-    """Raise ROSTopicIOException if no master answers."""
+    """Raise ROSTopicIOException if no master responds."""
     with _graph() as graph:
         graph.master.get_pid()
 
 
 def _master_get_topic_types(master: masterapi.Master) -> list[list[str]]:
-    """Return [[topic, type]] of all topics that the master knows."""
+    """Return [topic, type] for every topic that is registered with the master."""
     return master.getTopicTypes()
 
 
 def _sleep(duration: float) -> None:
-    """Wait for ``duration`` seconds on ROS's clock. Raise ROSInterruptException."""
+    """Wait for ``duration`` seconds on ROS's clock. Raise ROSInterruptException if the node shuts down."""
     import rospy
 
     rospy.rostime.wallsleep(duration)
@@ -344,19 +347,19 @@ def _rostopic_list(
     publishers_only: bool = False,
     group_by_host: bool = False,
 ) -> None:
-    """Print the output of `rostopic list`. Raise ROSTopicIOException."""
+    """Print the output of `rostopic list`. Raise ROSTopicIOException if the master does not respond."""
     _check_master()
     chosen = {"-v": verbose, "-s": subscribers_only, "-p": publishers_only, "--host": group_by_host}
     _command(["list", *(option for option, on in chosen.items() if on), *([topic] if topic else [])])
 
 
 def _rostopic_info(topic: str) -> None:
-    """Print the output of `rostopic info`. Raise ROSTopicException."""
+    """Print the output of `rostopic info`. Raise ROSTopicException if the topic does not exist."""
     print(get_info_text(topic))
 
 
 def _rostopic_type(topic: str) -> None:
-    """Print the output of `rostopic type`. Raise ROSTopicIOException."""
+    """Print the output of `rostopic type`. Raise ROSTopicIOException if the master does not respond."""
     _check_master()
     _command(["type", topic])
 
@@ -364,7 +367,7 @@ def _rostopic_type(topic: str) -> None:
 def _rostopic_echo(
     topic: str, callback_echo: CallbackEcho, bag_file: str | None = None, echo_all_topics: bool = False
 ) -> None:
-    """Pass the messages of a topic, or one of their fields, to ``callback_echo`` until it is done."""
+    """Pass a topic's messages, or one of their fields, to ``callback_echo`` until its ``done`` is true."""
     import rospy
 
     if bag_file:

@@ -121,5 +121,5 @@ def create_field_filter(echo_nostr: bool, echo_noarr: bool) -> FieldFilter:
 
 
 def create_value_transform(echo_nostr: bool, echo_noarr: bool) -> ValueTransform:
-    """Return a function of (value, type) that replaces strings or arrays by a placeholder."""
+    """Return a function of (value, type) that replaces strings or arrays with a placeholder."""
     return lambda value, type_: elided(value, str(type_ or ""), not echo_nostr, not echo_noarr)

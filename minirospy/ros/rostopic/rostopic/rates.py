@@ -27,9 +27,9 @@ Statistics = tuple[float, float, float, float, int]
 
 
 class ROSTopicHz:
-    """Measures the rate of topics: ``rospy.Subscriber(topic, rospy.AnyMsg, hz.callback_hz, callback_args=topic)``.
+    """Measures topic rates: ``rospy.Subscriber(topic, rospy.AnyMsg, hz.callback_hz, callback_args=topic)``.
 
-    ``window_size``: number of latest messages to use (-1: all). The clock is rospy's; with ``use_wtime``, the machine's.
+    ``window_size``: number of latest messages to use (-1: all). Uses rospy's clock, or with ``use_wtime`` the machine's clock.
     """
 
     def __init__(
@@ -52,7 +52,10 @@ class ROSTopicHz:
                 self._window(topic).add(now)
 
     def get_hz(self, topic: str | None = None) -> Statistics | None:
-        """Return (rate, minimum and maximum interval, standard deviation, messages); None if no new message has arrived."""
+        """Return (rate, minimum interval, maximum interval, standard deviation, messages).
+
+        Return None if no new message has arrived.
+        """
         report = self._report(topic)
         return report and (report.rate, report.min, report.max, report.std_dev, report.window)
 
@@ -69,7 +72,7 @@ class ROSTopicHz:
 
 
 class ROSTopicBandwidth:
-    """Measures the bandwidth of a topic: ``rospy.Subscriber(topic, rospy.AnyMsg, bw.callback)``.
+    """Measures a topic's bandwidth: ``rospy.Subscriber(topic, rospy.AnyMsg, bw.callback)``.
 
     ``times`` (seconds) and ``sizes`` (bytes) describe the latest ``window_size`` messages.
     """
@@ -119,7 +122,7 @@ class ROSTopicDelay:
             self._window.add(now, msg.header.stamp.to_sec())
 
     def get_delay(self) -> Statistics | None:
-        """Return (mean, minimum, maximum, standard deviation, messages); None if no new message has arrived."""
+        """Return (mean, minimum, maximum, standard deviation, messages), or None if no new message has arrived."""
         report = self._report()
         return report and (report.mean, report.min, report.max, report.std_dev, report.window)
 
@@ -135,7 +138,7 @@ class ROSTopicDelay:
 
 
 def _now() -> float:
-    # When the first message arrives, a subscriber has already imported rospy.
+    # A subscriber has already imported rospy when its first message arrives.
     from minirospy.client import get_time
 
     return get_time()

@@ -1,4 +1,4 @@
-"""rosunit.junitxml: files of test results."""
+"""rosunit.junitxml: test result files."""
 
 from minirospy.ros.rosunit.runner.junit import (
     Result,

@@ -1,4 +1,4 @@
-"""rosunit.pmon: processes that are watched, as roslaunch.pmon has them."""
+"""rosunit.pmon: watched processes, with the same names as in roslaunch.pmon."""
 
 from minirospy.ros.roslaunch.roslaunch.pmon import (
     Process,

@@ -29,7 +29,7 @@ _TERMINATE_SECONDS = 2.0
 
 @contextlib.contextmanager
 def interrupt_noted() -> Iterator[SignalSafeEvent]:
-    """Make Ctrl-C set the event instead of raising: an exception could leave behind a process that has just started."""
+    """Make Ctrl-C set the event instead of raising: an exception could leave a newly started process running."""
     noted = SignalSafeEvent()
     before = {number: signal.signal(number, lambda *_: noted.set()) for number in interrupt_signals()}
     try:
@@ -51,7 +51,7 @@ def run_bare(
 ) -> tuple[Result, TestCaseResult]:
     """Run a file, Python or executable, for at most ``seconds``; return (its results, the result of the run itself).
 
-    ``text``: the test prints and writes no results; then its exit status decides.
+    ``text``: the test prints and writes no results; the exit status then determines the result.
     """
     case = TestCaseResult("runTest")
     case.classname = "rosunit.baretest.BareTestCase"
@@ -80,7 +80,7 @@ def run_bare(
 
 
 def _run(command: list[str], seconds: float) -> int | None:
-    """Return the exit status; None after the time limit. Raise MinirospyError on Ctrl-C."""
+    """Return the exit status, or None if the time limit is reached. Raise MinirospyError on Ctrl-C."""
     with interrupt_noted() as interrupted, guard_children(), subprocess.Popen(command) as popen:
         end = time.monotonic() + seconds
         while (status := popen.poll()) is None and not interrupted.is_set() and time.monotonic() < end:

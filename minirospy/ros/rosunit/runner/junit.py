@@ -39,7 +39,7 @@ _RED, _GREEN = "1;31", "32"
 
 
 class TestInfo:
-    """The error of a test case: the exception's name, and its message with the traceback."""
+    """A test case's error: the exception's name, and its message with the traceback."""
 
     kind: ClassVar[str] = ""
     word: ClassVar[str] = ""
@@ -76,7 +76,7 @@ class TestFailure(TestInfo):
 class TestCaseResult:
     """One test case: its name and class, its duration in seconds, and its errors.
 
-    ``skipped`` is the reason for not running it.
+    ``skipped`` is the reason for not running the case.
     """
 
     def __init__(self, name: str) -> None:
@@ -134,7 +134,7 @@ class TestCaseResult:
 
 
 class Result:
-    """The results of a test suite: counts, captured output, and cases."""
+    """A test suite's results: counts, captured output, and cases."""
 
     def __init__(self, name: str, num_errors: int = 0, num_failures: int = 0, num_tests: int = 0) -> None:
         self.name = name
@@ -202,7 +202,7 @@ class Result:
 def read(test_file: str | os.PathLike[str], test_name: str) -> Result:
     """Return the results in a file, with cases named ``package.rosunit-name/case``.
 
-    An invalid file prints a warning and returns no cases.
+    If the file is invalid, print a warning and return no cases.
     """
     path = Path(test_file)
     if not path.is_file():
@@ -224,7 +224,10 @@ def read(test_file: str | os.PathLike[str], test_name: str) -> Result:
 
 
 def read_all(filter_: Sequence[str] = ()) -> Result:
-    """Read all results in the results folder, for the packages in ``filter_`` or for all; skip those of rostest itself."""
+    """Read all results in the results folder, for the packages in ``filter_`` or for all packages.
+
+    Skip the results of rostest itself.
+    """
     from minirospy.workspace.folders import results_dir
 
     root = Path(results_dir())
@@ -268,7 +271,7 @@ def headline(text: str) -> str:
 
 
 def coloured(text: str, colour: str) -> str:
-    """Return a text wrapped in a terminal colour code."""
+    """Return a string wrapped in a terminal colour code."""
     return f"\x1b[{colour}m{text}\x1b[0m"
 
 
@@ -280,7 +283,7 @@ def names_of(infos: Iterable[tuple[object, str]]) -> list[str]:
 def report(results: Result, runner_name: str, errors: int = 0, failed: Sequence[str] = ()) -> str:
     """Return a line for each case, then the counts.
 
-    ``errors`` and ``failed`` are the runner's own: tests that could not report their results.
+    ``errors`` and ``failed`` are the runner's own counts: tests that could not report their results.
     """
     errors, failures = errors + results.num_errors, len(failed) + results.num_failures
     is_good = not errors and not failures
@@ -309,7 +312,7 @@ def print_summary(junit_results: Result, runner_name: str = "ROSUNIT") -> None:
 
 
 def filter_nonprintable_text(text: str) -> str:
-    """Return the text with characters that XML does not allow written as ``&#x001B;``."""
+    """Return a string in which characters that XML does not allow are written as ``&#x001B;``."""
     return _NOT_IN_XML.sub(lambda match: f"&#x{ord(match[0]):04X};", text)
 
 

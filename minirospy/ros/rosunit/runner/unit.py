@@ -1,4 +1,4 @@
-"""Runs the unit tests of a TestCase in this process; writes JUnit XML and prints a summary. ``rosunit`` re-exports this.
+"""Runs a TestCase's unit tests in this process; writes JUnit XML and prints a summary. ``rosunit`` re-exports this.
 
 Source: http://wiki.ros.org/rosunit, http://wiki.ros.org/unittest.
 """
@@ -44,7 +44,7 @@ __all__ = [
 XML_OUTPUT_FLAG = "--gtest_output=xml:"
 _LINE = "-" * 61
 
-# Folders of modules whose lines are left out of tracebacks.
+# Folders of modules whose lines are omitted from tracebacks.
 _MACHINERY = {Path(unittest.__file__).parent, Path(__file__).parent}
 
 ExcInfo = tuple[type[BaseException], BaseException, TracebackType] | tuple[None, None, None]
@@ -57,11 +57,11 @@ def unitrun(
     sysargs: Sequence[str] | None = None,
     coverage_packages: Sequence[str] | None = None,
 ) -> None:
-    """Run a TestCase, given as its class or its name, as the main function of a test file.
+    """Run a TestCase, given as its class or its name; called as a test file's main function.
 
     With ``--text`` in ``sysargs`` (default: ``sys.argv``), print as unittest does; else write the results to
-    ``~/.ros/test_results/PACKAGE/rosunit-NAME.xml``, or to the file of ``--gtest_output=xml:FILE``. Raise SystemExit(1)
-    if a test fails. ``coverage_packages`` has no effect: run the file under coverage.py instead.
+    ``~/.ros/test_results/PACKAGE/rosunit-NAME.xml``, or to the file given by ``--gtest_output=xml:FILE``. Raise
+    SystemExit(1) if a test fails. ``coverage_packages`` has no effect: run the file under coverage.py instead.
     """
     arguments = sys.argv if sysargs is None else sysargs
     loader = unittest.TestLoader()
@@ -92,7 +92,7 @@ def create_xml_runner(
 
 
 def begin_results(file: Path) -> None:
-    """Create the file's folder, delete the file of an earlier run, and print the file's path."""
+    """Create the file's folder, delete an earlier run's file, and print the file's path."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.unlink(missing_ok=True)
     print(f"[ROSUNIT] Outputting test results to {file.absolute()}", flush=True)
@@ -101,14 +101,14 @@ def begin_results(file: Path) -> None:
 def xml_results_file(
     test_pkg: str, test_name: str, is_rostest: bool = False, env: Mapping[str, str] | None = None
 ) -> str:
-    """Return the path of a test's results: ``PACKAGE/rosunit-NAME.xml`` in the folder of test results."""
+    """Return the path of a test's results: ``PACKAGE/rosunit-NAME.xml`` in the folder for test results."""
     kind = "rostest" if is_rostest else "rosunit"
     name = test_name.replace("/", "_").replace(os.sep, "_")
     return os.path.join(results_dir(env), test_pkg, f"{kind}-{name}.xml")
 
 
 def rostest_name_from_path(pkg_dir: str, test_file: str) -> str:
-    """Return the results name of a test file: ``test/hz.test`` in its package becomes ``test_hz``."""
+    """Return the results name for a test file: ``test/hz.test`` in its package becomes ``test_hz``."""
     name = (
         test_file.removeprefix(pkg_dir).removeprefix(os.sep) if test_file.startswith(pkg_dir) else test_file
     )
@@ -116,7 +116,7 @@ def rostest_name_from_path(pkg_dir: str, test_file: str) -> str:
 
 
 def print_unittest_summary(result: unittest.TestResult) -> None:
-    """Print the counts of a run, and the names of the tests that did not pass."""
+    """Print a run's counts, and the names of the tests that did not pass."""
     is_good = result.wasSuccessful()
     print(f"{_LINE}\nSUMMARY:")
     print(coloured(" * RESULT: SUCCESS", "32") if is_good else " * RESULT: FAIL")
@@ -128,7 +128,7 @@ def print_unittest_summary(result: unittest.TestResult) -> None:
 def print_runner_summary(
     runner_results: unittest.TestResult, junit_results: Result, runner_name: str = "ROSUNIT"
 ) -> None:
-    """Print each case of the results that tests wrote, then the counts with the runner's own errors."""
+    """Print each case in the results that tests wrote, then the counts with the runner's own errors."""
     print(report(junit_results, runner_name, len(runner_results.errors), names_of(runner_results.failures)))
 
 
@@ -138,7 +138,7 @@ def print_runner_summary(
 class XMLTestRunner:
     """Runs tests, prints a line for each, and writes the results to a file (or stream) at the end.
 
-    The output of the tests goes only into the file.
+    The tests' output is written only to the file.
     """
 
     def __init__(self, stream: Path | TextIO | None = None) -> None:
@@ -205,7 +205,7 @@ class _Recorder(unittest.TestResult):
         self._note(test, (TestFailure if is_failure else TestError)(kind, text))
 
     def addUnexpectedSuccess(self, test: unittest.TestCase) -> None:
-        # Count it as a failure, as wasSuccessful() does.
+        # Count the unexpected success as a failure, as wasSuccessful() does.
         super().addUnexpectedSuccess(test)
         text = "the test was expected to fail, and did not"
         self.failures.append((test, text))
@@ -238,7 +238,7 @@ def _case_of(test: unittest.TestCase) -> TestCaseResult:
 
 
 def _told(err: ExcInfo) -> tuple[str, str]:
-    """Return the name of an exception, and its message with the traceback, without unittest's own lines."""
+    """Return an exception's name, and its message with the traceback, without unittest's own lines."""
     kind, error, trace = err
     if kind is None or error is None:
         return "", ""

@@ -81,7 +81,7 @@ def _doctor(others: Sequence[str], listen: bool, offline: bool, json: bool, args
     if machines and offline:
         raise Misuse(f"{machines[0]}: to try another machine needs the network")
 
-    # Suppress the log of the node that runs the checks: the checks report the same errors.
+    # Suppress the log of the node that runs the checks, because the checks report the same errors.
     logging.getLogger("minirospy").addHandler(logging.NullHandler())
     show = _show_json if json else _show
     counts = dict.fromkeys(Status, 0)
@@ -108,7 +108,7 @@ def _wait_for_signal() -> None:
     stop = threading.Event()
     for number in (*interrupt_signals(), signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    # In slices: on Windows a wait without a timeout is not interrupted by signals.
+    # Wait in slices: on Windows signals do not interrupt a wait without a timeout.
     while not stop.wait(0.5):
         pass
 

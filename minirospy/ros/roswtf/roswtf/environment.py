@@ -1,4 +1,4 @@
-"""roswtf.environment: the checks of paths and URIs that plugins of roswtf use."""
+"""roswtf.environment: the checks for paths and URIs that roswtf plugins use."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ def paths(path: str | None) -> list[str]:
 
 
 def is_executable(path: str) -> int:
-    """Return the permission bits that allow a file to be executed; 0 if there are none. Raise OSError."""
+    """Return the permission bits that allow a file to be executed, or 0 if there are none. Raise OSError if it does not exist."""
     mode = os.stat(path)[stat.ST_MODE]
     return mode & (stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
 
 
 def invalid_url(url: str | None) -> str | None:
-    """Return the error in a master's URI; None if it is valid."""
+    """Return the error in a master's URI, or None if the URI is valid."""
     if not url:
         return None
     scheme, _, rest = url.partition("://")

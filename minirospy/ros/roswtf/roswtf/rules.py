@@ -1,4 +1,4 @@
-"""roswtf.rules: convert the return values of checks to errors and warnings of a context.
+"""roswtf.rules: convert the checks' return values to errors and warnings in a context.
 
 A rule is a pair (check, message); a check returns the problem, or a false value. A list is shown item by item.
 """
@@ -14,7 +14,7 @@ __all__ = ["error_rule", "warning_rule"]
 
 
 class Context(Protocol):
-    """The object that the rules of roswtf check."""
+    """The object that roswtf's rules check."""
 
     errors: list[WtfError]
     warnings: list[WtfError]

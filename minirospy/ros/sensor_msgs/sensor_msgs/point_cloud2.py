@@ -1,4 +1,4 @@
-"""sensor_msgs.point_cloud2: converts the points of a PointCloud2 to tuples or numpy arrays, and back.
+"""sensor_msgs.point_cloud2: converts a PointCloud2's points to tuples or numpy arrays, and back.
 
 Source: http://docs.ros.org/api/sensor_msgs/html/point__cloud2_8py.html. ``read_points_numpy`` and arrays as ``points`` of
 ``create_cloud`` are from sensor_msgs_py.
@@ -50,7 +50,7 @@ _DATATYPES: dict[int, tuple[str, int]] = {
 }
 """A field's datatype -> its format character and size in bytes."""
 
-_BLOCK = 4_096  # points read at a time, so that they fit the processor's cache
+_BLOCK = 4_096  # points read at a time, chosen so that they fit into the processor's cache
 
 _FEW = 1_000  # with fewer points than this, numpy is slower than plain Python
 
@@ -70,10 +70,10 @@ def read_points(
     skip_nans: bool = False,
     uvs: Iterable[tuple[int, int]] = (),
 ) -> Iterator[Point]:
-    """Yield a tuple of values for each point: those of ``field_names``, in the order of their offsets.
+    """Yield a tuple of values for each point: the values of ``field_names``, in the order of their offsets.
 
-    ``skip_nans`` leaves out points with a NaN in one of them; ``uvs`` selects the points to yield, as (column, row).
-    Raise AssertionError if it is not a PointCloud2, struct.error if the data ends before the last point.
+    ``skip_nans`` omits points with a NaN in one of them; ``uvs`` selects the points to yield, as (column, row).
+    Raise AssertionError if ``cloud`` is not a PointCloud2, struct.error if the data ends before the last point.
     """
     _check_type(cloud)
     columns = _columns(cloud.fields, field_names)
@@ -85,7 +85,7 @@ def read_points(
         return
 
     for offset, shape in _blocks(cloud):
-        # Creating the tuples takes most of the time; zip does it fastest, and reuses a tuple that the caller has
+        # Creating the tuples takes most of the time; zip is the fastest way, and reuses a tuple that the caller has
         # dropped.
         yield from zip(*_values(cloud, columns, offset, shape, skip_nans=skip_nans), strict=True)
 
@@ -96,15 +96,18 @@ def read_points_list(
     skip_nans: bool = False,
     uvs: Iterable[tuple[int, int]] = (),
 ) -> list[Point]:
-    """Return the points of ``read_points`` as a list of namedtuples. Raise its errors, and TypeError."""
+    """Return the points of ``read_points`` as a list of namedtuples.
+
+    Raise the errors that read_points raises, and TypeError if a field has more than one value.
+    """
     _check_type(cloud)
     if field_names is None:
         field_names = [field.name for field in cloud.fields]
     named = namedtuple("Point", field_names)  # type: ignore[misc]
 
     points = read_points(cloud, field_names, skip_nans, uvs)
-    # Raise TypeError if a field has more than one value. One point is enough, since all have the same number of
-    # values.
+    # Raise TypeError if a field has more than one value. One point is enough, because all points have the same number
+    # of values.
     first: list[Point] = [named._make(point) for point in islice(points, 1)]
     return first + list(map(functools.partial(tuple.__new__, named), points))
 
@@ -120,7 +123,7 @@ def read_points_numpy(
 
     With ``reshape_organized_cloud`` its shape is (height, width, values). The array is a read-only view of the message's
     data if the values have one type and are evenly spaced, as x, y, z are; else a copy, with a type that can represent all.
-    Raise AssertionError if it is not a PointCloud2, ValueError if a field or data is missing.
+    Raise AssertionError if ``cloud`` is not a PointCloud2, ValueError if a field or data is missing.
     """
     _check_type(cloud)
     fields = {field.name: field for field in cloud.fields}
@@ -173,7 +176,7 @@ def create_cloud(
 
 
 def create_cloud_xyz32(header: Header, points: Sequence[Iterable[float]] | Values) -> PointCloud2:
-    """Return a cloud of points with x, y and z as 32-bit floats. Raise struct.error."""
+    """Return a cloud of points with x, y and z as 32-bit floats. Raise struct.error if a point does not have three numbers."""
     return create_cloud(
         header, [PointField(name, 4 * at, PointField.FLOAT32, 1) for at, name in enumerate("xyz")], points
     )
@@ -187,12 +190,12 @@ def _check_type(cloud: PointCloud2) -> None:
 def _get_struct_fmt(
     is_bigendian: bool, fields: Iterable[PointField], field_names: Collection[str] | None = None
 ) -> str:
-    """Return the ``struct`` format of a point. Programs use this function, although it is private in ROS, too."""
+    """Return a point's ``struct`` format. Programs use this function, although it is private in ROS, too."""
     return _format(is_bigendian, _columns(fields, field_names))
 
 
 def _columns(fields: Iterable[PointField], field_names: Collection[str] | None) -> list[Column]:
-    """Return the columns of the fields with these names, read one after the other as in ROS, even if they overlap."""
+    """Return the columns for the fields with these names, read one after another as in ROS, even if they overlap."""
     columns, end = [], 0
     for field in sorted(fields, key=lambda each: each.offset):
         if field_names is not None and field.name not in field_names:
@@ -223,7 +226,7 @@ def _offsets(cloud: PointCloud2) -> Iterator[int]:
 
 
 def _is_whole(cloud: PointCloud2, size: int) -> bool:
-    """Return whether the data is bytes, and contains all of ``point_step`` for each point."""
+    """Return whether the data is bytes, and contains ``point_step`` bytes for each point."""
     if not isinstance(cloud.data, bytes | bytearray | memoryview) or not 0 < size <= cloud.point_step:
         return False
     return len(cloud.data) >= (cloud.height - 1) * cloud.row_step + cloud.width * cloud.point_step
@@ -233,7 +236,7 @@ def _blocks(cloud: PointCloud2) -> Iterator[tuple[int, tuple[int, int]]]:
     """Yield the byte offset and (rows, columns) of each block of a cloud, in the order of the points."""
     height, width = cloud.height, cloud.width
     if cloud.row_step == width * cloud.point_step:
-        # Without padding between the rows, treat them as one row.
+        # If there is no padding between the rows, treat them as one row.
         height, width = 1, height * width
     rows = max(1, _BLOCK // width)
     for row in range(0, height, rows):
@@ -245,7 +248,7 @@ def _blocks(cloud: PointCloud2) -> Iterator[tuple[int, tuple[int, int]]]:
 def _values(
     cloud: PointCloud2, columns: Iterable[Column], offset: int, shape: tuple[int, int], *, skip_nans: bool
 ) -> list[memoryview]:
-    """Return the values of a block of a cloud: one sequence for each value of a point."""
+    """Return the values in a block of a cloud: one sequence for each of a point's values."""
     import numpy as np
 
     order = ">" if cloud.is_bigendian else "<"
@@ -262,7 +265,7 @@ def _values(
                 good &= ~np.isnan(each)
         if not good.all():
             arrays = [each[good] for each in arrays]
-    # Copy, because memoryview reads only aligned values in the machine's byte order.
+    # Copy the values, because memoryview reads only aligned values in the machine's byte order.
     copies = [each.astype(each.dtype.newbyteorder("="), order="C") for each in arrays]
     return [each.reshape(-1).data for each in copies]
 
@@ -305,7 +308,7 @@ def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
 
 
 def _packed_array(points: object, columns: Sequence[Column], step: int) -> bytes | None:
-    """Return the packed data if points and fields are all floats; None if ``struct`` has to pack them."""
+    """Return the packed data if points and fields are all floats, or None if ``struct`` has to pack them."""
     numpy = sys.modules.get("numpy")
     if numpy is None or not isinstance(points, numpy.ndarray) or points.ndim != 2 or points.dtype.kind != "f":
         return None

@@ -1,6 +1,7 @@
 """smach_ros: states that use topics, services and actions, and introspection of running containers.
 
-Importing it makes smach log through rospy and stop at rospy's shutdown, as in ROS. Source: http://wiki.ros.org/smach.
+Importing this package makes smach log through rospy and stop at rospy's shutdown, as in ROS. Source:
+http://wiki.ros.org/smach.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ __all__ = ["ActionServerWrapper"]
 
 
 class ActionServerWrapper:
-    """Executes a container for each goal of an action; the container's outcome decides the goal's final state."""
+    """Executes a container for each goal of an action; the container's outcome determines the goal's final state."""
 
     def __init__(
         self,
@@ -36,9 +36,9 @@ class ActionServerWrapper:
         expand_goal_slots: bool = False,
         pack_result_slots: bool = False,
     ) -> None:
-        """Set the userdata keys for the goal, which the container reads, and for feedback and result, which it writes.
+        """Set the userdata keys for the goal, which the container reads, and for feedback and result, which the container writes.
 
-        ``goal_slots_map``: field of the goal -> key, ``result_slots_map``: field of the result -> key. ``expand_goal_slots``
+        ``goal_slots_map``: goal field -> key, ``result_slots_map``: result field -> key. ``expand_goal_slots``
         and ``pack_result_slots``: use every field under its own name.
         """
         self.wrapped_container = wrapped_container

@@ -15,9 +15,9 @@ __all__ = ["StateCallback"]
 
 
 class StateCallback:
-    """A state's callback; it may be None.
+    """A state's callback, which may be None.
 
-    Its userdata has the keys that it declares with ``cb_interface``, else those of the state's arguments.
+    Its userdata contains the keys that the callback declares with ``cb_interface``, else those in the state's arguments.
     """
 
     def __init__(
@@ -30,7 +30,7 @@ class StateCallback:
         args: Sequence[object] = (),
         kwargs: Mapping[str, object] | None = None,
     ) -> None:
-        """Raise InvalidStateError if the callback is not callable. ``what`` names it in messages, for example "Goal"."""
+        """Raise InvalidStateError if the callback is not callable. ``what`` describes it in messages, for example "Goal"."""
         if callback is not None and not callable(callback):
             raise InvalidStateError(
                 f"{what} callback object given to {type(state).__name__} that IS NOT a function object"
@@ -46,7 +46,7 @@ class StateCallback:
         self._state = state
 
     def adopt(self) -> None:
-        """Add to the state the keys and outcomes that the callback declares."""
+        """Add the keys and outcomes that the callback declares to the state."""
         adopt_interface(self._state, self._callback)
 
     def __bool__(self) -> bool:

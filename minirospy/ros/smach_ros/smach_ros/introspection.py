@@ -34,12 +34,12 @@ STRUCTURE_TOPIC = "/smach/container_structure"
 
 _QUEUE_SIZE = 20
 _CONNECT_SECONDS = 2.0
-"""Seconds that a command waits for the connection to the server."""
+"""Seconds for which a command waits for the connection to the server."""
 _RESEND_SECONDS = 0.3
 
 
 class IntrospectionClient:
-    """Finds introspection servers, and sets the initial states of their containers."""
+    """Finds introspection servers, and sets their containers' initial states."""
 
     def get_servers(self) -> list[str]:
         """Return the names of the servers that are publishing."""
@@ -56,7 +56,7 @@ class IntrospectionClient:
     ) -> bool | None:
         """Set the initial states of the container at a path, and add values to its userdata.
 
-        Return whether the container confirmed this within ``timeout``; None without a timeout.
+        Return whether the container confirmed the change within ``timeout``, or None without a timeout.
         """
         data = {} if initial_userdata is None else initial_userdata._data
         local_data, _ = pickle_userdata(data)
@@ -212,7 +212,7 @@ class ContainerProxy:
 
 
 class IntrospectionServer:
-    """Publishes the state of a container and of the containers in it."""
+    """Publishes the state of a container and of all containers in it."""
 
     def __init__(self, server_name: str, state: Container, path: str) -> None:
         """Create the server; ``path`` is the container's name, for example "/SM_ROOT"."""
@@ -231,7 +231,7 @@ class IntrospectionServer:
             proxy.stop()
 
     def construct(self, server_name: str, state: Container, path: str) -> None:
-        """Create the proxies of a container and of those in it."""
+        """Create the proxies for a container and for the containers in it."""
         proxy = ContainerProxy(server_name, state, path)
         prefix = "" if path == "/" else path
         for label, child in state.get_children().items():

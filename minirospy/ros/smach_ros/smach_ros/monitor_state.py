@@ -16,7 +16,7 @@ _SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
 
 
 class MonitorState(State):
-    """Outcomes: "valid" after ``max_checks`` messages that meet the condition, "invalid" at the first that does not."""
+    """Outcomes: "valid" after ``max_checks`` messages that meet the condition, "invalid" at the first one that does not."""
 
     def __init__(
         self,
@@ -29,7 +29,7 @@ class MonitorState(State):
     ) -> None:
         """Create the state. ``cond_cb`` is called with the userdata and a message.
 
-        ``max_checks``: -1 means that it continues until a message does not meet the condition.
+        ``max_checks``: -1 means no limit, so that the state runs until a message does not meet the condition.
         """
         super().__init__(
             outcomes=["valid", "invalid", "preempted"], input_keys=input_keys, output_keys=output_keys
@@ -75,6 +75,6 @@ class MonitorState(State):
             self._trigger_event.set()
 
     def request_preempt(self) -> None:
-        """Preempt the state; it ends without waiting for another message."""
+        """Preempt the state, which then finishes without waiting for another message."""
         super().request_preempt()
         self._trigger_event.set()

@@ -1,6 +1,6 @@
 """Userdata as a string on a topic: pickled and base64-encoded, as in ROS's smach.
 
-The data comes from another node, so only plain values, arrays and messages are created from it; no other code is executed.
+Another node sends the data, so only plain values, arrays and messages are created from it; no other code is executed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from minirospy.core.idl.load import get_message_class, get_service_class
 __all__ = ["pickle_userdata", "unpickle_userdata"]
 
 _RENAMED = {"__builtin__": "builtins", "copy_reg": "copyreg", "numpy.core": "numpy._core"}
-"""Module names of Python 2 and of older numpy."""
+"""Module names in Python 2 and in older numpy versions."""
 _MESSAGE = re.compile(r"(\w+)\.(msg|srv)\._(\w+)")
 _TEXTS = "SU"
 _SIMPLE = "biufc" + _TEXTS  # numpy dtype kinds: numbers and strings; other kinds may contain pointers
@@ -63,7 +63,7 @@ _set_state = pickle._Unpickler.dispatch[pickle.BUILD[0]]
 
 
 class _Unpickler(pickle._Unpickler):
-    """The unpickler that is written in Python, so that its operations can be checked before they run."""
+    """The unpickler implemented in Python, so that its operations can be checked before they run."""
 
     stack: list[Any]
     read: Callable[[int], bytes]
@@ -76,14 +76,14 @@ class _Unpickler(pickle._Unpickler):
         if made := _MAKERS.get(f"{module}.{name}"):
             return made
         if match := _MESSAGE.fullmatch(module):
-            # Find the class by its message type: importing any module named in the data would execute the module.
+            # Find the class by its message type: importing a module named in the data would execute that module.
             for found in _classes(f"{match[1]}/{match[3]}", match[2]):
                 if found.__name__ == name:
                     return found
         raise pickle.UnpicklingError(f"{module}.{name} is not a plain value or a message")
 
     def load_build(self) -> None:
-        """Set an object's state. Refuse classes, which are shared, and numpy dtypes, whose state could corrupt memory."""
+        """Set an object's state. Refuse classes, because they are shared, and numpy dtypes, whose state could corrupt memory."""
         target, state = self.stack[-2:]
         if callable(target):
             raise pickle.UnpicklingError("the state of a class")
@@ -92,7 +92,7 @@ class _Unpickler(pickle._Unpickler):
         _set_state(self)  # type: ignore[arg-type]
 
     def load_bytearray8(self) -> None:
-        """Create a bytearray from the available bytes; pickle itself first allocates the size given in the data."""
+        """Create a bytearray from the available bytes; pickle itself would first allocate the size given in the data."""
         size = int.from_bytes(self.read(8), "little")
         self.append(bytearray(self.read(size)))
 
@@ -113,7 +113,7 @@ def _classes(name: str, kind: str) -> tuple[Any, ...]:
 
 def _check_dtype(target: Any, state: Any) -> None:
     """Raise UnpicklingError unless the state leaves a numpy dtype unchanged except for its byte order."""
-    # The values that numpy writes. numpy would accept any size of a string, even a negative one, and any flags.
+    # Allow only the values that numpy writes: numpy would accept any string size, even a negative one, and any flags.
     size, alignment = (target.itemsize, target.alignment) if target.kind in _TEXTS else (-1, -1)
     allowed = [(3, order, None, None, None, size, alignment, target.flags) for order in "<>=|"]
     if target.kind not in _SIMPLE or tuple(state) not in allowed:
@@ -121,7 +121,7 @@ def _check_dtype(target: Any, state: Any) -> None:
 
 
 def _plain(make: Callable[..., object], *kinds: type) -> Callable[..., object]:
-    """Wrap a constructor so that it accepts only these types: not a number, which would be its size, nor a range."""
+    """Wrap a constructor so that it accepts only these types: not a number, which would be a size, and not a range."""
 
     def made(content: object = (), *more: object) -> object:
         if type(content) not in (*kinds, tuple):
@@ -149,7 +149,7 @@ def _simple_dtype(name: object, *_: object) -> Any:
     found = np.dtype(name if isinstance(name, str) else "O")
     if found.kind not in _SIMPLE:
         raise pickle.UnpicklingError(f"an array of {name}")
-    # A copy, because the state that follows must not change numpy's own dtype.
+    # Return a copy, because the state set afterwards must not change numpy's own dtype.
     return np.dtype(found.str, copy=True)
 
 
@@ -170,7 +170,7 @@ def _scalar(dtype: Any, data: Any) -> object:
 def _from_buffer(data: Any, dtype: Any, count: int = -1) -> Any:
     import numpy as np
 
-    # Another array is refused: a state that follows could free its memory.
+    # Refuse another array: a state set afterwards could free its memory.
     if type(data) not in (bytes, bytearray):
         raise pickle.UnpicklingError(f"an array in {type(data).__name__}")
     return np.frombuffer(data, dtype, count)

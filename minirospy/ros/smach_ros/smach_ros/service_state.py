@@ -15,7 +15,10 @@ __all__ = ["ServiceState"]
 
 
 class ServiceState(State):
-    """Outcomes: "succeeded", "aborted" (no request, no response, or a callback's exception), "preempted", and the callback's."""
+    """Outcomes: "succeeded", "aborted", "preempted", and the callback's outcomes.
+
+    The outcome is "aborted" if there is no request or no response, or if a callback raises an exception.
+    """
 
     def __init__(
         self,
@@ -81,7 +84,7 @@ class ServiceState(State):
         return self._take_response(ud, response)
 
     def _connect(self) -> str | None:
-        """Wait for the service; return an outcome if that fails."""
+        """Wait for the service; return an outcome if the service does not become available."""
         while self._proxy is None:
             if self.preempt_requested():
                 rospy.loginfo(f"Preempting while waiting for service '{self._service_name}'.")
@@ -101,7 +104,7 @@ class ServiceState(State):
         return None
 
     def _make_request(self, ud: Values) -> str | None:
-        """Build the request; return an outcome if that fails."""
+        """Build the request; return an outcome if the request cannot be built."""
         if self._request_key is not None:
             if self._request_key not in ud:
                 rospy.logerr(

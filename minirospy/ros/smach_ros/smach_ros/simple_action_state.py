@@ -20,12 +20,12 @@ from minirospy.ros.smach_ros.smach_ros.callbacks import StateCallback
 
 __all__ = ["SimpleActionState"]
 
-_LOOK = 0.1  # seconds between two checks of the timeouts and for a shutdown
+_LOOK = 0.1  # seconds between two checks for timeouts and for a shutdown
 _MINUTE = rospy.Duration(60.0)
 
 
 class SimpleActionState(State):
-    """Outcomes: "succeeded", "preempted", "aborted" (in all other cases), and those of the callback."""
+    """Outcomes: "succeeded", "preempted", "aborted" (in all other cases), and the callback's outcomes."""
 
     WAITING_FOR_SERVER = 0
     INACTIVE = 1
@@ -59,7 +59,7 @@ class SimpleActionState(State):
 
         ``goal_cb(userdata, goal)`` may change the goal or return another one. ``result_cb(userdata, status, result)`` may
         return an outcome. ``result_key`` and ``result_slots`` select what is stored in the userdata. A goal is cancelled after
-        ``exec_timeout``, and given up ``preempt_timeout`` after the cancellation.
+        ``exec_timeout``, and abandoned ``preempt_timeout`` after the cancellation.
         """
         super().__init__(outcomes=["succeeded", "aborted", "preempted"])
         self._action_name = action_name
@@ -141,7 +141,7 @@ class SimpleActionState(State):
         return self._take_result(ud) if is_done else "aborted"
 
     def _connect(self) -> str | None:
-        """Wait for the server; return an outcome if that fails."""
+        """Wait for the server; return an outcome if the server does not become available."""
         if self._status == SimpleActionState.WAITING_FOR_SERVER:
             rospy.logwarn(f"Still waiting for action server '{self._action_name}' to start... is it running?")
             if self._action_wait_thread.is_alive():
@@ -160,7 +160,7 @@ class SimpleActionState(State):
         return None
 
     def _make_goal(self, ud: Values) -> str | None:
-        """Build the goal; return an outcome if that fails."""
+        """Build the goal; return an outcome if the goal cannot be built."""
         if self._goal_key is not None:
             self._goal = ud[self._goal_key]
         for key in self._goal_slots:
@@ -188,7 +188,7 @@ class SimpleActionState(State):
                     )
                     return False
             elif self.preempt_requested():
-                # The preemption may have arrived just before the goal was sent.
+                # The preemption may have been requested just before the goal was sent.
                 self._action_client.cancel_goal()
                 cancelled = now
             elif self._exec_timeout and now - self._activate_time > self._exec_timeout:

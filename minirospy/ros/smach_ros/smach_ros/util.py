@@ -14,9 +14,9 @@ __all__ = ["set_preempt_handler"]
 
 
 def set_preempt_handler(sc: StateMachine | Concurrence | Iterator) -> None:
-    """Preempt a container when the node shuts down, and wait until it has ended.
+    """Preempt a container when the node shuts down, and wait until the container has finished.
 
-    A container that executes in the thread that handles the shutdown cannot end in the meantime, so it is not waited for.
+    If the container executes in the thread that handles the shutdown, do not wait, because it cannot finish in the meantime.
     """
 
     def handler() -> None:

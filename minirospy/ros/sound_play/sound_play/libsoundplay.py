@@ -1,4 +1,4 @@
-"""The client of sound_play: plays files and sounds, and speaks texts, through a topic or an action.
+"""The client for sound_play: plays files and sounds, and speaks texts, through a topic or an action.
 
 Source: http://wiki.ros.org/sound_play.
 """
@@ -57,10 +57,8 @@ class SoundClient:
     """Sends requests to soundplay_node.
 
     Each method that plays a sound accepts ``blocking`` (True: wait until the sound has ended), ``replace`` (False: wait
-    until no
-    other sound is playing), ``server_timeout`` and ``result_timeout``. Files are on the machine of soundplay_node; a file
-    without
-    a folder is one of the package's.
+    until no other sound is playing), ``server_timeout`` and ``result_timeout``. Files are on soundplay_node's machine; a
+    relative path is in the package's sound folder.
     """
 
     def __init__(
@@ -73,15 +71,15 @@ class SoundClient:
         self.sub = rospy.Subscriber(f"{sound_action}/status", GoalStatusArray, self._action_status_cb)
 
     def voiceSound(self, s: str, volume: float = 1.0) -> Sound:
-        """Return a spoken text as a sound."""
+        """Return a sound that speaks a text."""
         return Sound(self, SoundRequest.SAY, s, volume=volume)
 
     def waveSound(self, sound: str, volume: float = 1.0) -> Sound:
-        """Return a file as a sound."""
+        """Return a sound that plays a file."""
         return Sound(self, SoundRequest.PLAY_FILE, _place(sound), volume=volume)
 
     def builtinSound(self, id: int, volume: float = 1.0) -> Sound:
-        """Return a built-in sound of the package."""
+        """Return one of the package's built-in sounds."""
         return Sound(self, id, "", volume)
 
     def say(self, text: str, voice: str = "", volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
@@ -153,7 +151,7 @@ class SoundClient:
         blocking: bool | None = None,
         **kwargs: object,
     ) -> None:
-        """Send a request. A timeout of None waits without limit for the server, or for the end of the sound."""
+        """Send a request. A timeout of None waits indefinitely for the server, or for the end of the sound."""
         request = SoundRequest(sound=snd, command=cmd, volume=max(0, min(1, vol)), arg=s, arg2=arg2)
         if not (self._blocking if blocking is None else blocking):
             self.pub.publish(request)
@@ -183,7 +181,7 @@ def _waits(timeout: times.Duration | None) -> bool:
 
 
 def _place(sound: str) -> str:
-    """Return the path of a file; without a folder, it is one of the package's."""
+    """Return a file's absolute path; a relative path is in the package's sound folder."""
     if sound.startswith("/") or Path(sound).is_absolute():
         return sound
     return f"{RosPack().get_path('sound_play')}/sounds/{sound}"

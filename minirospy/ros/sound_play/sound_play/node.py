@@ -1,4 +1,4 @@
-"""soundplay_node.py: plays requests from robotsound and from the action sound_play, with a player program of this machine.
+"""soundplay_node.py: plays requests from robotsound and from the action sound_play, with a player program on this machine.
 
 Parameters: ~default_voice, ~loop_rate (100 Hz, for the action's feedback). Source: http://wiki.ros.org/sound_play.
 """
@@ -42,7 +42,7 @@ Key = tuple[int, str, str]
 
 
 class SoundError(Exception):
-    """A sound cannot be played; the message gives the reason and a remedy."""
+    """A sound cannot be played; the message states the reason and a remedy."""
 
 
 class PlayingSound:
@@ -99,7 +99,7 @@ class PlayingSound:
 
 
 class SoundNode:
-    """The playing sounds, by request."""
+    """The sounds that are playing, by request."""
 
     def __init__(self, folder: Path) -> None:
         """Create the node; ``folder`` is the folder for the package's sound files."""
@@ -118,7 +118,7 @@ class SoundNode:
         self._server.start()
 
     def handle(self, request: SoundRequest) -> PlayingSound | None:
-        """Play or stop the sound of a request; return the playing sound. Raise SoundError if that fails."""
+        """Play or stop a request's sound; return the playing sound. Raise SoundError if the sound cannot be played."""
         with self._lock:
             key = (request.sound, request.arg, request.arg2)
             if request.command == SoundRequest.PLAY_STOP:

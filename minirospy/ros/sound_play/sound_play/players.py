@@ -1,4 +1,4 @@
-"""Choose the program of this machine that plays a file or speaks a text, and its arguments. Pure."""
+"""Choose this machine's program that plays a file or speaks a text, and the program's arguments. Pure."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ _ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
 
 
 def _espeak(voice: str, volume: float) -> list[str]:
-    # Names such as voice_kal_diphone are for festival.
+    # Names such as voice_kal_diphone are festival voices.
     names = [] if not voice or voice.startswith("voice_") else ["-v", voice]
     return ["--stdin", "-a", str(round(volume * 100)), *names]
 
@@ -74,7 +74,7 @@ def installable(programs: Iterable[str], platform: str) -> list[str]:
 
 
 def play_command(file: str, volume: float, which: Which) -> Command | None:
-    """Return the command that plays a file; None if there is no player."""
+    """Return the command that plays a file, or None if there is no player."""
     for name, arguments in PLAYERS.items():
         program = which(name)
         if program:
@@ -83,7 +83,7 @@ def play_command(file: str, volume: float, which: Which) -> Command | None:
 
 
 def say_command(text: str, voice: str, volume: float, which: Which) -> Command | None:
-    """Return the command that speaks a text; None if there is no program for it."""
+    """Return the command that speaks a text, or None if there is no program that can."""
     for name, make in SPEAKERS.items():
         program = which(name)
         if program:

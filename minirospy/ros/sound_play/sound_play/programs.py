@@ -138,7 +138,7 @@ def _request(name: str, request: Callable[[SoundClient], object]) -> int:
     with suppress(rospy.ROSInterruptException):
         _connect(client)
         request(client)
-        # Give the message time to be sent before the node exits.
+        # Wait until the message has probably been sent, before the node exits.
         rospy.sleep(0.2)
     return 0
 

@@ -26,7 +26,7 @@ BUILTIN: dict[int, tuple[float, ...]] = {
 
 
 def wav_of(notes: tuple[float, ...]) -> bytes:
-    """Return a WAV file with notes of equal length: mono, 16 bit."""
+    """Return a WAV file that contains notes of equal length: mono, 16 bit."""
     count = int(_RATE * _NOTE_SECONDS)
     samples = array.array("h")
     for note in notes:

@@ -98,7 +98,7 @@ class Transformer:
     ) -> None:
         """Wait up to ``timeout`` for a transform; ``polling_sleep_duration`` has no effect.
 
-        Raise tf.Exception after the timeout.
+        Raise tf.Exception if the transform is not available by then.
         """
         self._check_thread()
         target, source = strip_leading_slash(target_frame), strip_leading_slash(source_frame)

@@ -165,7 +165,7 @@ def projection_matrix(
 ) -> Floats:
     """Return the matrix that projects onto a plane: from a perspective point, along a direction, or orthogonally.
 
-    ``pseudo``: a perspective projection keeps the relative depths.
+    ``pseudo``: a perspective projection preserves the relative depths.
     """
     import numpy
 

@@ -1,4 +1,4 @@
-"""tf2_py: the buffer of transforms. Source: http://wiki.ros.org/tf2_py."""
+"""tf2_py: the transform buffer. Source: http://wiki.ros.org/tf2_py."""
 
 from minirospy.base.errors import (
     ConnectivityException,

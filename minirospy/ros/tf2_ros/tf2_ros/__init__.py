@@ -1,7 +1,7 @@
 """The API of tf2_ros for nodes: buffers, listeners, broadcasters, buffer servers and clients, on the public node API.
 
 The path of a transform: broadcaster `sendTransform` -> topic /tf ==> listener `callback` -> core `insert_message` ->
-`minirospy.core.tf2`, which answers `lookup_transform`. `import tf2_ros` and `import tf2_py` re-export these names.
+`minirospy.core.tf2`, which computes the result of `lookup_transform`. `import tf2_ros` and `import tf2_py` re-export these names.
 """
 
 from typing import TYPE_CHECKING

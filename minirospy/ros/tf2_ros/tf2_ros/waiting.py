@@ -1,4 +1,4 @@
-"""Waiting for a transform, until an insertion, a shutdown, the timeout, or a time jump."""
+"""Wait for a transform: until an insertion, a shutdown, the timeout, or a time jump."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds
 __all__ = ["wait_until"]
 
 _JUMP = times.Duration(3)  # a wall clock that is set back by more than this aborts a wait
-_SIMULATED_SLICE = 0.01  # seconds; a change of simulated time does not wake a waiting thread
+_SIMULATED_SLICE = 0.01  # seconds; a change in simulated time does not wake a blocked thread
 
 
 def wait_until(core: BufferCore, is_possible: Callable[[], bool], timeout: Moment, step: float) -> None:

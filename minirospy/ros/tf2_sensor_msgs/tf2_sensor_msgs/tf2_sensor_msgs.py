@@ -39,9 +39,9 @@ _FORMATS = {
 def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> PointCloud2:
     """Return a cloud with transformed x, y and z, with the transform's header.
 
-    As in real ROS, the result has one row, little-endian numbers, nothing behind a point's last field, zeros between
+    As in real ROS, the result has one row, little-endian numbers, nothing after a point's last field, zeros between
     its fields, and is not marked as dense. The other fields, and points with NaN coordinates, are kept. x, y and z are
-    the fields of these names, while real ROS uses the first three. Raise ValueError if the cloud has no x, y and z,
+    the fields with these names, while real ROS uses the first three fields. Raise ValueError if the cloud has no x, y and z,
     or less data than its sizes require.
     """
     import numpy
@@ -61,7 +61,7 @@ def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> Point
     frame = transform_to_kdl(transform)
     rotation = numpy.array(frame.M._m).reshape(3, 3)
     places = numpy.stack([points[name].astype(numpy.float64) for name in "xyz"], axis=-1)
-    # Coordinates may be infinite, or overflow.
+    # Coordinates may be infinite, or may overflow.
     with numpy.errstate(invalid="ignore", over="ignore"):
         moved = places @ rotation.T + numpy.array(frame.p._v)
         for column, name in enumerate("xyz"):
@@ -81,7 +81,7 @@ def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> Point
 
 
 def _points(cloud: PointCloud2) -> NDArray[numpy.void]:
-    """Return the points as a one-dimensional structured array, without the padding of rows."""
+    """Return the points as a one-dimensional structured array, without row padding."""
     import numpy
 
     try:
@@ -94,7 +94,7 @@ def _points(cloud: PointCloud2) -> NDArray[numpy.void]:
 
 
 def _layout(fields: Sequence[PointField], order: str, step: int | None = None) -> numpy.dtype[numpy.void]:
-    """Return the layout of a point of ``step`` bytes (default: up to its last field). Raise ValueError."""
+    """Return the layout of a point of ``step`` bytes (default: up to its last field). Raise ValueError if fields do not fit."""
     import numpy
 
     known = [field for field in fields if field.datatype in _FORMATS]

@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     class _OpenCV(Protocol):
-        """The (old) module cv."""
+        """The old OpenCV module cv."""
 
         def Rodrigues2(self, src: NDArray[numpy.floating], dst: NDArray[numpy.floating]) -> object: ...
 
@@ -184,7 +184,7 @@ def toMatrix(f: Frame) -> NDArray[numpy.float64]:
 
 
 def fromCameraParams(cv: _OpenCV, rvec: NDArray[numpy.floating], tvec: NDArray[numpy.floating]) -> Frame:
-    """Convert OpenCV's rotation and translation vectors to a Frame; ``cv`` is its (old) module."""
+    """Convert OpenCV's rotation and translation vectors to a Frame; ``cv`` is OpenCV's old module."""
     import numpy
 
     matrix = numpy.zeros((4, 4), dtype=numpy.float32)

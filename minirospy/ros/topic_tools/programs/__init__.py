@@ -2,5 +2,6 @@
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# The modules below import messages of ROS 1; if ROS 2 is sourced, its packages of the same names would come first.
+# The modules below import ROS 1 messages; if ROS 2 is sourced, its packages of the same names would be imported
+# instead.
 prefer_ros1()

@@ -1,4 +1,4 @@
-"""mux_select, mux_add, mux_delete, mux_list: call a service of a running mux; demux_select and so on do so for a demux.
+"""mux_select, mux_add, mux_delete, mux_list: call a service of a running mux; demux_select and so on call a demux.
 
 The demux programs exist only in minirospy. The exit status is 1 if the call fails (ROS: 0).
 """
@@ -30,7 +30,7 @@ _VERBS = {
     "delete": _Verb(MuxDelete, True, lambda kind, name, topic: f'Deleting "{topic}" from {kind} "{name}"'),
     "list": _Verb(MuxList, False, lambda kind, name, topic: f'Listing topics from {kind} "{name}"'),
 }
-"""demux's services have the same fields as mux's, and so the same md5sums."""
+"""demux's services have the same fields as mux's services, and therefore the same md5sums."""
 
 
 def main(program: str) -> int:

@@ -32,7 +32,7 @@ __all__ = ["Demux", "main"]
 
 _USAGE = "\nusage: demux IN_TOPIC OUT_TOPIC1 [OUT_TOPIC2 [...]]\n"
 _FIRST_SUBSCRIBER = 0.5
-"""Seconds that an output's first message waits for a subscriber to connect, after the topic is advertised."""
+"""Seconds for which an output's first message waits for a subscriber to connect, after the topic is advertised."""
 
 
 def main() -> int:
@@ -46,7 +46,7 @@ def main() -> int:
 
 
 class Demux:
-    """Forwards the messages of a topic to the selected output, unchanged."""
+    """Forwards a topic's messages to the selected output, unchanged."""
 
     def __init__(self, source: str, targets: Sequence[str]) -> None:
         self._lock = threading.RLock()

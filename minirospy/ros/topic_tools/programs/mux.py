@@ -46,7 +46,7 @@ def main() -> int:
 
 
 class Mux:
-    """Forwards the messages of the selected topic, unchanged."""
+    """Forwards the selected topic's messages, unchanged."""
 
     def __init__(self, target: str, sources: Sequence[str], *, is_lazy: bool, latch: bool) -> None:
         self._is_lazy = is_lazy

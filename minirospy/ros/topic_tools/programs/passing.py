@@ -1,4 +1,4 @@
-"""The common part of the programs: messages of any type are received and sent as bytes."""
+"""The code that the programs share: messages of any type are received and sent as bytes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from minirospy.client.topics import AnyMsg, SubscribeListener
 
 __all__ = ["NONE", "Input", "Output", "base_name", "flag", "run_node"]
 
-NONE = "__none"  # the name that selects no topic of a mux or demux
+NONE = "__none"  # the name that selects no topic in a mux or demux
 _QUEUE_SIZE = 10
 
 
@@ -29,7 +29,7 @@ class _Connected(SubscribeListener):
 
 
 class Output:
-    """A topic with the type of the first forwarded message; latched if the input was, unless ``latch`` is given."""
+    """A topic with the type of the first forwarded message; latched if the input is latched, unless ``latch`` is given."""
 
     def __init__(
         self,
@@ -39,7 +39,7 @@ class Output:
         on_subscriber: Callable[[], object] = lambda: None,
         on_advertised: Callable[[], object] = lambda: None,
     ) -> None:
-        """Create the output. ``latch``: None means as the input; ``on_advertised`` is called after the first message."""
+        """Create the output. ``latch``: None means the same as the input; ``on_advertised`` is called after the first message."""
         self.topic = _checked(topic)
         self._latch = latch
         self._on_subscriber = on_subscriber
@@ -49,7 +49,7 @@ class Output:
 
     @property
     def is_advertised(self) -> bool:
-        """Return whether a first message has arrived."""
+        """Return whether the first message has arrived."""
         return self._publisher is not None
 
     @property
@@ -58,7 +58,7 @@ class Output:
         return self._publisher is not None and self._publisher.get_num_connections() > 0
 
     def advertise(self, message: AnyMsg) -> None:
-        """Advertise the topic with the type of a message; later calls have no effect."""
+        """Advertise the topic with a message's type; later calls have no effect."""
         with self._lock:
             if self._publisher is not None:
                 return
@@ -126,7 +126,7 @@ class Input:
 
 
 def base_name(topic: str) -> str:
-    """Return the last part of a topic's name, which is used in the node's name. Raise ValueError if it has none."""
+    """Return the last part of a topic's name, which is used in the node's name. Raise ValueError if it is empty."""
     name = _checked(topic).rstrip("/").rpartition("/")[2].lstrip("~")
     if not name:
         raise ValueError(f"[{topic}] is not the name of a topic")
@@ -141,7 +141,7 @@ def _checked(topic: str) -> str:
 
 
 def flag(name: str) -> bool:
-    """Return a boolean private parameter; False if it is not set."""
+    """Return a boolean private parameter, or False if it is not set."""
     return bool(rospy.get_param(f"~{name}", False))
 
 
@@ -150,7 +150,7 @@ def run_node(
 ) -> int:
     """Run a program until its node shuts down; return its exit status.
 
-    ``name`` and ``start`` are called with the command line's arguments; their ValueError is printed with the usage.
+    ``name`` and ``start`` are called with the command-line arguments; if they raise ValueError, it is printed with the usage.
     ``counts``: the allowed numbers of arguments.
     """
     words = rospy.myargv()[1:]

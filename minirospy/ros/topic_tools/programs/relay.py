@@ -40,7 +40,7 @@ class Relay:
     def __init__(self, source: str, target: str, *, is_lazy: bool = False) -> None:
         self._is_lazy = is_lazy
         self._is_stealthy = False
-        # Covers a new subscriber that arrives while the input is being closed: it opens the input again.
+        # Handles a subscriber that arrives while the input is being closed: the input must be opened again.
         self._lock = threading.Lock()
         self._output = Output(target, on_subscriber=self._subscribed, on_advertised=self._advertised)
         self._input = Input(source, self._received)

@@ -40,7 +40,7 @@ usage: drop IN_TOPIC X Y [OUT_TOPIC]
 """
 
 Passes = Callable[[float, int], bool]
-"""Return whether a message passes, given the time in seconds and its size in bytes; count it if it does."""
+"""Returns whether a message passes, given the time in seconds and its size in bytes; counts the message if it passes."""
 
 
 def main() -> int:
@@ -93,7 +93,7 @@ def _count(word: str) -> int:
 
 
 class MessageLimit:
-    """Lets a message pass if more than ``period`` seconds have passed since the last one."""
+    """Lets a message pass if more than ``period`` seconds have elapsed since the last one that passed."""
 
     def __init__(self, period: float) -> None:
         self._period = period
@@ -143,7 +143,7 @@ def every(dropped: int, of: int) -> Passes:
 
 
 class Filter:
-    """Forwards some of the messages, unchanged."""
+    """Forwards the messages that a filter selects, unchanged."""
 
     def __init__(
         self,
@@ -158,7 +158,7 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
-        # Covers a new subscriber that arrives while the input is being closed: it opens the input again.
+        # Handles a subscriber that arrives while the input is being closed: the input must be opened again.
         self._lock = threading.Lock()
 
         self._output = Output(

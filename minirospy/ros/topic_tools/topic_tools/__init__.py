@@ -1,4 +1,4 @@
-"""topic_tools: the base class of lazy nodes, and programs that evaluate Python expressions.
+"""topic_tools: the base class for lazy nodes, and programs that evaluate Python expressions.
 
 The programs that forward bytes are in minirospy.ros.topic_tools.programs. Source: http://wiki.ros.org/topic_tools.
 """
@@ -27,17 +27,17 @@ class MetaLazyTransport(type):
 
 
 class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
-    """Base class of nodes that subscribe only while their own topics have subscribers.
+    """Base class for nodes that subscribe only while their own topics have subscribers.
 
     Subclass it, create publishers with ``advertise``, and implement ``subscribe`` and ``unsubscribe``. If the parameter
-    ``~lazy`` is false, it subscribes when it is created, and stays subscribed.
+    ``~lazy`` is false, the node subscribes when the object is created, and stays subscribed.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._publishers: list[Publisher[Message]] = []
         self._connection_status: bool | None = None
-        """Whether it is subscribed; None before the first subscription."""
+        """Whether the node is subscribed; None before the first subscription."""
         self._changing = threading.RLock()
         rospy.Timer(rospy.Duration(_WARN_SECONDS), self._warn_never_subscribed_cb, oneshot=True)
 
@@ -57,16 +57,16 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         raise NotImplementedError("Please overwrite this method")
 
     def unsubscribe(self) -> None:
-        """Unregister the subscribers of the inputs; a subclass implements it."""
+        """Unregister the input subscribers; a subclass implements it."""
         raise NotImplementedError("Please overwrite this method")
 
     def peer_subscribe(self, *args: object, **kwargs: object) -> None:
-        """Subscribe when one of the topics gets a subscriber."""
+        """Subscribe when one of the node's topics gets a subscriber."""
         rospy.logdebug(f"[{args[0]}] is subscribed")
         self._subscribe_once()
 
     def peer_unsubscribe(self, *args: object, **kwargs: object) -> None:
-        """Unsubscribe when none of the topics has a subscriber left."""
+        """Unsubscribe when none of the node's topics has a subscriber left."""
         rospy.logdebug(f"[{args[0]}] is unsubscribed")
         if not rospy.get_param("~lazy", True):
             return
@@ -90,7 +90,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         return publisher
 
     def _subscribe_once(self) -> None:
-        # The constructor's thread and the listener's thread may get here at the same time.
+        # The constructor's thread and the listener's thread may reach this code at the same time.
         with self._changing:
             if self._connection_status is not True:
                 self.subscribe()

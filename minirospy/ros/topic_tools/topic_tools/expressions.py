@@ -1,6 +1,6 @@
 """transform and relay_field: publish the result of a Python expression on a topic's messages or on one of their fields.
 
-The expression is the user's own, from the command line or a launch file; ``m`` is the message or the field.
+The user writes the expression, on the command line or in a launch file; ``m`` is the message or the field.
 Source: http://wiki.ros.org/topic_tools/transform, http://wiki.ros.org/topic_tools/relay_field.
 """
 
@@ -91,7 +91,7 @@ def _transform(options: argparse.Namespace) -> rospy.Subscriber[Message]:
     modules: dict[str, ModuleType] = {}
     for name in options.modules:
         try:
-            # For tf.transformations, the expression can use the name tf.
+            # For the module tf.transformations, the expression can use the name tf.
             modules[name.partition(".")[0]] = importlib.import_module(name.partition(".")[0])
             importlib.import_module(name)
         except ImportError as error:
@@ -130,7 +130,7 @@ def _relay(options: argparse.Namespace) -> rospy.Subscriber[Message]:
 
 
 def _subscribe(options: argparse.Namespace, convert: Callable[[object], None]) -> rospy.Subscriber[Message]:
-    """Call a function with each message, or with the given field of it. Raise MinirospyError if the topic does not exist."""
+    """Call a function with each message, or with the given field. Raise MinirospyError if the topic does not exist."""
     name = rospy.resolve_name(options.input)
     cls, topic, field = rostopic.get_topic_class(name, blocking=options.wait_for_start)
     if cls is None or topic is None:
@@ -153,7 +153,7 @@ def _compiled(expression: str) -> CodeType:
 
 
 def _evaluated(template: dict[str, object], value: object) -> dict[str, object]:
-    """Return the fields with their strings evaluated; keep a string that is not a valid expression."""
+    """Return the fields with their strings evaluated; leave a string that is not a valid expression unchanged."""
     found: dict[str, object] = {}
     for name, each in template.items():
         if isinstance(each, dict):

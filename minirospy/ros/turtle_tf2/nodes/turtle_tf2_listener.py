@@ -24,7 +24,7 @@ def main() -> None:
         try:
             target = frames.lookup_transform(name, "turtle1", rospy.Time()).transform.translation
         except tf2_ros.TransformException:
-            # Not all frames have arrived yet.
+            # Not all frames have been received yet.
             pass
         else:
             twist = Twist()

@@ -1,7 +1,7 @@
 """`check_urdf`, and `urdf_to_graphviz` with its old name `urdf_to_graphiz`: print or draw a robot description's tree.
 
-The output is that of liburdfdom-tools, but with line numbers of the description instead of its own source code.
-The exit status is 255 if the description cannot be read, as there. Source: http://wiki.ros.org/urdf#Verification.
+The output is that of liburdfdom-tools, but with line numbers in the description instead of line numbers in its source
+code. The exit status is 255 if the description cannot be read, as there. Source: http://wiki.ros.org/urdf#Verification.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def _graph(file: str | None, output: str | None) -> None:
         print(_NO_OUTPUT + _USAGE, file=sys.stderr)
     robot = _read(file)
     name = robot.name if output is None else output
-    # The file may come from a stranger, so the robot's name must not decide where files are written.
+    # The file may come from an untrusted source, so the robot's name must not determine where files are written.
     if output is None and (not name or name != Path(name).name or name.startswith(".") or "\\" in name):
         raise UsageError(f"the robot's name [{name}] is not a file's name: name the OUTPUT")
 
@@ -118,7 +118,7 @@ def _picture(robot: Robot) -> str:
 
 
 def _read(file: str) -> Robot:
-    """Return the robot from a file, and print its problems. Raise WordedError."""
+    """Return the robot from a file, and print its problems. Raise WordedError if it cannot be read or parsed."""
     from minirospy.core.urdf.read import read_robot
 
     try:

@@ -1,8 +1,8 @@
-"""`xacro`: expands the macros of robot descriptions with the Python package xacro.
+"""`xacro`: expands the macros in robot descriptions with the Python package xacro.
 
-`$(find PACKAGE)` finds minirospy's packages.
-The options, messages and exit statuses (2 if a file cannot be processed) are that package's. Options of earlier releases
-for behaviour that is now the only one are accepted. Source: http://wiki.ros.org/xacro.
+`$(find PACKAGE)` finds minirospy's packages. The options, messages and exit statuses (2 if a file cannot be processed) are
+those of the Python package. Options that earlier releases needed for behaviour that is now standard are accepted. Source:
+http://wiki.ros.org/xacro.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def _xacro(words: Sequence[str]) -> int:
     def checked_parse(inp: object, filename: str | None = None) -> object:
         """Parse a file or string after checking that its entities do not expand to gigabytes."""
         if inp is None and filename is not None:
-            # A file that cannot be opened is left to xacro, which reports it.
+            # Leave a file that cannot be opened to xacro, which reports the error.
             with contextlib.suppress(OSError), open(Path(xacro.root_dir, filename)) as file:
                 inp = file.read()
         if isinstance(inp, str):

@@ -72,7 +72,7 @@ class ROSHandler(XmlRpcHandler):
         return self._call("getSubscriptions", args)
 
     def paramUpdate(self, *args: object) -> Answer:
-        """Update the cached value of a parameter."""
+        """Update a parameter's cached value."""
         return self._call("paramUpdate", args)
 
     def publisherUpdate(self, *args: object) -> Answer:

@@ -60,10 +60,10 @@ class TopicManager:
 
 
 class ServiceManager:
-    """Lists the services of this node."""
+    """Lists this node's services."""
 
     def get_services(self) -> list[tuple[str, str | None]]:
-        """Return the name and URI of each service."""
+        """Return each service's name and URI."""
         return [(name, service.uri) for name, service in list(current_session().offered.items())]
 
     def get_service(self, resolved_service_name: str) -> Service[object] | None:
