@@ -1,4 +1,4 @@
-"""Wait for a condition that no event reports: the only place in the tests that polls, with one limit.
+"""Wait for a condition that no event reports: the only place in the tests that polls.
 
 A test that uses a loop with a stopped clock needs ``until`` of :mod:`tests.manual_loop`.
 """
@@ -12,21 +12,23 @@ from collections.abc import Callable
 __all__ = ["until", "wait_until"]
 
 _PATIENCE = 100.0  # seconds; a machine that runs tests may stall
-_PAUSE = 0.005
+_PAUSE = 0.005  # seconds between two calls of a condition
 
 
-def wait_until(condition: Callable[[], object]) -> None:
-    """Return once a condition is true. Raise TimeoutError if it never is."""
-    end = time.monotonic() + _PATIENCE
+def wait_until(
+    condition: Callable[[], object], seconds: float = _PATIENCE, error: str = "the condition does not hold"
+) -> None:
+    """Return once a condition is true. Raise TimeoutError with the text ``error`` if it is not in time."""
+    end = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > end:
-            raise TimeoutError("the condition does not hold")
+            raise TimeoutError(error)
         time.sleep(_PAUSE)
 
 
-async def until(condition: Callable[[], object]) -> None:
-    """Let the loop run until a condition is true. Raise TimeoutError if it never is."""
-    end = time.monotonic() + _PATIENCE
+async def until(condition: Callable[[], object], seconds: float = _PATIENCE) -> None:
+    """Let the loop run until a condition is true. Raise TimeoutError if it is not in time."""
+    end = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > end:
             raise TimeoutError("the condition does not hold")

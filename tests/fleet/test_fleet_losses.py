@@ -35,6 +35,7 @@ from minirospy.fleet.rules import GatewayRules, parse_rates
 from tests.conftest import free_port
 from tests.fleet.fleet import SECONDS, Fleet, Place
 from tests.fleet.test_fleet_gateways import collect, fleet, publisher
+from tests.waiting import until
 
 pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
 
@@ -237,7 +238,7 @@ def test_a_robot_that_is_silent_leaves_though_zenoh_keeps_its_tokens(
         gateway_of(robot, "robot1", NetworkOptions(connect=(proxy.endpoint,), config=str(slow)))
         client = control.node("client")
         fleet.until(lambda: importer._presence._answered)
-        # All are queried with one key, and each answers under its own.
+        # All gateways are queried with one key expression, and each replies under its own key.
         fleet.until(partial(_answers, importer))
 
         async def call() -> str:
@@ -564,8 +565,7 @@ def test_a_name_that_does_not_resolve_yet_is_named_once(
 
     async def opening() -> None:
         task = asyncio.ensure_future(FleetNetwork.open(NetworkOptions(connect=(fleet.endpoint,))))
-        while len(looks) < 3:
-            await asyncio.sleep(0.02)
+        await until(lambda: len(looks) >= 3)
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
 

@@ -9,7 +9,6 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from http.client import HTTPException
@@ -20,6 +19,7 @@ from xmlrpc.client import Error, ServerProxy
 import pytest
 
 from tests.conftest import free_port
+from tests.waiting import wait_until
 
 HERE = Path(__file__).parent
 REAL_PYTHON = "/usr/bin/python3"
@@ -96,10 +96,11 @@ def started_master(stack: str) -> tuple[subprocess.Popen[str], str]:
     }
     program = start(commands[stack], uri, stack)
     try:
-        end = time.monotonic() + PATIENCE
-        while program.poll() is None and not is_ready(program, uri, stack):
-            assert time.monotonic() < end, "the master does not answer"
-            time.sleep(0.05)
+        wait_until(
+            lambda: program.poll() is not None or is_ready(program, uri, stack),
+            PATIENCE,
+            "the master does not answer",
+        )
     except BaseException:
         end_master(program)
         raise

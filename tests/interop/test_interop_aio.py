@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 from std_msgs.msg import String
@@ -14,6 +14,7 @@ from std_srvs.srv import SetBool, SetBoolRequest, Trigger
 from minirospy import Node
 from minirospy.base.errors import ServiceException
 from tests.interop.conftest import PATIENCE
+from tests.waiting import until
 
 PEER = """
 import sys
@@ -64,11 +65,6 @@ async def set_flag(request: SetBoolRequest) -> tuple[bool, str]:
     return request.data, f"flag={request.data}"
 
 
-async def until(condition: Callable[[], bool]) -> None:
-    while not condition():
-        await asyncio.sleep(0.01)
-
-
 def test_aio_node_exchanges_topics_services_and_parameters(
     any_master: str, peer: subprocess.Popen[str]
 ) -> None:
@@ -78,7 +74,7 @@ def test_aio_node_exchanges_topics_services_and_parameters(
             answers = await node.subscribe("/from_peer", String)
             publisher = await node.advertise("/to_peer", String)
             await publisher.wait_for_subscribers()
-            await until(lambda: answers.num_connections == 1)
+            await until(lambda: answers.num_connections == 1, PATIENCE)
             for word in ("one", "zażółć"):
                 await publisher.publish(word)
                 assert (await answers.next()).data == "heard " + word

@@ -21,6 +21,7 @@ from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer
 from tests.interop.conftest import PATIENCE
 from tests.interop.gate import Gate, serving
 from tests.interop.test_interop_foreign import Peer, modules
+from tests.waiting import until
 
 __all__ = ["modules"]
 
@@ -100,8 +101,7 @@ def test_session_of_the_apps_survives_a_restart_of_the_bridge(master: str, modul
                     assert await peer.says("tf") == ["wheel"]
                     assert await peer.says("action") == [[9], [0, 1, 2, 3]]
                     await peer.says("watching")
-                    while "/" not in bridge.node._node.parameters:
-                        await asyncio.sleep(0.01)
+                    await until(lambda: "/" in bridge.node._node.parameters, SECONDS)
                     await node.set_param("/speed", 2.5)
                     assert await peer.says("changed") == [{"name": "/speed", "value": 2.5, "type": "float64"}]
                     await node.delete_param("/speed")

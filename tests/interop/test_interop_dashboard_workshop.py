@@ -8,7 +8,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from tests.conftest import free_port
 from tests.interop.browser import PATIENCE, Page
 from tests.interop.test_interop_dashboard import browse, needs_chromium
 from tests.ros.robot_state_publisher.conftest import end
+from tests.waiting import wait_until
 
 __all__ = ["browse"]
 
@@ -76,10 +76,8 @@ class Student:
     def browser_of(self, line: str) -> Page:
         """Run a command; return the page that it opens."""
         self.type(line)
-        limit = time.monotonic() + PATIENCE
-        while len(found := self._read()) == self._opened:
-            assert time.monotonic() < limit, f"{line} opens no browser"
-            time.sleep(0.05)
+        wait_until(lambda: len(self._read()) != self._opened, PATIENCE, f"{line} opens no browser")
+        found = self._read()
         self._opened = len(found)
         page = self._browse(found[-1], width=1200, height=760)
         page.wait_text("#state", "connected")

@@ -8,7 +8,6 @@ import itertools
 import json
 import math
 import threading
-import time
 from collections.abc import Callable, Iterator
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -28,6 +27,7 @@ from minirospy.aio.topics import Subscription
 from minirospy.core.idl.protocols import Message
 from tests.interop.browser import CHROMIUM, PATIENCE, Page
 from tests.interop.test_interop_foreign import FOREIGN, modules
+from tests.waiting import wait_until
 from tests.web.conftest import Running, run_bridge
 
 __all__ = ["modules", "run_bridge"]
@@ -169,14 +169,6 @@ def robot(bridge: Running) -> Iterator[Robot]:
     robot.stop()
 
 
-def wait_for(condition: Callable[[], bool]) -> None:
-    """Wait until a condition holds, at most PATIENCE."""
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.2)
-
-
 def count(page: Page, tmp_path: Path, color: tuple[int, int, int]) -> int:
     """Return how many visible pixels have approximately this colour."""
     path = tmp_path / "seen.png"
@@ -190,11 +182,11 @@ def look(page: Page, robot: Robot, tmp_path: Path) -> None:
     """Check each panel, and publish from one."""
     page.wait_text("*", "it works")
     page.wait_text("*", "the battery is low")
-    wait_for(lambda: count(page, tmp_path, PINK) > 5000)
-    wait_for(lambda: count(page, tmp_path, GREEN) > 5000)
-    wait_for(lambda: count(page, tmp_path, PLOTTED) > 200)
+    wait_until(lambda: count(page, tmp_path, PINK) > 5000, PATIENCE)
+    wait_until(lambda: count(page, tmp_path, GREEN) > 5000, PATIENCE)
+    wait_until(lambda: count(page, tmp_path, PLOTTED) > 200, PATIENCE)
     page.click("button", "Send it")
-    wait_for(lambda: robot.heard == "from Studio")
+    wait_until(lambda: robot.heard == "from Studio", PATIENCE)
     assert page.errors == []
 
 
