@@ -54,11 +54,10 @@ connect if the kernel has net.ipv4.route_localnet set, as on container hosts.
 class Environment(NamedTuple):
     """The master's URI, this process's address, and the folders for its files.
 
-    ``host`` is the name advertised to peers; ``bind_host`` the address that servers listen on
-    (loopback if ``host`` is, else every interface; with ``ipv6`` the IPv6 addresses). ``ports`` are the ports
-    that a node's servers may use (None: any), such as those that a firewall or a container allows; ``allow`` are
-    the networks that may connect ("": all). ``transport`` "tcp" disables Unix sockets.
-    ``local``: nothing leaves this machine, see :meth:`on_this_machine`.
+    ``host`` is the name advertised to peers; ``bind_host`` the address that servers listen on (loopback if ``host`` is,
+    else every interface; with ``ipv6`` the IPv6 addresses). ``ports`` are the ports that a node's servers may use (None:
+    any), such as those that a firewall or a container allows; ``allow`` are the networks that may connect ("": all).
+    ``transport`` "tcp" disables Unix sockets. ``local``: nothing leaves this machine, see :meth:`on_this_machine`.
     """
 
     master_uri: str

@@ -16,9 +16,8 @@ def return_large_blocks(least: int = _LARGE) -> None:
     """Let glibc map each block of at least ``least`` bytes separately. No effect on other systems and C libraries.
 
     By default glibc maps blocks of at least 128 KiB. But once a larger block (up to 32 MiB) is freed, glibc allocates
-    that size
-    from its heap, which can shrink only from its end: after some large bodies a master kept 270 MiB of unused memory.
-    Growing such a block on the heap also copies it, while a mapping grows in place. Source: mallopt(3).
+    that size from its heap, which can shrink only from its end: after some large bodies a master kept 270 MiB of unused
+    memory. Growing such a block on the heap also copies it, while a mapping grows in place. Source: mallopt(3).
     """
     if sys.platform != "linux":
         return

@@ -42,7 +42,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
     if importlib.util.find_spec("pip") is None:
         return f"uv pip install --python {_quoted_path(sys.executable)}{option} {words}"
 
-    # PEP 668: pip refuses without the option, so the user also used it to install minirospy.
+    # PEP 668: pip requires this option, which the user also needed to install minirospy.
     marker = Path(sysconfig.get_path("stdlib")) / "EXTERNALLY-MANAGED"
     if sys.prefix == sys.base_prefix and marker.is_file():
         option += " --break-system-packages"

@@ -47,8 +47,8 @@ class BoardState:
 class Board:
     """The board ``name`` (default: MINIROSPY_BOARD, else "default"); started if it is not running.
 
-    Thread-safe. Pins are BCM numbers, 0 to 53. Every method raises BoardError if a pin does not
-    exist or the board does not respond.
+    Thread-safe. Pins are BCM numbers, 0 to 53. Every method raises BoardError if a pin does not exist or the board does
+    not respond.
     """
 
     def __init__(self, name: str | None = None) -> None:
@@ -71,8 +71,7 @@ class Board:
         """Press the button at ``pin``, until :meth:`release`.
 
         The wired buttons (11, 12) then read 1. A button at any other pin reads 1 too, unless the pin's pull-up is
-        enabled: then
-        the button connects it to ground, and it reads 0.
+        enabled: then the button connects it to ground, and it reads 0.
         """
         self._link.call(Press(pin))
 

@@ -136,8 +136,7 @@ class ParameterTree:
         """Set a value of ``weight`` bytes; a dictionary replaces the namespace.
 
         If a parameter has the name of a namespace in ``key``, the namespace replaces it. Raise ValueError if the root
-        would not
-        be a dictionary.
+        would not be a dictionary.
         """
         path = _split(key)
         if path:

@@ -104,10 +104,9 @@ class Layout:
         """Drop the oldest blocks that no frame needs; return the frames to decode.
 
         A frame does not need messages that it has decoded, or whose samples its cache would have dropped. The cache drops
-        samples
-        that are too old compared with the newest message, if it accepts that message: a valid transform, later than those
-        before.
-        A frame whose newest message would be rejected must be decoded; then its messages can be dropped too.
+        samples that are too old compared with the newest message, if it accepts that message: a valid transform, later
+        than those before. A frame whose newest message would be rejected must be decoded; then its messages can be
+        dropped too.
         """
         newest = [_sample(self._arrivals[-1].data, offsets) for offsets in self._offsets]
         moves_on = [

@@ -195,8 +195,7 @@ class SlaveApi:
         """Shut the node down.
 
         When a new node with the same name registers, the master calls the old node's address. The old node may have
-        exited long
-        ago and this node may be using its port, so check that the reason contains this node's name.
+        exited long ago and this node may be using its port, so check that the reason contains this node's name.
         """
         meant = _BUMPED.fullmatch(reason) if caller_id == "/master" and isinstance(reason, str) else None
         if meant and meant[1] != self._node.name:
