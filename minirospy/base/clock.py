@@ -148,7 +148,7 @@ class SimulatedClock:
         """Wait until the clock has advanced by ``nanoseconds``; return False if ``stop`` was set meanwhile.
 
         A time of 0 means that the clock has not been set yet: the sleep then starts at the first time that is set.
-        Raise ROSTimeMovedBackwardsException if the clock is set to before the sleep's start.
+        Raise ROSTimeMovedBackwardsException if the clock is set to a time before the sleep started.
         """
         sleeper = SignalSafeEvent()
         self._sleepers.append(sleeper)

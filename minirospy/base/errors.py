@@ -537,7 +537,7 @@ class SerializationError(MessageException):
 
 
 class SerializationOverflowError(SerializationError, OverflowError):
-    """A number exceeds a float32. Programs written for genpy expect an OverflowError, minirospy's code a SerializationError."""
+    """A number exceeds a float32's range. Programs for genpy expect an OverflowError, minirospy's code a SerializationError."""
 
 
 class DeserializationError(MessageException):

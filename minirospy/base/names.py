@@ -146,7 +146,7 @@ def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
 def parse_launch_arguments(words: Iterable[str]) -> dict[str, str]:
     """Return name -> value for the launch-file arguments ``name:=value`` among ``words``.
 
-    As in roslaunch, spaces around a value are stripped, and with an empty value the argument has its default;
+    As in roslaunch, spaces around a value are stripped, and an argument with an empty value has its default;
     special names (``__ns``) and private parameters (``_name``) are not arguments.
     """
     pairs = (word.partition(":=") for word in words)

@@ -28,7 +28,7 @@ Steps = Generator[Need | None, None, _T]  # work that yields between its steps a
 SMALL_ITEMS = 2000  # items; a value with this many takes a few milliseconds to serialize
 
 SHORT_ITEMS = 300
-"""Items; a value with this many takes some 0.1 ms to serialize. A thousand clients may request it at the same time."""
+"""Items; a value with this many takes some 0.1 ms to serialize, which is short even if a thousand clients request it together."""
 
 _LETTERS_PER_ITEM = 16
 

@@ -14,7 +14,7 @@ __all__ = ["did_you_mean", "nearest"]
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return up to three of the ``known`` names that are similar to ``name``."""
     if not isinstance(name, str):
-        # A program passed another type than a string, for which nothing is found either.
+        # A program passed a value that is not a string, for which nothing is found either.
         return []
     names = sorted(set(known))
     # The most common mistake is to omit the package or namespace.

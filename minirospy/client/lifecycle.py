@@ -130,7 +130,7 @@ class Lifecycle:
         return True
 
     def interrupting(self, interrupt: Callable[[], object]) -> contextlib.AbstractContextManager[None]:
-        """During a block, let a shutdown call ``interrupt`` to unblock calls made in it.
+        """Call ``interrupt`` if the node shuts down during a block, to unblock calls made in the block.
 
         A signal handler may call ``interrupt`` at any point in the main thread, so the events that it sets are
         SignalSafeEvents.

@@ -38,7 +38,7 @@ _log = logging.getLogger(__name__)
 
 
 class Session:
-    """The process's node, from before init_node until after its shutdown: its name, lifecycle, clock, tables and loop."""
+    """The process's node, from before init_node until after the node's shutdown: its name, lifecycle, clock, tables and loop."""
 
     def __init__(self, previous: Session | None = None, *, is_fork: bool = False) -> None:
         """Replace the session ``previous``; its name, clock and listeners remain in use until init_node is called."""

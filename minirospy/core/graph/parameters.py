@@ -19,7 +19,7 @@ from minirospy.core.graph.shares import Excess, Shares, holder_of
 
 __all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 
-# nested namespaces and dictionaries; together with the response, they must fit into XML-RPC's 64 levels
+# levels of namespaces and dictionaries; together with the response, they must fit into XML-RPC's 64 levels
 _MAX_DEPTH = 56
 
 _MAX_INT = 2**31

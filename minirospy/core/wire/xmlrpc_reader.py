@@ -117,7 +117,7 @@ class Reader:
         parser.StartDoctypeDeclHandler = self._refuse_doctype
 
     def feed(self, data: bytes | bytearray | memoryview, *, is_last: bool = False) -> None:
-        """Parse more data. Raise RpcProtocolError if the document is not acceptable."""
+        """Parse more data. Raise RpcProtocolError if the document is invalid or exceeds a limit."""
         try:
             self._parser.Parse(data, is_last)
         except self._errors as error:
@@ -258,7 +258,7 @@ def _width(text: str) -> int:
 
 
 def read_document(body: bytes | bytearray) -> Reader:
-    """Read a whole document. Raise RpcProtocolError if it is not acceptable."""
+    """Read a whole document. Raise RpcProtocolError if it is invalid or exceeds a limit."""
     reader = Reader()
     try:
         reader.feed(body, is_last=True)
