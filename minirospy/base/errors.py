@@ -338,7 +338,7 @@ class NoBagError(BagFormatError):
 
 
 class BagVersionError(BagError):
-    """The bag's ``version`` (101 is 1.1) cannot be read, or not be used for this purpose."""
+    """The bag's ``version`` (101 is 1.1) cannot be read, or cannot be used for this purpose."""
 
     def __init__(self, version: int, why: str) -> None:
         super().__init__(version, why)

@@ -40,7 +40,9 @@ _SUFFIXES = ("_msgs", "_srvs")  # of packages in workspaces, which are not in th
 _GENERATED = re.compile(rb"^from [\w.]+\.(?:msg|srv|action)\._\w+ import ", re.MULTILINE)
 """Matches msg/__init__.py as rosidl generates it; ROS 1 generates `from ._Name import *`."""
 _INDEX = os.path.join("share", "ament_index", "resource_index", "packages")
-_MAX_PARENTS = 5  # from a package up to the prefix: prefix/local/lib/python3.12/dist-packages/std_msgs
+_MAX_PARENTS = (
+    5  # folders from a package up to the prefix: prefix/local/lib/python3.12/dist-packages/std_msgs
+)
 
 
 def prefer_ros1() -> None:

@@ -162,7 +162,7 @@ class Lifecycle:
         return self._this_thread.state.awareness is Awareness.NOTIFIED
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
+        """Return whether the node has shut down, and record that the calling thread polls, or, if it has, was notified."""
         self.deferral.poll()
         is_shutdown = self.shutting_down.is_set()
         self._this_thread.state.awareness = Awareness.NOTIFIED if is_shutdown else Awareness.POLLS

@@ -199,7 +199,7 @@ class Session:
         return self.lifecycle.is_shutdown()
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
+        """Return whether the node has shut down, and record that the calling thread polls, or, if it has, was notified."""
         if self._installs_signals:
             # A fork uses the default signal handling until it polls.
             self._installs_signals = False

@@ -34,7 +34,7 @@ _MAX_SCALAR = 2048  # characters in a number, a boolean or a date
 _LONG_TEXT = 16  # 8-KiB pieces after which a string counts as long
 
 _GROWTH_SHIFT = 17
-"""A long string is joined each time it has grown by a sixteenth: its length shifted by this is a number of 8-KiB pieces."""
+"""A string's length shifted right by this is a sixteenth of it, in 8-KiB pieces; joining waits until it has grown so much."""
 
 
 class DateTime(NamedTuple):

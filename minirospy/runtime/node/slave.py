@@ -178,7 +178,7 @@ class SlaveApi:
         return [SUCCESS, "", 0]
 
     def request_topic(self, caller_id: str, topic: str, protocols: object) -> Answer:
-        """Return the address of the topic for the first protocol that both nodes support."""
+        """Return the topic's address for the first protocol that both nodes support."""
         if topic not in self._node.publications:
             return [ERROR, f"Not a publisher of [{topic}]", []]
         host, port = self._node.environment.host, self._node.tcpros_port
