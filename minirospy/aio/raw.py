@@ -52,7 +52,7 @@ class RawSubscription(Handle):
 
     @property
     def headers(self) -> list[Header]:
-        """The connection headers of the connected publishers: the same objects that are passed to ``deliver``."""
+        """The connected publishers' connection headers, which are the same objects that are passed to ``deliver``."""
         return [link.header for link in self._state.subscription.links]
 
     async def close(self) -> None:

@@ -69,7 +69,7 @@ class SimulatedTime:
     async def sleep(self, nanoseconds: int) -> None:
         """Wait until ``nanoseconds`` have passed, or the node shuts down.
 
-        Raise ROSTimeMovedBackwardsException if time is set to before the sleep's start.
+        Raise ROSTimeMovedBackwardsException if time jumps back to before the sleep started.
         """
         while self.now == 0 and not self._stopping.is_set():
             await self._next_tick()

@@ -1,1 +1,1 @@
-"""Modules that all other packages share: errors, names, times, clocks, the environment."""
+"""Modules that all other packages use: errors, names, times, clocks, the environment."""

@@ -1,7 +1,7 @@
 """Terminate child processes with this process, even if it is killed: on Windows with a job object, which the system closes.
 
 On other systems a launcher's guardian process terminates them (`ros/roslaunch/launcher/guardian.py`), and this module
-does nothing. Source: https://learn.microsoft.com/en-us/windows/win32/procthread/job-objects
+has no effect. Source: https://learn.microsoft.com/en-us/windows/win32/procthread/job-objects
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ _CREATE_BREAKAWAY_FROM_JOB = 0x01000000
 
 
 class JobSystem(Protocol):
-    """The system calls for jobs. Each raises OSError if it fails."""
+    """The system calls for job objects. Each raises OSError if it fails."""
 
     def create(self) -> int:
         """Create a job; return its handle."""
 
     def set_limits(self, job: int, flags: int) -> None:
-        """Set the limits of a job."""
+        """Set a job's limits."""
 
     def add_this_process(self, job: int) -> None:
-        """Add this process to a job; processes that it starts from now on belong to the job, too."""
+        """Add this process to a job; processes that it starts after that belong to the job too."""
 
 
 class ProcessJob:
-    """The job of this process and its children. A process cannot leave its job, so all guards share one."""
+    """The job that contains this process and its children. A process cannot leave its job, so all guards share one."""
 
     def __init__(self, system: JobSystem) -> None:
         self._system = system
@@ -46,11 +46,12 @@ class ProcessJob:
         self._guards = 0
 
     def guard(self) -> bool:
-        """Let the system terminate the children with this process; return whether it will."""
+        """Let the system terminate the children together with this process; return whether it will."""
         with self._lock:
             try:
                 if self._job is None:
-                    # Never closed here: the system closes it when the process has exited, for whatever reason.
+                    # The handle is never closed here: the system closes it when the process has exited, for whatever
+                    # reason.
                     job = self._system.create()
                     self._system.set_limits(job, _BREAKAWAY_OK)
                     self._system.add_this_process(job)
@@ -74,10 +75,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """Until :meth:`close`, child processes are terminated with this process if ``is_guarded`` is true.
-
-    A context manager.
-    """
+    """A context manager: until :meth:`close`, child processes are terminated with this process if ``is_guarded`` is true."""
 
     def __init__(self, job: ProcessJob | None) -> None:
         self._job = job if job is not None and job.guard() else None
@@ -98,7 +96,7 @@ class ChildLifetime:
 
 
 def guard_children() -> ChildLifetime:
-    """On Windows, let every process started from now on terminate with this one, until the result is closed."""
+    """On Windows, let every process started after this terminate with this process, until the result is closed."""
     return ChildLifetime(_process_job())
 
 
@@ -108,9 +106,9 @@ def start_outside_of_job(
     creationflags: int = 0,
     **options: Any,
 ) -> subprocess.Popen[bytes]:
-    """Start a process that may outlive this one, even if the children of this one are guarded.
+    """Start a process that may outlive this one, even if this process's children are guarded.
 
-    ``options`` are those of subprocess.Popen. Raise OSError.
+    ``options`` are those of subprocess.Popen. Raise OSError if the process cannot be started.
     """
     import subprocess
 
@@ -120,8 +118,8 @@ def start_outside_of_job(
                 command, creationflags=creationflags | _CREATE_BREAKAWAY_FROM_JOB, **options
             )
         except PermissionError:
-            # This process belongs to another program's job, such as an IDE's or a service's, which lets no process
-            # leave.
+            # This process belongs to another program's job, such as an IDE's or a service's, and that job does not
+            # allow processes to leave.
             pass
     return subprocess.Popen(command, creationflags=creationflags, **options)
 

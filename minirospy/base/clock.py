@@ -1,6 +1,6 @@
 """Clocks: the current time, and waiting until a given time.
 
-There are a wall clock, and a simulated one that is set by other code (http://wiki.ros.org/Clock). Times are
+There are a wall clock, and a simulated clock that other code sets (http://wiki.ros.org/Clock). Times are
 nanoseconds since the epoch.
 """
 
@@ -27,7 +27,7 @@ __all__ = [
 _CLOCK = struct.Struct("<II")
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
 """Seconds. The main thread, which receives signals, waits in slices: on Windows Ctrl-C does not interrupt a wait, and on
-other systems a Ctrl-C just before the start of a wait is noticed only after it.
+other systems a Ctrl-C just before the start of a wait takes effect only after it.
 """
 
 _POLL_SECONDS = 0.1
@@ -36,16 +36,16 @@ _POLL_SECONDS = 0.1
 class SignalSafeEvent(threading.Event):
     """An event that a signal handler may set or wait for, whichever code it interrupts.
 
-    The interrupted thread may be inside wait() or set() of the same event. threading.Event takes a lock there, so a handler
+    The interrupted thread may be inside wait() or set() of the same event. threading.Event acquires a lock there, so a handler
     that sets the event, or waits for another thread that needs the lock, would deadlock.
-    This event has no lock: its list operations are atomic.
+    This event has no lock, because its list operations are atomic.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._is_set = False
         self._waiting: list[threading.Lock] = []
-        """A lock for each waiting thread, acquired until the event is set."""
+        """One lock per waiting thread, acquired until the event is set."""
 
     def is_set(self) -> bool:
         """Return whether the event is set."""
@@ -53,10 +53,10 @@ class SignalSafeEvent(threading.Event):
 
     def set(self) -> None:
         """Set the event, and wake the waiting threads."""
-        # Set the flag first: a thread adds itself to the list, and then checks the flag.
+        # Set the flag before reading the list, because a thread adds itself to the list and then checks the flag.
         self._is_set = True
         for lock in self._waiting.copy():
-            # Another thread, or a handler in this one, has already released it.
+            # Another thread, or a signal handler in this thread, has already released the lock.
             with contextlib.suppress(RuntimeError):
                 lock.release()
 
@@ -80,7 +80,7 @@ class SignalSafeEvent(threading.Event):
 
 
 def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
-    """Do ``event.wait(timeout)`` so that a signal can interrupt it on every OS."""
+    """Do the same as ``event.wait(timeout)``, so that a signal can interrupt it on every OS."""
     if threading.current_thread() is not threading.main_thread():
         return event.wait(timeout)
     end = None if timeout is None else time.monotonic() + timeout
@@ -93,8 +93,8 @@ def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
 
 
 def time_of_clock_message(body: bytes | memoryview) -> int | None:
-    """Return the nanoseconds in a serialized message of /clock; None if it is not a rosgraph_msgs/Clock."""
-    # A Clock is one time: seconds and nanoseconds. A node may publish another type.
+    """Return the nanoseconds in a serialized /clock message, or None if it is not a rosgraph_msgs/Clock."""
+    # A Clock is one time: seconds and nanoseconds. Check the size, because a node may publish another type.
     if len(body) != _CLOCK.size:
         return None
     seconds, nanoseconds = _CLOCK.unpack(body)
@@ -112,7 +112,7 @@ class Clock(Protocol):
 
 
 class WallClock:
-    """The time of the machine."""
+    """The system time."""
 
     now = staticmethod(time.time_ns)
     """Return the nanoseconds since the epoch."""
@@ -123,21 +123,21 @@ class WallClock:
 
 
 class SimulatedClock:
-    """A clock that is set by a simulator through /clock, or by a test."""
+    """A clock that a simulator sets through /clock, or a test."""
 
     def __init__(self, now: int = 0, changed: threading.Condition | None = None) -> None:
-        """Take ``changed``, which is notified each time the clock is set."""
+        """Start at ``now``; ``changed`` is notified each time the clock is set."""
         self._now = now
         self._changed = changed or threading.Condition()
-        # Not the condition: a signal handler may wait for a thread that sets the clock or sleeps.
+        # Do not use the condition: a signal handler may wait for a thread that sets the clock or sleeps.
         self._sleepers: list[SignalSafeEvent] = []
 
     def now(self) -> int:
-        """Return the time set last; 0 before the first one."""
+        """Return the time that was set last, or 0 if none was set."""
         return self._now
 
     def set(self, now: int) -> None:
-        """Set the time and wake the sleepers that waited for it."""
+        """Set the time, and wake the sleepers so that they check it."""
         with self._changed:
             self._now = now
             self._changed.notify_all()
@@ -147,8 +147,8 @@ class SimulatedClock:
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
         """Wait until the clock has advanced by ``nanoseconds``; return False if ``stop`` was set meanwhile.
 
-        While the time is 0, it has not been set yet: the sleep starts at the first time that is set.
-        Raise ROSTimeMovedBackwardsException if the clock is set to before the sleep's start.
+        A time of 0 means that the clock has not been set yet: the sleep then starts at the first time that is set.
+        Raise ROSTimeMovedBackwardsException if the clock is set to a time before the sleep started.
         """
         sleeper = SignalSafeEvent()
         self._sleepers.append(sleeper)

@@ -24,7 +24,7 @@ def close_each(functions: Iterable[CloseFunction]) -> None:
 
 
 async def close_all(functions: Iterable[AsyncCloseFunction]) -> None:
-    """Call the functions, some of which may be coroutine functions, as :func:`close_each` does. A cancellation stops it."""
+    """Do the same as :func:`close_each`, also for coroutine functions. A cancellation stops it."""
     for function in functions:
         try:
             closing = function()

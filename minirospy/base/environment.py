@@ -1,6 +1,6 @@
-"""Read the environment variables of ROS and of minirospy into one frozen record.
+"""Read ROS's and minirospy's environment variables into one frozen record.
 
-It is read once at the start of a process (a command's main, init_node) and passed on as an argument.
+The record is created once at the start of a process (a command's main, init_node) and passed on as an argument.
 Source: http://wiki.ros.org/ROS/EnvironmentVariables and http://wiki.ros.org/ROS/NetworkSetup.
 """
 
@@ -37,7 +37,7 @@ DEFAULT_MASTER_PORT = 11311
 _SWITCH = {"": False, "0": False, "off": False, "false": False, "1": True, "on": True, "true": True}
 
 DISTRO = "noetic\n"
-"""The value of /rosdistro: the ROS 1 distribution whose behaviour minirospy follows; with a newline, as ROS sets it."""
+"""The value of /rosdistro: the ROS 1 distribution that minirospy behaves like, with a newline, as ROS sets it."""
 
 ROS_VERSION = "1.17.0\n"  # the value of /rosversion
 
@@ -46,19 +46,18 @@ _RUN_ID = re.compile(r"[\w-][\w.+@ -]{0,99}")
 
 
 LOOPBACK = "127.0.0.0/8, ::1"
-"""The networks that may connect to a local process. Listening only on loopback is not enough: a kernel with
-net.ipv4.route_localnet, as container hosts set it, lets neighbouring machines in.
+"""The networks that may connect to a local process. Listening only on loopback is not enough: neighbouring machines can
+connect if the kernel has net.ipv4.route_localnet set, as on container hosts.
 """
 
 
 class Environment(NamedTuple):
-    """The master's URI, the address of this process, and the folders of its files.
+    """The master's URI, this process's address, and the folders for its files.
 
-    ``host`` is the name advertised to peers; ``bind_host`` the address that servers listen on
-    (loopback if ``host`` is, else every interface; with ``ipv6`` the IPv6 addresses). ``ports`` are the ports
-    that a node's servers may use (None: any), such as those that a firewall or a container lets through; ``allow``
-    the networks that may connect ("": all). ``transport`` "tcp" disables Unix sockets.
-    ``local``: nothing leaves this machine, see :meth:`on_this_machine`.
+    ``host`` is the name advertised to peers; ``bind_host`` the address that servers listen on (loopback if ``host`` is,
+    else every interface; with ``ipv6`` the IPv6 addresses). ``ports`` are the ports that a node's servers may use (None:
+    any), such as those that a firewall or a container allows; ``allow`` are the networks that may connect ("": all).
+    ``transport`` "tcp" disables Unix sockets. ``local``: nothing leaves this machine, see :meth:`on_this_machine`.
     """
 
     master_uri: str
@@ -77,9 +76,9 @@ class Environment(NamedTuple):
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
         """Return the record for ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
 
-        Raise UsageError on a ROS_MASTER_URI that is not http://host:port, on a ROS_HOSTNAME or ROS_IP that is
-        not just a name or address, on MINIROSPY_PORTS that is not like 40000-40100, on an unknown MINIROSPY_TRANSPORT
-        or MINIROSPY_LOCAL, and on a master on another machine with MINIROSPY_LOCAL=1.
+        Raise UsageError if ROS_MASTER_URI is not http://host:port, ROS_HOSTNAME or ROS_IP is more than a name or address,
+        MINIROSPY_PORTS is not like 40000-40100, MINIROSPY_TRANSPORT or MINIROSPY_LOCAL is unknown, or the master is on another
+        machine although MINIROSPY_LOCAL is 1.
         """
         from pathlib import Path
 
@@ -102,12 +101,12 @@ class Environment(NamedTuple):
         return environment.on_this_machine() if local else environment
 
     def on_this_machine(self) -> Environment:
-        """Return the record of a process that listens on loopback, advertises localhost and refuses other machines."""
+        """Return the record for a process that listens on loopback, advertises localhost and refuses other machines."""
         return self._replace(host="localhost", allow=LOOPBACK, local=True)
 
     @property
     def bind_host(self) -> str:
-        """Return the address to listen on, as rospy chooses it."""
+        """Return the address to listen on, chosen as in rospy."""
         if self.host.startswith("127."):
             return self.host
         if self.host in {"localhost", "::1"}:
@@ -116,30 +115,33 @@ class Environment(NamedTuple):
 
     @property
     def same_host(self) -> bool:
-        """Return whether processes on this machine may be connected through Unix sockets."""
+        """Return whether Unix sockets may be used for connections to processes on this machine."""
         return self.transport != "tcp"
 
     @property
     def uri_host(self) -> str:
-        """Return ``host`` in the form used in a URI: an IPv6 address in brackets."""
+        """Return ``host`` as it is written in a URI: an IPv6 address in brackets."""
         return f"[{self.host}]" if ":" in self.host else self.host
 
     @property
     def master_address(self) -> tuple[str, int]:
-        """Return the (host, port) of the master."""
+        """Return the master's (host, port)."""
         host, port, _ = split_uri(self.master_uri)
         return host, port
 
     @property
     def master_is_local(self) -> bool:
-        """Return whether the master's host is this machine, so that a tool may start one."""
+        """Return whether the master's host is this machine, so that a tool may start a master."""
         return is_own_host(self.master_address[0], self.host)
 
 
 def master_and_namespace(
     environ: Mapping[str, str], *, master_uri: str = "", namespace: str = "", **_: str
 ) -> tuple[str, str]:
-    """Return the master's URI and the namespace, which suffice for a tool's queries. Raise as Environment.read."""
+    """Return the master's URI and the namespace, which are enough for a tool's queries.
+
+    Raise UsageError as Environment.read does, if a variable is invalid.
+    """
     uri = master_uri or environ.get("ROS_MASTER_URI") or f"http://localhost:{DEFAULT_MASTER_PORT}"
     uri = _checked_uri(uri)
     if is_local(environ):
@@ -148,7 +150,7 @@ def master_and_namespace(
 
 
 def is_local(environ: Mapping[str, str]) -> bool:
-    """Return whether MINIROSPY_LOCAL restricts this process to this machine. Raise UsageError on an unknown value."""
+    """Return whether MINIROSPY_LOCAL restricts this process to this machine. Raise UsageError if the value is unknown."""
     text = environ.get("MINIROSPY_LOCAL", "")
     if text.lower() not in _SWITCH:
         raise UsageError(f"MINIROSPY_LOCAL [{text}] is neither 1 nor 0")
@@ -158,7 +160,8 @@ def is_local(environ: Mapping[str, str]) -> bool:
 def export_local(environ: MutableMapping[str, str]) -> None:
     """Restrict programs started with ``environ`` to this machine if MINIROSPY_LOCAL is set.
 
-    Programs with other ROS clients do not know that variable. Raise UsageError as Environment.read.
+    Set ROS's own variables, because programs with other ROS clients ignore MINIROSPY_LOCAL. Raise UsageError as
+    Environment.read does, if a variable is invalid.
     """
     if is_local(environ):
         environ["ROS_MASTER_URI"], _ = master_and_namespace(environ)
@@ -167,11 +170,11 @@ def export_local(environ: MutableMapping[str, str]) -> None:
 
 
 def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
-    """Return the (host, port, path) of ``scheme://host:port/path``. Raise ValueError.
+    """Return the (host, port, path) in ``scheme://host:port/path``. Raise ValueError if the URI is malformed.
 
-    It does not use urllib.parse, whose import takes a twentieth of a command's time.
+    This does not use urllib.parse, because importing it takes a twentieth of a command's run time.
     """
-    # The path is sent in the first line of a request, and the URI is written to log lines.
+    # Reject them, because the path is sent in the first line of a request, and the URI is written to log lines.
     if has_controls(uri) or " " in uri:
         raise ValueError(f"[{escaped(uri)}] is not of the form {scheme}://host:port")
     found, _, rest = uri.partition("://")
@@ -189,14 +192,14 @@ def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
 
 
 def is_own_host(host: str, own: str = "localhost") -> bool:
-    """Return whether a name or address belongs to this machine, which is advertised as ``own``."""
+    """Return whether a name or address belongs to this machine, which advertises itself as ``own``."""
     if host in {"localhost", "::1", own, socket.gethostname()} or host.startswith("127."):
         return True
     try:
         address = socket.gethostbyname(host)
         if address.startswith("127."):
             return True
-        # Only an address of this machine can be bound (but Wine binds any address for datagrams, so use TCP).
+        # Only this machine's addresses can be bound (but Wine binds any address for datagrams, so use TCP).
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.bind((address, 0))
     except OSError:
@@ -205,9 +208,9 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
 
 
 def wrong_address(environment: Environment) -> str:
-    """Return a description of the fault in ROS_IP or ROS_HOSTNAME, by which peers reach this process; "" if none is found.
+    """Return a description of the fault in ROS_IP or ROS_HOSTNAME, which peers use to reach this process, or "".
 
-    Names are not checked: an unreachable name server would delay every program.
+    Names are not checked, because an unreachable name server would delay every program.
     """
     host = environment.host
     variable = "ROS_HOSTNAME" if os.environ.get("ROS_HOSTNAME") else "ROS_IP"
@@ -221,9 +224,9 @@ def wrong_address(environment: Environment) -> str:
 
 
 def run_folder(log_dir: Path, run_id: object) -> Path | None:
-    """Return the folder of a run's log files; None if the /run_id cannot be a single folder's name.
+    """Return the folder for a run's log files, or None if the /run_id is not valid as a folder name.
 
-    Any node may set that parameter, also to a path that leads elsewhere.
+    Any node may set that parameter, even to a path that leads outside of ``log_dir``.
     """
     if not isinstance(run_id, str) or not _RUN_ID.fullmatch(run_id):
         return None
@@ -241,7 +244,7 @@ def _checked_uri(uri: str) -> str:
 
 
 def _local_uri(uri: str) -> str:
-    """Return the URI of a master on this machine in the form that reaches one listening only on loopback."""
+    """Return the URI of a master on this machine, changed so that it reaches a master that listens only on loopback."""
     host, port, path = split_uri(uri)
     if host in ("localhost", "127.0.0.1", "::1"):
         return uri
@@ -254,7 +257,7 @@ def _local_uri(uri: str) -> str:
 
 
 def _checked_host(host: str, variable: str) -> str:
-    # A single colon precedes a port; several belong to an IPv6 address.
+    # A single colon precedes a port; several are part of an IPv6 address.
     if "/" in host or host.count(":") == 1 or host != host.strip() or "[" in host:
         raise UsageError(f"{variable} [{host}] must be a name or an address alone, without http:// and port")
     return host
@@ -287,7 +290,7 @@ def _advertised_host(environ: Mapping[str, str]) -> str:
             return _checked_host(named, variable)
     name = socket.gethostname()
     try:
-        # Looking up a str would import the IDNA codec.
+        # Pass bytes, because looking up a str would import the IDNA codec.
         socket.getaddrinfo(name.encode() if name.isascii() else name, None, socket.AF_INET)
     except OSError:
         return "localhost"

@@ -6,16 +6,16 @@
     +-- MinirospyError                  an error with a one-line explanation for the user in str()
     |   +-- UsageError                  usage error of a command (exit status 2)
     |   +-- NotFoundError               a package, node, type, topic or file that does not exist (with similar names)
-    |   +-- MasterUnreachableError      no master answers at the URI
-    |   +-- NodeUnreachableError        a node that the master knows does not answer
+    |   +-- MasterUnreachableError      no master responds at the URI
+    |   +-- NodeUnreachableError        a node that is registered with the master does not respond
     |   +-- RpcError                    a remote procedure call (XML-RPC) failed
-    |   |   +-- RpcFault                the peer answered with an XML-RPC fault
-    |   |   +-- RpcRefused              the peer answered with a status code other than 1
+    |   |   +-- RpcFault                the peer responded with an XML-RPC fault
+    |   |   +-- RpcRefused              the peer responded with a status code other than 1
     |   |   +-- RpcProtocolError        the peer's bytes are not HTTP or not XML-RPC
-    |   |   +-- RpcUnreachable          the peer could not be reached, or did not answer in time
+    |   |   +-- RpcUnreachable          the peer could not be reached, or did not respond in time
     |   +-- WireError                   bytes that are not TCPROS
-    |   |   +-- HandshakeRefused        the peer answered a connection header with ``error=``
-    |   |   +-- CallFailed              the service answered a call with an error
+    |   |   +-- HandshakeRefused        the peer replied to a connection header with ``error=``
+    |   |   +-- CallFailed              the service responded to a call with an error
     |   +-- SourceError                 a fault in a text written by a person (file, line)
     |   |   +-- DefinitionError         a .msg, .srv or .action text that cannot be parsed
     |   |   +-- ManifestError           a package.xml that cannot be read
@@ -25,7 +25,7 @@
     |   |   +-- RvizFileError           a .rviz file that cannot be read or written
     |   +-- BagError                    a bag that cannot be read or written
     |   |   +-- BagFormatError          bytes that violate the bag format
-    |   |   +-- BagVersionError         a version of the format that cannot be read
+    |   |   +-- BagVersionError         a format version that cannot be read
     |   |   +-- BagUnindexedError       a bag without its index: it was not closed, or its end is missing
     |   |   |   `-- McapUnindexedError  an MCAP file without its summary, for the same reasons
     |   |   +-- BagEncryptedError       the bag is encrypted
@@ -36,7 +36,7 @@
     |   +-- ValueTextError              a typed value that is not YAML, or does not fit its target
     +-- ROSException                    rospy's tree (http://wiki.ros.org/rospy/Overview/Exceptions)
     |   +-- ROSInitException
-    |   +-- ThreadLimitError            the system lets this process start no more threads
+    |   +-- ThreadLimitError            the system allows this process no more threads
     |   +-- ROSSerializationException
     |   +-- ROSInterruptException
     |   |   +-- ROSTimeMovedBackwardsException
@@ -49,8 +49,8 @@
     |   +-- ConnectivityException       the two frames are in different trees
     |   +-- LookupException             an unknown frame, or a loop of transforms
     |   +-- ExtrapolationException      a time without data
-    |   +-- InvalidArgumentException    a frame's name that is empty or starts with a slash
-    |   +-- TimeoutException            a buffer server that does not answer
+    |   +-- InvalidArgumentException    a frame name that is empty or starts with a slash
+    |   +-- TimeoutException            a buffer server that does not respond
     +-- MessageException                genpy's tree: values and bytes that do not match a message
         +-- SerializationError
         |   +-- SerializationOverflowError
@@ -131,7 +131,7 @@ class UsageError(MinirospyError):
 
 
 class NotFoundError(MinirospyError):
-    """A named object does not exist; the text suggests similar names that do.
+    """A named object does not exist; the message suggests similar names that do.
 
     ``kind`` is the kind of object that was looked up ("package", "message type"), ``name`` the given name,
     ``known`` every name that exists, ``hint`` an instruction for the user.
@@ -154,7 +154,7 @@ class NotFoundError(MinirospyError):
 
 
 class MasterUnreachableError(MinirospyError):
-    """No master answers at ``uri``; ``why``: the reason why this process cannot call it; ``cause``: why it does not answer."""
+    """No master responds at ``uri``. ``why``: the reason why this process cannot call it; ``cause``: why it does not respond."""
 
     def __init__(self, uri: str, why: str = "", cause: str = "") -> None:
         super().__init__(uri, why, cause)
@@ -174,7 +174,7 @@ class MasterUnreachableError(MinirospyError):
 
 
 class NodeUnreachableError(MinirospyError):
-    """The node (or another ``kind``: "service") ``name``, registered at ``uri``, does not answer."""
+    """The node ``name`` (or another ``kind``: "service"), registered at ``uri``, does not respond."""
 
     def __init__(self, name: str, uri: str, why: str = "", kind: str = "node") -> None:
         super().__init__(name, uri, why, kind)
@@ -194,7 +194,7 @@ class NodeUnreachableError(MinirospyError):
 SUSPENDED = (
     "it takes connections, so it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
 )
-"""The explanation of a process that accepts connections but answers nothing."""
+"""The explanation if a process accepts connections but does not respond."""
 
 
 class RpcError(MinirospyError):
@@ -202,7 +202,7 @@ class RpcError(MinirospyError):
 
 
 class RpcFault(RpcError):
-    """The peer answered with an XML-RPC fault."""
+    """The peer responded with an XML-RPC fault."""
 
     def __init__(self, code: int, text: str) -> None:
         super().__init__(code, text)
@@ -214,7 +214,7 @@ class RpcFault(RpcError):
 
 
 class RpcRefused(RpcError):
-    """The answer to a ROS API call has a status ``code`` other than 1 (0 failure, -1 error)."""
+    """The response to a ROS API call has a status ``code`` other than 1 (0 failure, -1 error)."""
 
     def __init__(self, method: str, code: int, text: str) -> None:
         super().__init__(method, code, text)
@@ -227,7 +227,7 @@ class RpcRefused(RpcError):
 
 
 class RpcProtocolError(RpcError):
-    """A peer's bytes are not HTTP, or not XML-RPC; ``status`` is the HTTP status with which a server answers."""
+    """A peer's bytes are not HTTP, or not XML-RPC; ``status`` is the HTTP status with which a server responds."""
 
     def __init__(self, text: str, *, status: int = 400) -> None:
         super().__init__(text)
@@ -235,7 +235,7 @@ class RpcProtocolError(RpcError):
 
 
 class RpcUnreachable(RpcError):
-    """The peer at ``uri`` could not be reached, or did not answer in time."""
+    """The peer at ``uri`` could not be reached, or did not respond in time."""
 
     def __init__(self, uri: str, why: str) -> None:
         super().__init__(uri, why)
@@ -247,7 +247,7 @@ class RpcUnreachable(RpcError):
 
 
 class RpcTimeout(RpcUnreachable):
-    """The peer accepted the connection but did not answer in time: its process is stopped, or busy."""
+    """The peer accepted the connection but did not respond in time: its process is stopped, or busy."""
 
     def __init__(self, uri: str, seconds: float) -> None:
         super().__init__(uri, f"timed out after {seconds:g} s")
@@ -258,15 +258,15 @@ class RpcTimeout(RpcUnreachable):
 
 
 class WireError(MinirospyError):
-    """Bytes that are not TCPROS."""
+    """The bytes are not TCPROS."""
 
 
 class HandshakeRefused(WireError):
-    """The peer answered a connection header with ``error=text``."""
+    """The peer replied to a connection header with ``error=text``."""
 
 
 class CallFailed(WireError):
-    """The service answered a call with an error; ``text`` is encoded as the server sent it."""
+    """The service responded to a call with an error; ``text`` is encoded as the server sent it."""
 
     def __init__(self, text: bytes) -> None:
         super().__init__(text)
@@ -290,7 +290,7 @@ class SourceError(MinirospyError):
 
 
 class DefinitionError(SourceError):
-    """An interface definition cannot be parsed; if it has no file, ``file`` is its type."""
+    """An interface definition cannot be parsed; if it is not in a file, ``file`` is its type."""
 
 
 class ManifestError(SourceError):
@@ -310,7 +310,7 @@ class RvizFileError(SourceError):
 
 
 class UrdfError(SourceError):
-    """A robot description cannot be read. ``context``: the enclosing elements in the words of ROS's parser, innermost first."""
+    """A robot description cannot be read. ``context``: the enclosing elements as ROS's parser describes them, innermost first."""
 
     def __init__(self, file: str, line: int, text: str, context: tuple[str, ...] = ()) -> None:
         super().__init__(file, line, ": ".join((text, *context[:1])))
@@ -318,7 +318,7 @@ class UrdfError(SourceError):
 
 
 class BagError(MinirospyError):
-    """A bag cannot be read or written; ``str()`` does not contain the file's name, which the caller knows."""
+    """A bag cannot be read or written; ``str()`` does not contain the file name, because the caller has it."""
 
 
 class BagFormatError(BagError):
@@ -338,7 +338,7 @@ class NoBagError(BagFormatError):
 
 
 class BagVersionError(BagError):
-    """The bag's ``version`` (101 is 1.1) cannot be read, or not be used for this purpose."""
+    """The bag's ``version`` (101 is 1.1) cannot be read, or cannot be used for this purpose."""
 
     def __init__(self, version: int, why: str) -> None:
         super().__init__(version, why)
@@ -368,7 +368,7 @@ class McapUnindexedError(BagUnindexedError):
 
 
 class BagEncryptedError(BagError):
-    """The bag is encrypted by ``encryptor``, a plugin of rosbag that is not supported."""
+    """The bag is encrypted by ``encryptor``, a rosbag plugin that is not supported."""
 
     def __init__(self, encryptor: str) -> None:
         super().__init__(encryptor)
@@ -382,7 +382,7 @@ class BagEncryptedError(BagError):
 
 
 class BagCompressionError(BagError):
-    """Chunks with this ``compression`` cannot be read or written; ``why`` states the reason."""
+    """Chunks with this ``compression`` cannot be read or written; ``why`` is the reason."""
 
     def __init__(self, compression: str, why: str = "") -> None:
         super().__init__(compression, why)
@@ -407,7 +407,7 @@ class BridgeProtocolError(BridgeError):
 
 
 class ValueTextError(MinirospyError):
-    """A value typed by a person (``text``, or the name of the file or parameter) cannot be used; ``why`` is the reason."""
+    """A value typed by a person (``text``, or the name of its file or parameter) cannot be used; ``why`` is the reason."""
 
     def __init__(self, text: str, why: str) -> None:
         super().__init__(text, why)
@@ -428,7 +428,7 @@ class ROSInitException(ROSException):
 
 
 class ThreadLimitError(ROSException):
-    """The system lets this process start no more threads; ``limits`` are the known limits."""
+    """The system allows this process no more threads; ``limits`` are the known limits."""
 
     def __init__(self, threads: int, limits: list[str]) -> None:
         super().__init__(threads, limits)
@@ -461,11 +461,11 @@ class ROSSerializationException(ROSException):
 
 
 class ROSInterruptException(ROSException):
-    """The node's shutdown interrupted a blocking call. rospy's exception is a subclass: `minirospy.client.lifecycle`."""
+    """The node's shutdown interrupted a blocking call. rospy's exception is a subclass in `minirospy.client.lifecycle`."""
 
 
 class ROSTimeMovedBackwardsException(ROSInterruptException):
-    """Simulated time jumped back to ``time`` seconds before the start of a sleep."""
+    """Simulated time jumped back to ``time`` seconds before a sleep started."""
 
     def __init__(self, time: float) -> None:
         super().__init__("ROS time moved backwards")
@@ -511,25 +511,25 @@ class LookupException(TransformException):
 
 
 class ExtrapolationException(TransformException):
-    """The buffer has no data for the time of a lookup."""
+    """The buffer has no data for the requested time."""
 
     __module__ = "tf2"
 
 
 class InvalidArgumentException(TransformException):
-    """A frame's name is empty, or starts with a slash."""
+    """A frame name is empty, or starts with a slash."""
 
     __module__ = "tf2"
 
 
 class TimeoutException(TransformException):
-    """A buffer server did not answer in time."""
+    """A buffer server did not respond in time."""
 
     __module__ = "tf2"
 
 
 class MessageException(Exception):
-    """Values that do not match a message's definition."""
+    """Values do not match a message's definition."""
 
 
 class SerializationError(MessageException):
@@ -537,8 +537,8 @@ class SerializationError(MessageException):
 
 
 class SerializationOverflowError(SerializationError, OverflowError):
-    """A number exceeds a float32: programs for genpy expect an OverflowError, minirospy's code a SerializationError."""
+    """A number exceeds a float32's range. Programs for genpy expect an OverflowError, minirospy's code a SerializationError."""
 
 
 class DeserializationError(MessageException):
-    """Bytes that are not a message of the expected type."""
+    """The bytes are not a message of the expected type."""

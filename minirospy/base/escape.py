@@ -1,7 +1,7 @@
-"""Make untrusted text safe to display: names, URIs and messages chosen by peers and files.
+"""Make untrusted text safe to display: names, URIs and messages from peers and files.
 
-A control character in them could move a terminal's cursor, set its title, forge a line of a log file or an HTTP header.
-Pure.
+A control character in them could move a terminal's cursor, set its title, or forge a line in a log file or an HTTP
+header. Pure.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TextIO
 __all__ = ["SafeTerminal", "escaped", "has_controls", "own_output"]
 
 _CONTROLS = r"\x00-\x1f\x7f-\x9f\u2028\u2029"
-# Direction marks reverse the following text: a name could look like another one.
+# Direction marks reverse the text that follows, so that a name could look like another one.
 _CONTROL = re.compile(f"[{_CONTROLS}\u202a-\u202e\u2066-\u2069]")
 _NAME_CONTROL = re.compile(f"[{_CONTROLS}]")
 
@@ -33,14 +33,14 @@ def escaped(text: str, keep: str = "") -> str:
 
 
 def has_controls(text: str) -> bool:
-    """Return whether ``text`` contains a control character or a line separator, and so is not a name or a URI."""
+    """Return whether ``text`` contains a control character or a line separator, and therefore is not a name or a URI."""
     return _NAME_CONTROL.search(text) is not None
 
 
 def own_output() -> TextIO:
-    """Return the standard output for a picture that moves the cursor; :class:`SafeTerminal` would escape these sequences.
+    """Return the standard output for drawings that move the cursor; :class:`SafeTerminal` would escape these sequences.
 
-    The caller must escape untrusted text in the picture.
+    The caller must escape untrusted text in the drawing.
     """
     if isinstance(sys.stdout, SafeTerminal) and sys.__stdout__ is not None:
         sys.stdout.flush()
@@ -51,7 +51,7 @@ def own_output() -> TextIO:
 class SafeTerminal(io.TextIOWrapper):
     """A standard stream on a terminal that displays control characters instead of executing them, as `ls` does for names.
 
-    Sequences from the commands themselves (:data:`_OWN_SEQUENCE`), line feeds and tabs pass unchanged.
+    Sequences from the commands themselves (:data:`_OWN_SEQUENCE`), line feeds and tabs are written unchanged.
     """
 
     @classmethod
@@ -75,12 +75,12 @@ class SafeTerminal(io.TextIOWrapper):
         return super().write(text)
 
     def close(self) -> None:
-        """Write pending output; the terminal itself stays open for the interpreter's own stream."""
-        # ValueError: the stream was closed before.
+        """Write pending output; the terminal itself stays open, because the interpreter's own stream uses it."""
+        # ValueError means that the stream was already closed.
         with contextlib.suppress(ValueError):
             self.flush()
             self.detach()
 
     def __del__(self) -> None:
-        # TextIOWrapper.__del__ would close the buffer, which sys.__stdout__ shares.
+        # Do nothing: TextIOWrapper.__del__ would close the buffer, which sys.__stdout__ shares.
         pass

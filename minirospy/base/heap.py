@@ -1,4 +1,4 @@
-"""Settings of the C library's heap, so that freed blocks are returned to the system."""
+"""Settings for the C library's heap, so that freed blocks are returned to the system."""
 
 from __future__ import annotations
 
@@ -13,29 +13,30 @@ _LARGE = 256 * 1024
 
 
 def return_large_blocks(least: int = _LARGE) -> None:
-    """Have glibc map each block of at least ``least`` bytes separately. No effect on other systems and C libraries.
+    """Let glibc map each block of at least ``least`` bytes separately. No effect on other systems and C libraries.
 
-    By default glibc maps blocks from 128 KiB on. But once a larger block (up to 32 MiB) is freed, glibc allocates that size
-    from its heap, which can shrink only from its end: after some large bodies a master kept 270 MiB of unused memory.
-    Growing such a block on the heap also copies it, while a mapping grows in place. Source: mallopt(3).
+    By default glibc maps blocks of at least 128 KiB. But once a larger block (up to 32 MiB) is freed, glibc allocates
+    that size from its heap, which can shrink only from its end: after some large bodies a master kept 270 MiB of unused
+    memory. Growing such a block on the heap also copies it, while a mapping grows in place. Source: mallopt(3).
     """
     if sys.platform != "linux":
         return
     import ctypes
 
-    # musl has no such function; a Python without libffi has no ctypes.
+    # musl has no such function, and a Python without libffi has no ctypes.
     with contextlib.suppress(OSError, AttributeError):
         library = ctypes.CDLL(None)
         library.mallopt(_M_MMAP_THRESHOLD, least)
         if least > _LARGE:
-            # The same ratio as glibc's default; otherwise each block above 128 KiB grows and shrinks the heap's end.
+            # Use the same ratio as glibc's default; otherwise each block above 128 KiB grows and shrinks the heap's
+            # end.
             library.mallopt(_M_TRIM_THRESHOLD, 2 * least)
 
 
 def return_free_memory() -> None:
-    """Have glibc return free memory to the system; takes up to 0.1 s. No effect on other systems and C libraries.
+    """Let glibc return free memory to the system; takes up to 0.1 s. No effect on other systems and C libraries.
 
-    A glibc heap shrinks only from its end, and each thread of Zenoh has its own heap. Source: malloc_trim(3).
+    A glibc heap shrinks only from its end, and each Zenoh thread has its own heap. Source: malloc_trim(3).
     """
     if sys.platform != "linux":
         return

@@ -1,6 +1,6 @@
-"""Build the command line that adds a library to the environment of this minirospy, for the user to type.
+"""Build the command line with which the user adds a library to minirospy's own environment.
 
-Environments made by pipx or uv have no `python -m pip`, but commands of their own. Sources: https://pipx.pypa.io and
+Environments made by pipx or uv have no `python -m pip`, but their own commands. Sources: https://pipx.pypa.io and
 https://docs.astral.sh/uv/concepts/tools.
 """
 
@@ -18,15 +18,16 @@ _PIPX_FILE = "pipx_metadata.json"
 _UV_FILE = "uv-receipt.toml"
 
 _SHELLS_OWN = re.compile(r"[^\w./\\:~+-]")
-"""Characters with a special meaning in at least one of the shells."""
+"""Characters that are special in at least one of the shells."""
 
 
 def install_command(*requirements: str, upgrade: bool = False) -> str:
-    """Return the command line that installs requirements (``minirospy[web]``, ``lz4``) next to the running minirospy.
+    """Return the command line that installs requirements (``minirospy[web]``, ``lz4``) into minirospy's own environment.
 
     It works in sh, cmd.exe and PowerShell. ``upgrade``: replace a version that is too old.
     """
-    # Imported only to describe an error, so that commands with all their libraries do not load these modules.
+    # Imported here, only to describe an error, so that commands whose libraries are all installed do not load these
+    # modules.
     import importlib.util
     import sysconfig
 
@@ -34,14 +35,14 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
     words = " ".join(_quoted(each) for each in requirements)
     option = " --upgrade" if upgrade else ""
     if (prefix / _PIPX_FILE).is_file():
-        # Not `pipx inject`: pipx 1.7 treats minirospy itself as already injected, and does nothing.
+        # Do not use `pipx inject`: pipx 1.7 regards minirospy itself as already injected, and does nothing.
         return f"pipx runpip {_quoted(prefix.name)} install{option} {words}"
     if (prefix / _UV_FILE).is_file():
         return _uv_tool_command(prefix / _UV_FILE, requirements, option)
     if importlib.util.find_spec("pip") is None:
         return f"uv pip install --python {_quoted_path(sys.executable)}{option} {words}"
 
-    # PEP 668: without the option pip refuses, as it did when minirospy was installed.
+    # PEP 668: pip requires this option, which the user also needed to install minirospy.
     marker = Path(sysconfig.get_path("stdlib")) / "EXTERNALLY-MANAGED"
     if sys.prefix == sys.base_prefix and marker.is_file():
         option += " --break-system-packages"
@@ -49,7 +50,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
 
 
 def _uv_tool_command(receipt: Path, requirements: tuple[str, ...], option: str) -> str:
-    """Return uv's command including all earlier requirements, since uv removes those that a new command does not name."""
+    """Return uv's command with all earlier requirements, because uv removes those that a new command does not include."""
     try:
         text = receipt.read_text(encoding="utf-8").partition("entrypoints")[0]
     except OSError:
@@ -87,19 +88,19 @@ def _python() -> str:
 
     for name in ("python", "python3"):
         found = shutil.which(name)
-        # Not os.path.samefile: a venv's interpreter may be a link to the system's.
+        # Do not use os.path.samefile, because a venv's interpreter may be a link to the system's.
         if found is not None and os.path.normcase(found) == os.path.normcase(sys.executable):
             return name
     return _quoted_path(sys.executable)
 
 
 def _quoted(word: str) -> str:
-    """Return a quoted word for any shell: double quotes, since cmd.exe treats single quotes as part of the word."""
+    """Return a word quoted for any shell, with double quotes, because cmd.exe treats single quotes as part of the word."""
     return f'"{word}"' if _SHELLS_OWN.search(word) else word
 
 
 def _quoted_path(path: str) -> str:
-    """Return the path of a program for the system's shells.
+    """Return a program's path for the system's shells.
 
     On Windows only the parts that need it are quoted: cmd.exe and PowerShell both run ``C:\\"Program Files"\\python.exe``,
     but PowerShell parses a line that starts with a quote as an expression.

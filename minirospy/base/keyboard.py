@@ -1,4 +1,4 @@
-"""Single keys typed in a terminal, on every system."""
+"""Read single keys typed in a terminal, on every system."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from typing import ClassVar
 
 __all__ = ["LOOK_SECONDS", "Keys"]
 
-LOOK_SECONDS = 0.05  # time that Keys.next waits for a key
+LOOK_SECONDS = 0.05  # seconds that Keys.next waits for a key
 
 
 class Keys:
-    """Single keys from the terminal, without Enter and without echo; no keys if stdin is not a terminal."""
+    """Single keys from the terminal, without Enter and without echo; there are none if stdin is not a terminal."""
 
     _ARROWS: ClassVar = {"A": "up", "B": "down", "C": "right", "D": "left"}
     _WINDOWS_ARROWS: ClassVar = {"H": "up", "P": "down", "M": "right", "K": "left"}
 
     def __init__(self, *, end: str = "q") -> None:
-        """Take ``end``, the key to return when the terminal is closed."""
+        """Start reading keys; :meth:`next` returns ``end`` when the terminal is closed."""
         self._end = end
         self._is_closed = False
         self.is_terminal = sys.stdin is not None and sys.stdin.isatty()
@@ -35,7 +35,7 @@ class Keys:
                 self._before = termios.tcgetattr(sys.stdin)
                 tty.setcbreak(sys.stdin)
             except termios.error:
-                # The terminal's window was closed meanwhile.
+                # The terminal window has been closed.
                 self._is_closed = True
         return self
 
@@ -45,12 +45,12 @@ class Keys:
         if sys.platform != "win32" and self.is_terminal and not self._is_closed:
             import termios
 
-            # A terminal whose window was closed cannot be restored.
+            # The terminal cannot be restored if its window was closed.
             with contextlib.suppress(termios.error):
                 termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def next(self) -> str:
-        """Return the typed key (an arrow by its name), or "" after a moment."""
+        """Return the typed key (an arrow key by its name), or "" if none is typed within LOOK_SECONDS."""
         if not self.is_terminal:
             time.sleep(LOOK_SECONDS)
             return ""
@@ -69,7 +69,7 @@ class Keys:
         ready, _, _ = select.select([sys.stdin], [], [], LOOK_SECONDS)
         if not ready:
             return ""
-        # Bypass Python's buffer, whose contents select does not see. Reading no byte means that the terminal is
+        # Bypass Python's buffer, whose contents select does not see. If a read returns no byte, the terminal is
         # closed.
         try:
             key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
@@ -77,7 +77,7 @@ class Keys:
             return self._end
         if key != "\x1b":
             return key or self._end
-        # All bytes of a key arrive together.
+        # All bytes of one key arrive together.
         ready, _, _ = select.select([sys.stdin], [], [], 0)
         sequence = os.read(sys.stdin.fileno(), 2).decode("ascii", "replace") if ready else ""
         return self._ARROWS.get(sequence[-1:], "")

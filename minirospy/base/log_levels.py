@@ -1,4 +1,4 @@
-"""Log levels: those of rosgraph_msgs/Log and of Python's ``logging``, and the levels of this process's loggers.
+"""Log levels in rosgraph_msgs/Log and in Python's ``logging``, and the levels of this process's loggers.
 
 Source: http://docs.ros.org/api/rosgraph_msgs/html/msg/Log.html, http://wiki.ros.org/rospy/Overview/Logging.
 """
@@ -36,7 +36,7 @@ PYTHON_LEVELS = {
 
 
 SEVERITIES = {python: LEVEL_NAMES[ros] for ros, python in PYTHON_LEVELS.items()}
-"""Python's level -> ROS's name of it."""
+"""Python's level -> ROS's name for it."""
 
 
 def ros_level(python_level: int) -> int:
@@ -50,7 +50,7 @@ def logger_levels(names: Iterable[str]) -> dict[str, str]:
 
 
 def set_logger_level(logger: str, level: str) -> None:
-    """Set a logger's level by name, in upper or lower case. Raise ValueError on an unknown name."""
+    """Set a logger's level by name, in upper or lower case. Raise ValueError if the name is unknown."""
     levels = {name: ros for ros, name in LEVEL_NAMES.items()}
     if level.upper() not in levels:
         raise ValueError(f"[{level}] is not one of the levels {', '.join(levels).lower()}")

@@ -14,10 +14,10 @@ __all__ = ["NameFilter"]
 
 @dataclass(frozen=True)
 class NameFilter:
-    """Allows names that match a pattern of ``allow`` and one of ``whitelist``, but none of ``deny``.
+    """Allows names that match a pattern in ``allow`` and one in ``whitelist``, but none in ``deny``.
 
     ``allow`` and ``deny`` are globs in which ``*`` matches slashes too; ``whitelist`` contains regular expressions for the
-    whole name, like those of foxglove_bridge.
+    whole name, as in foxglove_bridge.
     """
 
     allow: tuple[str, ...] = ("*",)
@@ -28,7 +28,7 @@ class NameFilter:
     def of(
         cls, allow: Iterable[str] = (), deny: Iterable[str] = (), whitelist: Iterable[str] | None = None
     ) -> NameFilter:
-        """Return the filter; an empty ``allow`` allows all names. Raise BridgeError on a bad expression."""
+        """Return the filter; an empty ``allow`` allows all names. Raise BridgeError if a regular expression is invalid."""
         compiled = None
         if whitelist is not None:
             try:

@@ -37,7 +37,7 @@ def is_legal_name(name: str) -> bool:
 
 
 def is_legal_base_name(name: str) -> bool:
-    """Return whether ``name`` is legal without any namespace, as a node's name must be."""
+    """Return whether ``name`` is legal without any namespace, as required for a node name."""
     return bool(_LEGAL_BASE.match(name))
 
 
@@ -78,7 +78,7 @@ def join(namespace: str, name: str) -> str:
 
 
 def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = None) -> str:
-    """Return the global, remapped name of ``name`` as seen by the node ``node_name`` (global)."""
+    """Return ``name`` remapped and as a global name, resolved relative to the node ``node_name`` (global)."""
     if not name:
         return namespace_of(node_name)
     name = canonicalize(name)
@@ -92,7 +92,7 @@ def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = No
 
 
 def anonymous_name(base: str) -> str:
-    """Return a unique name, different at each call: base, host, process id and a random number."""
+    """Return a unique name, different in each call: base, host, process id and a random number."""
     host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
     number = int.from_bytes(os.urandom(8), "big") >> 1
     return f"{base}_{host}_{os.getpid()}_{number}"
@@ -101,7 +101,7 @@ def anonymous_name(base: str) -> str:
 class Arguments(NamedTuple):
     """A parsed command line.
 
-    ``plain``: the arguments left for the program; ``remappings``: names as typed, unresolved;
+    ``plain``: the arguments that remain for the program; ``remappings``: names as typed, unresolved;
     ``parameters``: private parameters as (name without the underscore, YAML text);
     ``special``: ``__name``, ``__ns`` and similar; ``wrong``: arguments with more than one ``:=``.
     """
@@ -120,8 +120,8 @@ class Arguments(NamedTuple):
 def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
     """Extract ``from:=to``, ``_param:=value`` and ``__special:=value`` from a command line.
 
-    An argument that does not start with a name, such as ``--flag:=x``, is left to the program; one without a value has no
-    effect.
+    An argument that does not start with a name, such as ``--flag:=x``, remains for the program; an argument without a value
+    has no effect.
     """
     parsed = Arguments([], {}, {}, {}, [])
     for argument in argv:
@@ -144,9 +144,9 @@ def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
 
 
 def parse_launch_arguments(words: Iterable[str]) -> dict[str, str]:
-    """Return name -> value of the launch-file arguments ``name:=value`` among ``words``.
+    """Return name -> value for the launch-file arguments ``name:=value`` among ``words``.
 
-    As in roslaunch, spaces around a value are stripped, and an empty value leaves the argument at its default;
+    As in roslaunch, spaces around a value are stripped, and an argument with an empty value has its default;
     special names (``__ns``) and private parameters (``_name``) are not arguments.
     """
     pairs = (word.partition(":=") for word in words)

@@ -1,7 +1,7 @@
 """Open files with predictable names, in folders that other users may write to, without following links.
 
 ROS_HOME is a shared folder on some robots, and TMPDIR is shared everywhere. Another user who creates the name first can
-make it a symbolic or hard link to a file of the owner's, and so cause that file to be overwritten.
+make it a symbolic or hard link to one of the owner's files, so that this file is overwritten.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from typing import IO
 __all__ = ["create_file", "open_file", "open_text", "read_file", "remove_file", "replace_file"]
 
 OPEN_ELSEWHERE_PATIENCE = 1.0
-"""Seconds to wait on Windows for a file that another process, such as a virus scanner, has open."""
+"""Seconds to wait on Windows while another process, such as a virus scanner, has the file open."""
 
 _REFUSES_OPEN_FILES = sys.platform == "win32"
 
 _FLAGS = (
     getattr(os, "O_BINARY", 0)
     | getattr(os, "O_NOFOLLOW", 0)
-    # Opening a FIFO would block until another process opens its other end.
+    # Without this, opening a FIFO would block until another process opens its other end.
     | getattr(os, "O_NONBLOCK", 0)
 )
 
@@ -33,17 +33,17 @@ _FLAGS = (
 def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
     """Open ``path`` as os.open does (in binary mode), and return the file descriptor.
 
-    Raise OSError, also if the path is a symbolic link, or anything except a device or a regular file with a single hard
-    link. With O_TRUNC the file is truncated only after these checks.
+    Raise OSError if it cannot be opened, if it is a symbolic link, or if it is neither a device nor a regular file with a
+    single hard link. With O_TRUNC the file is truncated only after these checks.
     """
     if os.path.islink(path):
-        # Windows has no O_NOFOLLOW. On other systems this only gives a clearer error.
+        # Check this because Windows has no O_NOFOLLOW. On other systems it only results in a clearer error.
         raise _refusal(path, "it is a symbolic link, which is not followed")
 
     file = os.open(path, (flags & ~os.O_TRUNC) | _FLAGS, mode)
     try:
         found = os.fstat(file)
-        # Devices are safe: only root creates them, and a user may name /dev/null.
+        # Allow devices: only root can create them, and a user may choose /dev/null.
         if not (stat.S_ISREG(found.st_mode) or stat.S_ISCHR(found.st_mode)):
             raise _refusal(path, "it is not a regular file")
         if found.st_nlink > 1 and flags & (os.O_WRONLY | os.O_RDWR):
@@ -60,33 +60,36 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
 
 
 def open_text(path: Path, mode: str) -> IO[str]:
-    """Open ``path`` to write UTF-8 text; ``mode`` is "a" to append or "w" to truncate. Raise OSError."""
+    """Open ``path`` to write UTF-8 text; ``mode`` is "a" to append or "w" to truncate.
+
+    Raise OSError as :func:`open_file` does, if the file cannot be opened or is not acceptable.
+    """
     how = {"a": os.O_APPEND, "w": os.O_TRUNC}[mode]
     return os.fdopen(open_file(path, os.O_WRONLY | os.O_CREAT | how), mode, encoding="utf-8")
 
 
 def create_file(path: Path, mode: int = 0o600) -> int:
-    """Create ``path`` for writing, replacing any file of that name; return the file descriptor. Raise OSError."""
+    """Create ``path`` for writing, replacing any file with that name; return the descriptor. Raise OSError if that fails."""
     remove_file(path)
     return open_file(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
 
 
 def read_file(path: Path) -> tuple[bytes, float]:
-    """Return the bytes of ``path`` and its modification time. Raise OSError."""
+    """Return the bytes in ``path`` and its modification time. Raise OSError if it cannot be read."""
     with os.fdopen(open_file(path, os.O_RDONLY), "rb") as stream:
         return stream.read(), os.fstat(stream.fileno()).st_mtime
 
 
 def replace_file(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> None:
-    """Rename ``source`` to ``target``, replacing any file of that name. Raise OSError.
+    """Rename ``source`` to ``target``, replacing any file with that name. Raise OSError if that fails.
 
-    Windows refuses this while another process has one of them open, so there it is retried for a second.
+    Windows refuses this while another process has one of the files open, so on Windows it is retried for a second.
     """
     _until_closed(lambda: os.replace(source, target))
 
 
 def remove_file(path: Path) -> None:
-    """Remove ``path``, if it exists; on Windows, retry while another process has it open. Raise OSError."""
+    """Remove ``path``, if it exists; on Windows, retry while another process has it open. Raise OSError if that fails."""
     _until_closed(lambda: path.unlink(missing_ok=True))
 
 
@@ -98,7 +101,7 @@ def _until_closed(action: Callable[[], None]) -> None:
             action()
             return
         except PermissionError:
-            # On other systems the folder's permissions are the cause, and waiting does not change them.
+            # On other systems the folder's permissions are the cause, which waiting does not change.
             if not _REFUSES_OPEN_FILES or time.monotonic() >= end:
                 raise
         time.sleep(pause)

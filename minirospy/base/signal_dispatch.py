@@ -1,4 +1,4 @@
-"""The signals that mean Ctrl-C, and a flag for shutdown hooks that run inside a call interrupted by a signal."""
+"""The signals that Ctrl-C sends, and a flag for shutdown hooks that run inside a call interrupted by a signal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _this_thread = threading.local()
 
 @contextlib.contextmanager
 def dispatching_signal() -> Iterator[None]:
-    """While a block runs, :func:`is_dispatching_signal` is true in this thread: the block handles a signal."""
+    """Make :func:`is_dispatching_signal` true in this thread during the block, which handles a signal."""
     _this_thread.is_dispatching = True
     try:
         yield
@@ -28,6 +28,6 @@ def is_dispatching_signal() -> bool:
 
 
 def interrupt_signals() -> list[signal.Signals]:
-    """Return the signals of Ctrl-C: SIGINT, and on Windows SIGBREAK, the only one that reaches a separate process group."""
+    """Return the signals that Ctrl-C sends: SIGINT, and on Windows SIGBREAK, which alone reaches a separate process group."""
     found = (getattr(signal, name, None) for name in ("SIGINT", "SIGBREAK"))
     return [number for number in found if number is not None]

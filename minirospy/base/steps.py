@@ -15,7 +15,7 @@ _T = TypeVar("_T")
 
 
 class Need(Enum):
-    """A request that a step may yield in place of None."""
+    """A request that a step may yield instead of None."""
 
     ALONE = "no other work that takes much memory may run beside this"
     PAUSE = "there is nothing to do at present"
@@ -25,10 +25,10 @@ ALONE, PAUSE = Need
 
 Steps = Generator[Need | None, None, _T]  # work that yields between its steps and returns its result
 
-SMALL_ITEMS = 2000  # a value of this size takes a few milliseconds to serialize
+SMALL_ITEMS = 2000  # items; a value with this many takes a few milliseconds to serialize
 
 SHORT_ITEMS = 300
-"""A value of this size takes some 0.1 ms to serialize; a thousand clients may request it at the same time."""
+"""Items; a value with this many takes some 0.1 ms to serialize, which is short even if a thousand clients request it together."""
 
 _LETTERS_PER_ITEM = 16
 
@@ -44,7 +44,7 @@ def finish(steps: Steps[_T]) -> _T:
 
 
 def is_small(value: object, most: int = SMALL_ITEMS) -> bool:
-    """Return whether an XML-RPC value has at most about ``most`` items; long strings count as many."""
+    """Return whether an XML-RPC value has at most about ``most`` items; a long string counts as many items."""
     return _left(value, most) >= 0
 
 

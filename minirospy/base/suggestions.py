@@ -14,7 +14,7 @@ __all__ = ["did_you_mean", "nearest"]
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return up to three of the ``known`` names that are similar to ``name``."""
     if not isinstance(name, str):
-        # A program passed another type, for which nothing is found either.
+        # A program passed a value that is not a string, for which nothing is found either.
         return []
     names = sorted(set(known))
     # The most common mistake is to omit the package or namespace.
@@ -25,11 +25,11 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
 _SLIP = 0.85
 """Minimum similarity (difflib's ratio) of two names that differ in only one or two missing, wrong or extra letters."""
 
-_STEM = 4  # shortest prefix, in letters, that also gets suggestions that complete it
+_STEM = 4  # minimum length, in letters, of a prefix for which completions are suggested
 
 
 def did_you_mean(word: str, known: Iterable[str], most: int = 2, *, only_slips: bool = False) -> str:
-    """Return a suggestion of up to ``most`` of the ``known`` words that are similar to an unknown word; "" if none is.
+    """Return a suggestion of up to ``most`` of the ``known`` words that are similar to an unknown word, or "".
 
     ``only_slips``: suggest only words with one or two missing, wrong or extra letters.
     """
@@ -38,13 +38,14 @@ def did_you_mean(word: str, known: Iterable[str], most: int = 2, *, only_slips: 
 
 
 def _similar(word: str, known: Iterable[str], cutoff: float) -> list[str]:
-    """Return the names with a similarity of at least ``cutoff``, by difflib's ratio; the most similar first.
+    """Return the names with a similarity of at least ``cutoff``, by difflib's ratio, the most similar first.
 
-    Names are compared part by part: a common long namespace, file name extension or option dashes are no similarity.
+    Names are compared part by part, so that a common long namespace, file extension or option dashes do not count as
+    similarity.
     """
     from difflib import SequenceMatcher
 
-    # The matcher caches its analysis of the second sequence.
+    # Pass the part as the second sequence, because the matcher caches its analysis of that one.
     wanted = [(part, SequenceMatcher(b=part)) for part in reversed(_parts_of(word))]
     found = []
     for name in known:
@@ -56,13 +57,13 @@ def _similar(word: str, known: Iterable[str], cutoff: float) -> list[str]:
         # Also suggest the same name in another package or namespace.
         if ratios and (min(ratios) >= cutoff or (ratios[0] == 1 and cutoff < _SLIP)):
             found.append((-sum(ratios) / len(ratios), len(parts) != len(wanted), name))
-    # If the name itself exists in another letter case or without an extension, suggest only that.
+    # If the name exists in another letter case or without an extension, suggest only that.
     exact = [entry for entry in found if entry[0] == -1]
     return [name for *_, name in sorted(exact or found)]
 
 
 def _parts_of(name: str) -> list[str]:
-    """Return the parts of a name to compare, without a file name's extension and an option's dashes."""
+    """Return the parts of a name to compare, without a file extension or an option's dashes."""
     stem, dot, _ = name.rpartition(".")
     return [part for part in (stem if dot else name).lstrip("-").lower().split("/") if part]
 

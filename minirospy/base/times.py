@@ -1,4 +1,4 @@
-"""Times and durations as in ROS messages: seconds and nanoseconds, normalized.
+"""Times and durations as ROS messages contain them: seconds and nanoseconds, normalized.
 
 Source: http://wiki.ros.org/genpy, http://docs.ros.org/api/genpy/html/.
 """
@@ -20,7 +20,10 @@ class TVal:
     __slots__ = ["secs", "nsecs"]  # noqa: RUF023 - genpy's order
 
     def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
-        """Take ``secs``, which may be a float if ``nsecs`` is 0. Raise ValueError or TypeError."""
+        """Create the value; ``secs`` may be a float if ``nsecs`` is 0.
+
+        Raise ValueError or TypeError if an argument is invalid.
+        """
         if type(secs) is int and type(nsecs) is int and 0 <= nsecs < _BILLION:
             self.secs: int = secs
             self.nsecs: int = nsecs
@@ -35,7 +38,7 @@ class TVal:
 
     @classmethod
     def from_sec(cls: type[_V], float_secs: float) -> _V:
-        """Return the value for seconds as a float."""
+        """Convert seconds, as a float, to a value."""
         return cls(*_split(float_secs))
 
     def is_zero(self) -> bool:
@@ -62,14 +65,14 @@ class TVal:
         secs, nsecs = self.secs, self.nsecs
         if type(secs) is int and type(nsecs) is int:
             return secs * _BILLION + nsecs
-        # A program may have assigned numpy values, which overflow, or fractions.
+        # A program may have assigned fractions, or numpy values, which overflow.
         whole, rest = _split(secs)
         return whole * _BILLION + rest + int(nsecs)
 
     def __bool__(self) -> bool:
         return bool(self.secs or self.nsecs)
 
-    # Time and Duration compare with their own class only; a TVal compares with both.
+    # Time and Duration are comparable only with their own class; a TVal is comparable with both.
     def __lt__(self, other: TVal) -> bool:
         return self.to_nsec() < other.to_nsec() if isinstance(other, TVal) else NotImplemented
 
@@ -104,7 +107,7 @@ class TVal:
 class Time(TVal):
     """A point in time since the epoch; never negative."""
 
-    # Pickles must be loadable by other ROS 1 programs, and theirs by this one.
+    # Use genpy's module name, so that programs that use real ROS can load pickles from this one, and vice versa.
     __module__ = "genpy.rostime"
 
     __slots__: list[str] = []
@@ -115,7 +118,7 @@ class Time(TVal):
             raise TypeError("time values must be positive")
 
     def to_time(self) -> float:
-        """Return the same as ``to_sec``, in the form of ``time.time()``."""
+        """Return the seconds as a float, as ``time.time()`` does; the same as ``to_sec``."""
         return self.to_sec()
 
     def __add__(self, other: Duration) -> Time:
@@ -157,7 +160,7 @@ class Time(TVal):
 
 
 class Duration(TVal):
-    """A time span; may be negative, then with negative ``secs`` and positive ``nsecs``."""
+    """A time span. If it is negative, ``secs`` is negative and ``nsecs`` positive."""
 
     __module__ = "genpy.rostime"
 
@@ -243,18 +246,18 @@ class Duration(TVal):
     __hash__ = TVal.__hash__
 
 
-# Named as in genpy's classes; the attributes themselves belong to TVal.
+# Set the slots that genpy's classes have; the attributes themselves belong to TVal.
 Time.__slots__ = Duration.__slots__ = TVal.__slots__
 
 
 def _split(seconds: float) -> tuple[int, int]:
-    """Return whole seconds, and the remaining nanoseconds, truncated like genpy does and not rounded."""
+    """Return whole seconds, and the remaining nanoseconds, truncated and not rounded, as in genpy."""
     whole = int(seconds)
     return whole, int(float(seconds - whole) * 1e9)
 
 
 def _is_integer(value: object) -> bool:
-    """Return whether a number is an integer, including numpy's."""
+    """Return whether a number is an integer, including numpy's integers."""
     try:
         operator.index(value)  # type: ignore[arg-type]
     except TypeError:

@@ -17,7 +17,7 @@ _STYLE = (
 
 
 class Edge(NamedTuple):
-    """An arrow from a parent to its child; the lines of ``label`` are drawn next to it."""
+    """An arrow from a parent to its child; the lines in ``label`` are drawn beside it."""
 
     parent: str
     child: str
@@ -29,8 +29,8 @@ def tree_svg(
 ) -> str:
     """Return a drawing of one or several trees, with the roots at the top.
 
-    ``alone``: nodes without an edge. ``round_``: nodes drawn as ellipses. A node is drawn once: below the first
-    parent that names it.
+    ``alone``: nodes without an edge. ``round_``: nodes drawn as ellipses. A node with several parents is drawn once, below
+    the first one.
     """
     children: dict[str, list[Edge]] = {name: [] for name in alone}
     below: set[str] = set()
@@ -43,7 +43,7 @@ def tree_svg(
 
     drawing = _Drawing(children, frozenset(round_))
     right = float(_GAP_X)
-    # Roots first; the remaining nodes are part of a loop.
+    # Draw the roots first; nodes that remain after that are part of a loop.
     for name in [*(name for name in children if name not in below), *children]:
         if name not in drawing.places:
             right = drawing.place(name, right)
@@ -58,7 +58,7 @@ class _Drawing:
 
     def place(self, root: str, left: float) -> float:
         """Place a tree to the right of ``left``; return its right edge."""
-        # Iterate with an explicit list, down and back up: recursion would exhaust Python's stack for deep trees.
+        # Use an explicit list, down and back up: recursion would exhaust Python's stack for deep trees.
         order: list[tuple[str, float]] = []
         waiting = [(root, float(_GAP_Y + _LINE))]
         seen = set()
@@ -88,7 +88,7 @@ class _Drawing:
         return left
 
     def _width(self, name: str) -> float:
-        """Return the width of a node, including the label above it."""
+        """Return a node's width, including the label above it."""
         labels = [
             len(line)
             for edges in self._children.values()

@@ -1,6 +1,6 @@
 """Parse XML text into elements with line numbers, for launch files, robot descriptions, manifests and test results. Pure.
 
-As in ROS, a document type is accepted, but not if it declares entities or default values of attributes: a few hundred
+As in ROS, a document type is accepted, but not if it declares entities or default attribute values, because a few hundred
 characters of these can expand to gigabytes. Nothing is ever loaded from another file or address.
 Source: https://www.w3.org/TR/xml/.
 """
@@ -16,12 +16,12 @@ from minirospy.base.errors import MinirospyError
 
 __all__ = ["MAX_LEVELS", "XmlElement", "XmlError", "XmlSyntaxError", "check_xml", "new_parser", "parse_xml"]
 
-MAX_LEVELS = 100  # nested tags; parsers and libraries recurse once or more for each level
-_MAX_ELEMENTS = 1_000_000  # tags per document; each takes about 500 bytes of memory, from 4 bytes of text
+MAX_LEVELS = 100  # nested tags; parsers and libraries recurse once or more per level
+_MAX_ELEMENTS = 1_000_000  # tags per document; a tag of 4 characters already uses about 500 bytes of memory
 
 
 class XmlError(MinirospyError):
-    """The text is refused: ``line`` is the location, 0 if unknown, and ``why`` the reason."""
+    """The text is rejected: ``line`` is the location, 0 if unknown, and ``why`` the reason."""
 
     def __init__(self, line: int, why: str) -> None:
         super().__init__(line, why)
@@ -38,7 +38,7 @@ class XmlSyntaxError(XmlError):
 
 @dataclass
 class XmlElement:
-    """A tag at ``line``; ``text`` is its text without that of its children."""
+    """A tag at ``line``; ``text`` is its text without its children's text."""
 
     tag: str
     attributes: dict[str, str]
@@ -51,12 +51,12 @@ class XmlElement:
         return (child for child in self.children if child.tag == tag)
 
     def first(self, tag: str) -> XmlElement | None:
-        """Return the first child with this tag; None if there is none."""
+        """Return the first child with this tag, or None if there is none."""
         return next(self.all(tag), None)
 
 
 def new_parser() -> expat.XMLParserType:
-    """Return a parser that refuses expanding declarations (Parse raises XmlError), and delivers text in large pieces."""
+    """Return a parser that rejects expanding declarations (Parse raises XmlError), and delivers text in large pieces."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
 
@@ -80,7 +80,7 @@ def new_parser() -> expat.XMLParserType:
 
 
 def parse_xml(text: str | bytes) -> XmlElement:
-    """Parse an XML text and return its root. Raise XmlSyntaxError, XmlError."""
+    """Parse an XML text and return its root. Raise XmlSyntaxError if it is not XML, XmlError if it is rejected."""
     parser = new_parser()
     stack: list[XmlElement] = []
     texts: list[list[str]] = []
@@ -110,9 +110,9 @@ def parse_xml(text: str | bytes) -> XmlElement:
 
 
 def check_xml(text: str | bytes) -> None:
-    """Raise XmlError for a text that :func:`parse_xml` refuses; call it before a library parses the text.
+    """Raise XmlError if :func:`parse_xml` rejects the text; call this before a library parses the text.
 
-    Text that is not XML is accepted here: callers expect the error that the library raises at the same place.
+    Text that is not XML is accepted here, because callers expect the error that the library then raises.
     """
     parser = new_parser()
     level, left = 0, _MAX_ELEMENTS

@@ -1,8 +1,8 @@
-"""Load YAML with PyYAML's safe loaders, but refuse text that takes minutes, fills the memory or crashes Python. Pure.
+"""Load YAML with PyYAML's safe loaders, but reject text that takes minutes, fills the memory or crashes Python. Pure.
 
 A short text may be nested without limit, expand through its aliases, or be a single number that takes hours to parse:
-`1:59:59:...` has base 60. Every refusal, and every other error of PyYAML, is raised as a yaml.YAMLError. PyYAML is
-imported at the first call.
+`1:59:59:...` has base 60. Every rejection, and every other error in PyYAML, is raised as a yaml.YAMLError. PyYAML is
+imported in the first call.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["check_yaml", "fast_loader", "guarded", "load", "load_all", "one_line", "safe_load"]
 
-_MAX_LEVELS = 200  # nested lists and dictionaries; PyYAML recurses several times for each
+_MAX_LEVELS = 200  # nested lists and dictionaries; PyYAML recurses several times per level
 _MAX_VALUES = 1_000_000  # values in a text with its aliases expanded
 _MAX_NUMBER = 1_000  # characters; parsing takes quadratic time, and a double has at most 309 digits
 _INDENT = re.compile(r"^[ \t?:-]+", re.MULTILINE)
@@ -27,14 +27,17 @@ _NUMBERS = frozenset({"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"})
 
 
 def safe_load(text: str) -> object:
-    """Return the value of a text, like yaml.safe_load. Raise yaml.YAMLError; TypeError if it is not a string."""
+    """Parse YAML text, like yaml.safe_load. Raise yaml.YAMLError if it is invalid, TypeError if it is not a string."""
     import yaml
 
     return load(text, yaml.SafeLoader)
 
 
 def load(text: str, loader: Loader) -> Any:
-    """Return the value of a text, loaded by a subclass of PyYAML's safe loaders. Raise yaml.YAMLError, TypeError."""
+    """Parse YAML text with a subclass of PyYAML's safe loaders.
+
+    Raise yaml.YAMLError if the text is invalid, TypeError if it is not a string.
+    """
     import yaml
 
     _require_text(text)
@@ -46,7 +49,10 @@ def load(text: str, loader: Loader) -> Any:
 
 
 def load_all(text: str, loader: Loader) -> Iterator[Any]:
-    """Yield the values of the documents in a text, loaded the same way. Raise yaml.YAMLError, TypeError."""
+    """Parse YAML text as :func:`load` does; yield the value of each document.
+
+    Raise yaml.YAMLError if the text is invalid, TypeError if it is not a string.
+    """
     import yaml
 
     _require_text(text)
@@ -66,7 +72,7 @@ def load_all(text: str, loader: Loader) -> Iterator[Any]:
 
 
 def _require_text(text: object) -> None:
-    """Raise TypeError for a value that is not a string: that is an error of the program, not of the text."""
+    """Raise TypeError if a value is not a string, which is an error in the program and not in the text."""
     if not isinstance(text, str | bytes):
         raise TypeError(f"YAML is a text, not {type(text).__name__}")
 
@@ -81,7 +87,7 @@ def fast_loader() -> type[yaml.SafeLoader]:
 
 @lru_cache(maxsize=32)
 def guarded(loader: Loader) -> Loader:
-    """Return a loader that refuses long numbers. Constructors that are added to ``loader`` later also apply."""
+    """Return a loader that rejects long numbers. Constructors that are added to ``loader`` later also apply."""
     import yaml
 
     class Guarded(loader):  # type: ignore[valid-type,misc]
@@ -98,19 +104,20 @@ def guarded(loader: Loader) -> Loader:
 def check_yaml(text: str) -> None:
     """Raise ValueError if a YAML text is nested too deeply, or expands too much through its aliases.
 
-    YAML libraries accept both: nesting may crash Python, and the result of aliases is small only until it is sent or
+    YAML libraries accept both: nesting may crash Python, and a value with aliases is small only until it is sent or
     printed. Raise yaml.YAMLError if the text is not YAML.
     """
-    # An upper bound of the depth, from brackets and indentation. Nearly every text passes here.
+    # Compute an upper bound for the depth from brackets and indentation. Nearly all texts are accepted here.
     indent = max(map(len, _INDENT.findall(text)), default=0)
     has_aliases = "*" in text and "&" in text
     if text.count("[") + text.count("{") + 2 * indent < _MAX_LEVELS and not has_aliases:
         return
     import yaml
 
-    counts = [0]  # number of values in each open collection, the document's first
+    counts = [0]  # number of values in each open collection, outermost first
     anchors: list[str | None] = []
-    sizes: dict[str, int | None] = {}  # anchor -> number of values in its node; None while the node is open
+    # anchor -> number of values in its node, or None while the node is open
+    sizes: dict[str, int | None] = {}
     for event in yaml.parse(text, Loader=fast_loader()):
         match event:
             case yaml.AliasEvent(anchor=name):
@@ -146,7 +153,7 @@ def one_line(error: Exception) -> str:
 
 
 _RAISED = (ValueError, ArithmeticError, LookupError, AttributeError, TypeError, RecursionError)
-"""Raised by check_yaml and by PyYAML, for example for an invalid date, or for a tag such as !!bool on other text."""
+"""Exceptions in check_yaml and PyYAML, for example for an invalid date, or for a tag such as !!bool on other text."""
 
 
 def _reason(error: Exception) -> str:

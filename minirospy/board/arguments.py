@@ -1,4 +1,4 @@
-"""Check the arguments of RPi.GPIO's functions, with RPi.GPIO's error texts."""
+"""Check the arguments of RPi.GPIO's functions, with RPi.GPIO's error messages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NO_BOUNCETIME = -666  # RPi.GPIO's default: no debouncing
 
 
 def channels_of(channel: object) -> list[int]:
-    """Return the list of channels from a single channel or a sequence. Raise ValueError."""
+    """Return the list of channels in a single channel or a sequence. Raise ValueError if one is not an integer."""
     if isinstance(channel, int):
         return [channel]
     if not isinstance(channel, (list, tuple)):
@@ -23,18 +23,18 @@ def channels_of(channel: object) -> list[int]:
 
 
 def level_of(value: object) -> int:
-    """Return an argument for a level as 0 or 1. Raise TypeError."""
+    """Convert an argument for a level to 0 or 1. Raise TypeError if it is neither an integer nor a bool."""
     if isinstance(value, int):
         return 1 if value else 0
     if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):
         raise TypeError("not a level")
-    # numpy.bool_ and similar types.
+    # Accept numpy.bool_ and similar types.
     return 1 if value else 0
 
 
 def detector_of(channel: int, edge: int, bouncetime: int) -> Detector:
-    """Return a detector for an edge; ``bouncetime`` in ms. Raise ValueError, TypeError."""
-    # Whole milliseconds: like RPi.GPIO, raise TypeError for a time in seconds such as 0.2.
+    """Return a detector for an edge; ``bouncetime`` is in ms. Raise ValueError or TypeError if an argument is invalid."""
+    # Require whole milliseconds: like RPi.GPIO, raise TypeError for a time in seconds such as 0.2.
     edge, bouncetime = operator.index(edge), operator.index(bouncetime)
     if edge not in {Slope.RISING, Slope.FALLING, Slope.BOTH}:
         raise ValueError("The edge must be set to RISING, FALLING or BOTH")

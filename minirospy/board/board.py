@@ -1,4 +1,4 @@
-"""The virtual board for programs that simulate its surroundings: press buttons, read lights, move a person.
+"""The virtual board, for programs that simulate its surroundings: press buttons, read lights, move a person.
 
 ::
 
@@ -31,8 +31,8 @@ __all__ = ["Board", "BoardState", "Edge"]
 class BoardState:
     """A snapshot of the board.
 
-    ``pins[n]`` is BCM pin n (function, pull, level, ...); ``person``: metres from the scanner, ahead and to the left,
-    or None if there is no person.
+    ``pins[n]`` is BCM pin n (function, pull, level, ...); ``person`` is the position in metres ahead of the scanner and to its
+    left, or None if there is no person.
     """
 
     name: str
@@ -45,15 +45,15 @@ class BoardState:
 
 
 class Board:
-    """The board ``name`` (default: MINIROSPY_BOARD, else "default"), started if it is not running.
+    """The board ``name`` (default: MINIROSPY_BOARD, else "default"); started if it is not running.
 
-    Thread-safe. Pins are BCM numbers, 0 to 53. Every method raises BoardError on a pin that does not
-    exist and on a board that does not answer.
+    Thread-safe. Pins are BCM numbers, 0 to 53. Every method raises BoardError if a pin does not exist or the board does
+    not respond.
     """
 
     def __init__(self, name: str | None = None) -> None:
         directory = BoardDirectory.find(name)
-        # Weak references: an abandoned watch receives no more edges.
+        # Use weak references, so that an abandoned watch receives no more edges.
         self._watchers: weakref.WeakSet[queue.SimpleQueue[Edge]] = weakref.WeakSet()
         self._lock = threading.Lock()
         self.name = directory.name
@@ -70,22 +70,22 @@ class Board:
     def press(self, pin: int) -> None:
         """Press the button at ``pin``, until :meth:`release`.
 
-        The wired buttons (11, 12) then read 1; a button at any other pin reads 1 too, unless the pin has its
-        pull-up enabled: then it connects to ground and reads 0.
+        The wired buttons (11, 12) then read 1. A button at any other pin reads 1 too, unless the pin's pull-up is
+        enabled: then the button connects it to ground, and it reads 0.
         """
         self._link.call(Press(pin))
 
     def release(self, pin: int) -> None:
-        """Release the button at ``pin``; also undoes :meth:`set` of an input."""
+        """Release the button at ``pin``; also undoes :meth:`set` on an input."""
         self._link.call(Release(pin))
 
     def set(self, pin: int, level: int) -> None:
-        """Drive an input to ``level`` (0 or 1) from outside; set an output as another program would."""
+        """Drive an input to ``level`` (0 or 1) from outside, or set an output as another program would."""
         self._link.call(Force(pin, level))
 
     @property
     def person(self) -> Position | None:
-        """The position of the person in front of the scanner, in metres ahead and to the left; None if there is no person."""
+        """The position of the person in front of the scanner, in metres ahead and to the left, or None if there is no person."""
         return self._link.person
 
     def move_person(self, position: Position | None) -> None:
@@ -113,7 +113,7 @@ class Board:
         return BoardState(self.name, tuple(self._link.states), self._link.person)
 
     def watch(self, pins: Iterable[int] | None = None, timeout: float | None = None) -> Iterator[Edge]:
-        """Yield the edges of ``pins`` (default: all) from this call on, as they occur.
+        """Yield the edges on ``pins`` (default: all) that occur after this call.
 
         Stops after ``timeout`` seconds in total (None: never).
         """
@@ -125,7 +125,7 @@ class Board:
         return self._edges(arrived, chosen, deadline)
 
     def close(self) -> None:
-        """Disconnect; the pins remain unchanged. Idempotent."""
+        """Disconnect; the pins do not change. Idempotent."""
         self._link.close()
 
     def _edges(

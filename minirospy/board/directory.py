@@ -1,6 +1,6 @@
-"""The files of a board: its name in, the paths of its socket, lock and saved pins out.
+"""A board's files: its name in, the paths of its socket, lock and saved pins out.
 
-``MINIROSPY_BOARD`` is the board's name (default "default"); ``MINIROSPY_RUNTIME_DIR`` is the folder of its files,
+``MINIROSPY_BOARD`` is the board's name (default "default"); ``MINIROSPY_RUNTIME_DIR`` is the folder for its files,
 by default one in the temporary folder that only this user may enter.
 """
 
@@ -32,9 +32,9 @@ class BoardDirectory:
 
     @classmethod
     def find(cls, name: str | None = None, environ: Mapping[str, str] | None = None) -> BoardDirectory:
-        """Return the directory of board ``name`` (default: from the environment).
+        """Return the directory of the board ``name`` (default: from the environment).
 
-        Raise BoardError on a name that is not a file name.
+        Raise BoardError if the name is not valid as a file name.
         """
         environ = os.environ if environ is None else environ
         name = name or environ.get("MINIROSPY_BOARD") or "default"
@@ -75,22 +75,22 @@ class BoardDirectory:
 
     @property
     def address_path(self) -> Path:
-        """The path of the file with "port token" of a TCP server; only this user may read it."""
+        """The path of the file in which a TCP server stores "port token"; only this user may read it."""
         return self.folder / f"{self.name}.address"
 
     @property
     def lock_path(self) -> Path:
-        """The path of the file that the running server keeps locked."""
+        """The path of the file that the running server locks."""
         return self.folder / f"{self.name}.lock"
 
     @property
     def state_path(self) -> Path:
-        """The path of the file with the board's state as saved by the last server."""
+        """The path of the file in which the last server saved the board's state."""
         return self.folder / f"{self.name}.pins"
 
     @property
     def log_path(self) -> Path:
-        """The path of the log of a failing server."""
+        """The path of the log in which a failing server writes its error."""
         return self.folder / f"{self.name}.log"
 
 

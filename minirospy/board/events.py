@@ -1,6 +1,6 @@
-"""Edge detection: edges and the time in, callbacks out, sequentially on one thread.
+"""Edge detection: edges and the time in, callbacks out, one at a time in a single thread.
 
-Debouncing is that of RPi.GPIO: the first edge is reported, then the pin is ignored for the bounce time.
+Debouncing is RPi.GPIO's: the first edge is reported, then the pin is ignored for the bounce time.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class Slope(IntEnum):
 
 
 class Detector:
-    """Watches one channel: decides which edges count and records that one occurred.
+    """Watches one channel: decides which edges count, and records that one occurred.
 
-    ``bouncetime`` is in seconds, None without debouncing.
+    ``bouncetime`` is in seconds, or None for no debouncing.
     """
 
     def __init__(self, channel: int, slope: Slope, bouncetime: float | None) -> None:
@@ -41,7 +41,7 @@ class Detector:
         self._occurred = threading.Event()
 
     def see(self, level: int, now: float) -> bool:
-        """Return whether an edge to ``level`` at ``now`` (seconds of a monotonic clock) counts."""
+        """Return whether an edge to ``level`` at ``now`` (seconds on a monotonic clock) counts."""
         if self.slope is not Slope.BOTH and (self.slope is Slope.RISING) != bool(level):
             return False
         if self._bouncetime is not None and self._last is not None and now - self._last <= self._bouncetime:
@@ -51,12 +51,12 @@ class Detector:
         return True
 
     def excludes(self, waiter: Detector) -> bool:
-        """Return whether waiting with ``waiter`` conflicts with this detector, which watches the same channel."""
+        """Return whether a wait with the detector ``waiter`` conflicts with this detector on the same channel."""
         same = waiter.slope is self.slope
         return bool(self.callbacks) or (same and self._bouncetime not in (None, waiter._bouncetime))
 
     def take(self) -> bool:
-        """Return whether an edge was counted since the last call."""
+        """Return whether an edge has been counted since the last call."""
         occurred = self._occurred.is_set()
         self._occurred.clear()
         return occurred
@@ -65,14 +65,14 @@ class Detector:
         """Wait up to ``timeout`` seconds for an edge that counts; return whether one occurred."""
         if timeout is not None or sys.platform != "win32":
             return self._occurred.wait(timeout)
-        # Windows delivers Ctrl-C only between waits.
+        # Wait in slices, because Windows delivers Ctrl-C only between waits.
         while not self._occurred.wait(0.2):
             pass
         return True
 
 
 class CallbackThread:
-    """Runs callbacks in the order of their edges; an exception of one is printed and the next one still runs."""
+    """Runs callbacks in the order of their edges; if one raises, its exception is printed and the next one still runs."""
 
     def __init__(self) -> None:
         self._due: queue.SimpleQueue[Detector | None] = queue.SimpleQueue()
@@ -80,7 +80,7 @@ class CallbackThread:
         self._thread.start()
 
     def schedule(self, detector: Detector) -> None:
-        """Run all callbacks of ``detector``, unless it is removed before that."""
+        """Run all callbacks of ``detector``, unless it is removed before they start."""
         self._due.put(detector)
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
 """A process's connection to a board: operations in, the mirrored pins and edges out.
 
-Blocking and thread-safe; one reader thread updates the mirror. If no server answers, one is started; if it
-dies, another one is started, and unacknowledged requests are sent again without an error for the caller.
+Blocking and thread-safe; one reader thread updates the mirror. If no server responds, one is started; if the server
+dies, another one is started, and unacknowledged requests are sent again, so that the caller sees no error.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ if TYPE_CHECKING:
 __all__ = ["Edge", "Link"]
 
 START_PATIENCE = 30.0
-"""Seconds for a server to start; a loaded small machine needs two or three, one with blocked I/O up to fifteen."""
+"""Seconds for a server to start; a loaded small machine needs two or three, a machine with blocked I/O up to fifteen."""
 
-ANSWER_PATIENCE = 40.0  # seconds to wait for an answer: longer than replacing a dead server takes
+ANSWER_PATIENCE = 40.0  # seconds to wait for a response; longer than it takes to replace a dead server
 
 CLOSE_PATIENCE = 0.5  # seconds that close() waits for the last outputs to arrive
 
-MAX_UNACKNOWLEDGED = 10_000  # requests in progress; with more, an output waits for the server
+MAX_UNACKNOWLEDGED = 10_000  # requests in progress; beyond that, an output waits for the server
 
 _SERVE = """\
 import sys
@@ -58,7 +58,7 @@ sys.path.append(sys.argv[1])
 from minirospy.board.server import main
 sys.exit(main(sys.argv[2:]))
 """
-"""Like `python -m minirospy.board.server`, but also finds a package imported from the current folder."""
+"""Does the same as `python -m minirospy.board.server`, and also finds a package imported from the current folder."""
 
 
 class Edge(NamedTuple):
@@ -72,8 +72,8 @@ class Edge(NamedTuple):
 class Link:
     """A connection to a board.
 
-    ``levels`` mirrors every pin's level and is always the same list: reading it is the fast way to read a pin.
-    ``on_edge`` is called on the reader thread, for every edge on the board.
+    ``levels`` mirrors every pin's level and is always the same list, so that reading it is the fast way to read a pin.
+    ``on_edge`` is called in the reader thread, for every edge on the board.
 
     Raise BoardError if no server can be started.
     """
@@ -81,7 +81,8 @@ class Link:
     def __init__(self, directory: BoardDirectory, on_edge: Callable[[Edge], None] | None = None) -> None:
         self._directory = directory
         self._on_edge = on_edge
-        # Reentrant: a signal handler (a node's shutdown hook) may set pins while its thread has the lock.
+        # Use a reentrant lock: a signal handler (a node's shutdown hook) may set pins while its thread holds the
+        # lock.
         self._news = threading.Condition(threading.RLock())
         self._number = 0
         self._acknowledged = 0
@@ -99,9 +100,9 @@ class Link:
         self._reader.start()
 
     def call(self, operation: Operation | MovePerson | None, timeout: float = ANSWER_PATIENCE) -> None:
-        """Perform ``operation``, and return when the mirror shows it; None only waits for the operations sent before.
+        """Perform ``operation``, and return when the mirror shows its effect; None only waits for the operations sent before.
 
-        Raise BoardError if the board refuses or does not answer within ``timeout`` seconds.
+        Raise BoardError if the board refuses or does not respond within ``timeout`` seconds.
         """
         with self._news:
             number = self._send(operation)
@@ -116,7 +117,7 @@ class Link:
                 raise BoardError(f"the virtual board [{self._directory.name}] does not answer")
 
     def write(self, levels: Sequence[tuple[int, int]]) -> None:
-        """Set the latches of output pins, in order, without waiting; the mirror shows the levels immediately."""
+        """Set output pins' latches, in order, without waiting; the mirror shows the levels immediately."""
         with self._news:
             if len(self._unacknowledged) >= MAX_UNACKNOWLEDGED:
                 self.call(None)
@@ -127,7 +128,7 @@ class Link:
                     self._written[pin] = number
 
     def close(self) -> None:
-        """Wait shortly for the last outputs, then disconnect. The pins remain unchanged."""
+        """Wait briefly for the last outputs, then disconnect. The pins do not change."""
         if self._closed:
             return
         with contextlib.suppress(BoardError):
@@ -183,7 +184,7 @@ class Link:
             now = time.time()
             edges = []
             # A killed server may not have saved its last changes: repeat the setup of this process's pins, with the
-            # last levels known here.
+            # last levels in the mirror.
             for pin in sorted(self._mine):
                 state = self.states[pin]
                 latch = state.latch if state.function is Function.OUT else None
@@ -201,11 +202,11 @@ class Link:
         return connection
 
     def _take(self, message: Message) -> Edge | None:
-        """Apply one message to the mirror (under the lock); return the edge that it reports, if any."""
+        """Apply one message to the mirror; return the edge that it reports, if any. The caller holds the lock."""
         if isinstance(message, Changed):
             self.states[message.pin] = message.state
             level = message.state.level
-            # A change sent before this process's latest write would undo that write for a moment.
+            # Skip a change sent before this process's latest write, because it would undo that write for a moment.
             if message.pin not in self._written:
                 self.levels[message.pin] = level
             return Edge(message.pin, level, message.time) if message.edge else None
@@ -243,12 +244,12 @@ class _Connection:
         self.person: Position | None = welcome.person
 
     def send(self, data: bytes) -> None:
-        # The reader notices a dead server and replaces it.
+        # Ignore errors, because the reader detects a dead server and replaces it.
         with contextlib.suppress(OSError):
             self._socket.sendall(data)
 
     def incoming(self) -> Iterator[list[Message]]:
-        """Yield batches of arriving messages until the connection is closed."""
+        """Yield batches of messages as they arrive, until the connection is closed."""
         if self._more:
             yield self._more
         with contextlib.suppress(OSError, ProtocolError):
@@ -256,14 +257,14 @@ class _Connection:
                 yield list(self._stream.feed(data))
 
     def hang_up(self) -> None:
-        # shutdown first: it wakes the reader, while close would not.
+        # Call shutdown first: it wakes the reader, while close would not.
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
 
 
 def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connection:
-    """Connect to the board's server; start one if none answers."""
+    """Connect to the board's server; start one if none responds."""
     directory.prepare()
     deadline = time.monotonic() + START_PATIENCE
     process: subprocess.Popen[bytes] | None = None
@@ -276,15 +277,15 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
-            # Status 0 without an answer: it found another server that was just exiting. Negative: a Ctrl-C for this
-            # process killed the new one before it had left the terminal.
+            # Status 0 although no server responds: the new server found another one that was just exiting. Negative:
+            # a Ctrl-C for this process killed the new server before it had left the terminal.
             process = _start_server(directory)
         time.sleep(pause)
         pause = min(pause * 1.3, 0.05)
 
 
 def _connect(directory: BoardDirectory) -> _Connection | None:
-    """Return the connection, after Hello and Welcome, or None if no server answers."""
+    """Return the connection, after Hello and Welcome, or None if no server responds."""
     token = ""
 
     try:
@@ -324,7 +325,7 @@ def _connect(directory: BoardDirectory) -> _Connection | None:
 
 
 def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
-    """Start and return a server process in a new session, which outlives this process while the board has clients."""
+    """Start and return a server process in a new session, which outlives this process if the board still has clients."""
     import subprocess
 
     if not sys.executable:
@@ -334,20 +335,20 @@ def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
     windows = sys.platform == "win32"
     if sys.platform == "win32":
         flags = subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP
-    # A temporary board serves the processes started here, and need not outlive this one.
+    # A temporary board is for the processes started here, and need not outlive this one.
     start = subprocess.Popen if os.environ.get("MINIROSPY_BOARD_TEMPORARY") else start_outside_of_job
     with open(os.devnull, "a") if windows else private_files.open_text(directory.log_path, "a") as log:
         process = start(
             [sys.executable, "-c", _SERVE, root, str(directory.folder), directory.name],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            # On Windows the server writes its log itself; the reason is in server.py.
+            # On Windows the server writes its log itself; server.py gives the reason.
             stderr=log,
             cwd=directory.folder,
             start_new_session=True,
             creationflags=flags,
         )
-    # Collect its exit status, or a long-lived client would keep a zombie.
+    # Wait for its exit status, or a long-lived client would have a zombie process.
     threading.Thread(target=process.wait, name="gpio-server-wait", daemon=True).start()
     return process
 

@@ -1,8 +1,8 @@
-"""The behaviour of a board: operations in, changed pins out. Pure.
+"""A board's behaviour: operations in, changed pins out. Pure.
 
 A pin is an input or an output. An output's level is its latch; an input's level is the one driven from outside
-(a pressed button, a jumper wire), else its pull resistor, else 0. As on a Raspberry Pi, the latch survives changes of
-direction and the process that wrote it. In front of the board is a scanner, and perhaps a person.
+(a pressed button, a jumper wire), else its pull resistor, else 0. As on a Raspberry Pi, the latch does not change with the
+direction, or when the process that wrote it exits. In front of the board is a scanner, and perhaps a person.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ __all__ = [
     "Write",
 ]
 
-PINS = 54  # number of the chip's pins, in BCM numbering: 0 to 53
+PINS = 54  # number of pins on the chip, in BCM numbering: 0 to 53
 
 LEDS = {2: "green", 3: "green", 4: "yellow", 5: "yellow", 6: "red", 7: "red"}  # BCM pin -> colour of its LED
 
 BUTTONS = (11, 12)
-"""BCM pins of the wired buttons: a resistor pulls them to 0, pressing drives them to 1."""
+"""BCM pins of the wired buttons: a resistor pulls them to 0, pressing a button drives its pin to 1."""
 
 
 class Function(IntEnum):
-    """The function of a pin, with RPi.GPIO's numbers."""
+    """A pin's function, with RPi.GPIO's numbers."""
 
     OUT = 0
     IN = 1
@@ -55,7 +55,7 @@ class Pull(IntEnum):
 
 
 class Pin(NamedTuple):
-    """One pin; ``world`` is the level that it is driven to from outside, or None if it is not driven."""
+    """One pin; ``world`` is the level to which it is driven from outside, or None if it is not driven."""
 
     function: Function = Function.IN
     pull: Pull = Pull.OFF
@@ -64,7 +64,7 @@ class Pin(NamedTuple):
 
     @property
     def level(self) -> int:
-        """Return the level read at the pin: 0 or 1."""
+        """Return the level that is read at the pin: 0 or 1."""
         if self.function is Function.OUT:
             return self.latch
         if self.world is not None:
@@ -73,7 +73,7 @@ class Pin(NamedTuple):
 
 
 class Setup(NamedTuple):
-    """Set a pin's function; ``initial`` is an output's first level, None keeps the latch."""
+    """Set a pin's function; ``initial`` is an output's first level, or None to keep the latch."""
 
     pin: int
     function: int
@@ -124,7 +124,7 @@ class OperationError(ValueError):
 
 
 class BoardModel:
-    """All the pins of one board, and the person in front of it."""
+    """All pins on one board, and the person in front of it."""
 
     def __init__(self, pins: Sequence[Pin] | None = None, person: Position | None = None) -> None:
         fresh = [Pin(world=0 if number in BUTTONS else None) for number in range(PINS)]
@@ -132,7 +132,10 @@ class BoardModel:
         self.person = person
 
     def apply(self, operation: Operation) -> list[Change]:
-        """Perform one operation completely, and return the pins that changed. Raise OperationError without changing anything."""
+        """Perform one operation completely, and return the changed pins.
+
+        If the operation is invalid, raise OperationError and change nothing.
+        """
         match operation:
             case Setup(pin, function, pull, initial):
                 wanted = self._set_up(_pin(pin), function, pull, initial)
@@ -160,7 +163,7 @@ class BoardModel:
         return changes
 
     def move_person(self, position: Position | None) -> bool:
-        """Set the person's position (None: no person); return whether it changed. Raise OperationError."""
+        """Set the person's position (None: no person); return whether it changed. Raise OperationError if it is invalid."""
         if position is not None and not all(map(math.isfinite, position)):
             raise OperationError(f"a position is two lengths in metres, not {position}")
         moved = position != self.person
@@ -175,7 +178,7 @@ class BoardModel:
         return {pin: state if initial is None else state._replace(latch=_level(initial))}
 
     def _pressed(self, pin: int) -> int:
-        # A button at a pin with a pull-up connects it to ground; the wired ones connect to 3.3 V.
+        # A button at a pin with a pull-up connects the pin to ground; the wired buttons connect it to 3.3 V.
         return 0 if pin not in BUTTONS and self.pins[pin].pull is Pull.UP else 1
 
 

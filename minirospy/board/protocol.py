@@ -1,8 +1,8 @@
 """Messages between a board's server and its clients <-> bytes (msgpack). Pure.
 
 Each message is an array: the number of its kind, then its fields. A client first sends Hello and then
-Requests with increasing numbers. The server first sends Welcome (the whole board), and then Changed and PersonMoved to
-all clients on each change. It sends Done to a client for its finished requests, after the changes that they caused.
+Requests with increasing numbers. The server first sends Welcome (the whole board), and then, on each change, Changed or
+PersonMoved to all clients. It sends Done to a client for its finished requests, after the changes that they caused.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class ProtocolError(ValueError):
 
 
 class Hello(NamedTuple):
-    """A client's first message; ``token`` is the secret of a TCP server, "" on a Unix socket."""
+    """A client's first message; ``token`` is a TCP server's secret, or "" on a Unix socket."""
 
     version: int
     token: str
@@ -66,7 +66,7 @@ class MovePerson(NamedTuple):
 
 
 class Request(NamedTuple):
-    """Perform ``operation``; None requests only the Done."""
+    """Perform ``operation``; None only requests the Done message."""
 
     number: int
     operation: Operation | MovePerson | None
@@ -102,7 +102,7 @@ class Done(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """Request ``number`` changed nothing, for the reason ``why``."""
+    """Request ``number`` changed nothing, because of ``why``."""
 
     number: int
     why: str
@@ -124,7 +124,7 @@ _OPERATION_NUMBER = {kind: number for number, kind in enumerate(_OPERATIONS)}
 
 
 def serialize(message: Message) -> bytes:
-    """Return the bytes of one message."""
+    """Return one message's bytes."""
     fields: tuple[object, ...] = message
     if isinstance(message, Request):
         operation = message.operation
@@ -135,13 +135,13 @@ def serialize(message: Message) -> bytes:
 
 
 class Stream:
-    """The decoder for one direction of one connection: bytes in, messages out."""
+    """The decoder for one direction of a connection: bytes in, messages out."""
 
     def __init__(self) -> None:
         self._unpacker = msgpack.Unpacker(use_list=False, max_buffer_size=_MAX_BUFFER)
 
     def feed(self, data: bytes) -> Iterator[Message]:
-        """Yield the messages that ``data`` completes. Raise ProtocolError."""
+        """Yield the messages that ``data`` completes. Raise ProtocolError if the data is invalid."""
         try:
             self._unpacker.feed(data)
             for item in self._unpacker:
@@ -151,12 +151,12 @@ class Stream:
 
 
 def encode_board(pins: list[Pin], person: Position | None) -> bytes:
-    """Return a board as one block of bytes, for the file in which it is saved."""
+    """Return a board as one block of bytes, for the file that stores it."""
     return serialize(Welcome(VERSION, pins, person))
 
 
 def decode_board(block: bytes) -> tuple[list[Pin], Position | None]:
-    """Return the pins and the person of :func:`encode_board`. Raise ProtocolError."""
+    """Return the pins and the person from :func:`encode_board`. Raise ProtocolError if the block is invalid."""
     messages = list(Stream().feed(block))
     if len(messages) != 1 or not isinstance(messages[0], Welcome) or messages[0].version != VERSION:
         raise ProtocolError("not a saved board")
@@ -212,4 +212,4 @@ _READERS: tuple[Callable[..., Message], ...] = (
     lambda number: Done(_natural(number)),
     lambda number, why: Refused(_natural(number), str(why)),
     lambda position: PersonMoved(_position(position)),
-)  # in the order of _KINDS
+)  # in the same order as _KINDS

@@ -22,7 +22,7 @@ def model_name(file: Path = _MODEL_FILE) -> str | None:
 
 
 def warn_of_missing_library(file: Path = _MODEL_FILE) -> None:
-    """Print a warning on stderr if this is a Raspberry Pi: the program only controls a virtual board."""
+    """If this is a Raspberry Pi, warn on stderr that the program only controls a virtual board."""
     name = model_name(file)
     if name is not None:
         print(

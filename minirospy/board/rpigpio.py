@@ -1,8 +1,8 @@
-"""The module of `import RPi.GPIO as GPIO`: the API of RPi.GPIO 0.7.1 on the virtual board.
+"""The module for `import RPi.GPIO as GPIO`: the API of RPi.GPIO 0.7.1 on the virtual board.
 
-Names, defaults, error texts and warnings are RPi.GPIO's
-(https://sourceforge.net/p/raspberry-gpio-python/wiki/). The connection to the board is made at the first call that needs
-it, not on import. As on hardware, the pins keep their state when the process exits; only cleanup() resets them.
+Names, defaults, error messages and warnings are RPi.GPIO's
+(https://sourceforge.net/p/raspberry-gpio-python/wiki/). The first call that needs the board connects to it, not the
+import. As on hardware, the pins keep their state when the process exits; only cleanup() resets them.
 """
 
 from __future__ import annotations
@@ -105,11 +105,11 @@ HEADER = {
     38: 20,
     40: 21,
 }
-"""Pin of the 40-pin header (BOARD numbering) -> BCM pin."""
+"""Pin on the 40-pin header (BOARD numbering) -> BCM pin."""
 
 
 class Gpio:
-    """The board from the view of one program: its numbering mode, the pins that it set up, its events."""
+    """The board as one program sees it: its numbering mode, the pins that it set up, its events."""
 
     def __init__(self, board: str | None = None) -> None:
         self._board = board
@@ -119,10 +119,11 @@ class Gpio:
         self._link: Link | None = None
         self._levels: list[int] = []
         self._directions: dict[int, int] = {}
-        # Channel -> BCM pin of the channels that are set up, for the two calls that must be fast.
+        # Channel -> BCM pin for the channels that are set up, for the two calls that must be fast.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
-        # The same for channels released by cleanup() in a signal handler: the interrupted call still finds them.
+        # The same for channels that cleanup() has released in a signal handler, so that the interrupted call still
+        # finds them.
         self._interrupted: dict[int, int] = {}
         self._detectors: dict[int, Detector] = {}
         self._waiting: dict[int, Detector] = {}
@@ -167,7 +168,7 @@ class Gpio:
     def output(self, channel: int | Sequence[int], value: int | bool | Sequence[int | bool]) -> None:
         """Set output channels; a single value applies to all of them."""
         try:
-            # The usual case first: one channel, one value.
+            # Try the usual case first: one channel, one value.
             pin = self._writable[channel]  # type: ignore[index]
             level = level_of(value)
         except (KeyError, TypeError):
@@ -186,12 +187,12 @@ class Gpio:
             raise RuntimeError("You must setup() the GPIO channel first") from None
 
     def gpio_function(self, channel: int) -> int:
-        """Return the present function of the pin: IN or OUT."""
+        """Return the pin's current function: IN or OUT."""
         pin = self._pin(channel)
         return int(self._linked().states[pin].function)
 
     def cleanup(self, channel: int | Sequence[int] | None = None) -> None:
-        """Make the channels that this program set up inputs again; without argument also reset the numbering mode."""
+        """Make the channels that this program set up inputs again; without an argument also reset the numbering mode."""
         with self._lock:
             everything = channel is None
             wanted = (
@@ -199,8 +200,8 @@ class Gpio:
             )
             mine = wanted & set(self._directions)
             if is_dispatching_signal():
-                # In a shutdown hook the program may already have checked its flag, and be about to use its pin. That
-                # must not fail: RPi.GPIO is written in C and finishes its calls first.
+                # If this runs in a shutdown hook, the interrupted program may already have checked its flag and be
+                # about to use its pin. That must not fail: RPi.GPIO is written in C and finishes its calls first.
                 self._interrupted.update((one, pin) for one, pin in self._readable.items() if pin in mine)
 
             for pin in sorted(mine):
@@ -213,7 +214,8 @@ class Gpio:
                     del table[one]
 
             if everything and self._link is not None:
-                # Even if no channel was set up: RPi.GPIO only checks whether it has accessed a pin yet.
+                # Do this even if no channel was set up, because RPi.GPIO only checks whether it has accessed a pin
+                # yet.
                 self._mode = None
 
         if not mine:
@@ -232,7 +234,7 @@ class Gpio:
         *,
         channel: int | None = None,
     ) -> None:
-        """Detect edges of an input; ``callback(channel)`` runs for each. ``bouncetime`` in ms."""
+        """Detect edges on an input; ``callback(channel)`` runs for each. ``bouncetime`` is in ms."""
         number = gpio if gpio is not None else channel
         if number is None or edge is None:
             raise TypeError("add_event_detect() needs a channel and an edge")
@@ -250,7 +252,7 @@ class Gpio:
             self._detectors[pin] = detector
 
     def add_event_callback(self, gpio: int, callback: Callback) -> None:
-        """Add a callback for a channel with add_event_detect."""
+        """Add a callback for a channel on which add_event_detect was called."""
         if not callable(callback):
             raise TypeError("Parameter must be callable")
         pin = self._input_pin(gpio)
@@ -265,7 +267,7 @@ class Gpio:
     def wait_for_edge(
         self, channel: int, edge: int, bouncetime: int = NO_BOUNCETIME, timeout: int = -1
     ) -> int | None:
-        """Wait for an edge, up to ``timeout`` ms (-1: forever); return the channel, or None on a timeout."""
+        """Wait for an edge, up to ``timeout`` ms (-1: forever); return the channel, or None after the timeout."""
         pin = self._input_pin(channel)
         detector = detector_of(channel, edge, bouncetime)
         if operator.index(timeout) <= 0 and timeout != -1:
@@ -282,17 +284,17 @@ class Gpio:
                 self._waiting.pop(pin, None)
 
     def event_detected(self, channel: int) -> bool:
-        """Return whether an edge occurred since the last call."""
+        """Return whether an edge has occurred since the last call."""
         detector = self._detectors.get(self._pin(channel))
         return detector is not None and detector.take()
 
     def remove_event_detect(self, gpio: int) -> None:
-        """Stop detecting edges of a channel; callbacks that have not started will not run."""
+        """Stop detecting edges on a channel; callbacks that have not started will not run."""
         with self._lock:
             self._forget_events(self._pin(gpio))
 
     def close(self) -> None:
-        """Disconnect; the pins keep their state, except those with a running PWM, which go low."""
+        """Disconnect; the pins keep their state, except those with a running PWM, which become low."""
         for reference in list(self._waves.values()):
             wave = reference()
             if wave is not None:
@@ -307,7 +309,7 @@ class Gpio:
         atexit.unregister(self.close)
 
     def output_pin(self, channel: int) -> int:
-        """Return the BCM pin of a channel, for a PWM. Raise the exceptions of PWM()."""
+        """Return a channel's BCM pin, for a PWM. Raise the same exceptions as PWM()."""
         pin = self._pin(channel)
         if pin in self._waves:
             raise RuntimeError("A PWM object already exists for this GPIO channel")
@@ -324,7 +326,7 @@ class Gpio:
         self._waves.pop(wave.pin, None)
 
     def write(self, pin: int, level: int) -> None:
-        """Set the latch of a BCM pin."""
+        """Set a BCM pin's latch."""
         self._linked().write(((pin, level),))
 
     def _linked(self) -> Link:
@@ -369,14 +371,15 @@ class Gpio:
         if pin in {2, 3} and pull != PUD_OFF:
             self._warn("A physical pull up resistor is fitted on this channel!", depth=3)
         with self._lock:
-            # Before calling the board: a Ctrl-C may interrupt that call, and cleanup() must undo its effect.
+            # Do this before calling the board: a Ctrl-C may interrupt that call, and cleanup() must then undo its
+            # effect.
             self._directions[pin] = direction
 
         link.call(Setup(pin, direction, pull, level))
 
         with self._lock:
             if pin not in self._directions:
-                # A signal handler has called cleanup() during the call of the board.
+                # A signal handler has called cleanup() during the call to the board.
                 return
             self._interrupted.pop(channel, None)
             self._readable[channel] = pin
@@ -429,7 +432,7 @@ class Gpio:
                 callbacks.schedule(detector)
 
     def _warn(self, text: str, depth: int) -> None:
-        """Warn at the user's line, which is ``depth`` calls above this one."""
+        """Issue a warning for the user's line, which is ``depth`` calls above this one."""
         if self._warns:
             warnings.warn(text, RuntimeWarning, stacklevel=depth + 1)
 
@@ -438,9 +441,9 @@ _gpio = Gpio()
 
 
 class PWM:
-    """Pulse width modulation of an output channel; ``frequency`` in Hz.
+    """Pulse width modulation on an output channel; ``frequency`` is in Hz.
 
-    As in RPi.GPIO, it stops when stop() is called or the object is deleted: keep a reference.
+    As in RPi.GPIO, it stops when stop() is called or the object is deleted: keep a reference to it.
     """
 
     def __init__(self, channel: int, frequency: float) -> None:

@@ -1,7 +1,7 @@
 """A simulated safety scanner: a room with walls and a person in, ranges and fields out. Pure.
 
-The geometry is that of SICK's nanoScan3 as published by its ROS 1 driver: 1651 beams over 275 degrees. Lengths are in
-metres, angles in rad, x straight ahead of the scanner and y to its left.
+The geometry is that of SICK's nanoScan3 as its ROS 1 driver publishes it: 1651 beams over 275 degrees. Lengths are in
+metres, angles in radians; x is straight ahead of the scanner and y to its left.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ NOISE = 0.004  # standard deviation of a range, in metres
 FIELDS = (0.4, 0.2)  # reach of the warning field and of the protective field, in metres
 
 _PLAIN, _REFLECTOR = 90.0, 250.0
-_DARK_EDGE = 0.35  # minimum brightness, as a share, of a surface seen from the side
+_DARK_EDGE = 0.35  # minimum brightness, from 0 to 1, of a surface seen from the side
 
 
 class Wall(NamedTuple):
-    """A straight wall between two points; a reflector returns all light."""
+    """A straight wall between two points; a reflector reflects all light."""
 
     x1: float
     y1: float
@@ -131,7 +131,7 @@ def _angle(beam: int) -> float:
 
 
 def _nearest_wall(angle: float, walls: Sequence[Wall]) -> tuple[float, float, bool]:
-    """Return the distance of the first wall that a beam hits, its brightness, and whether it is a reflector."""
+    """Return the distance to the first wall that a beam hits, the wall's brightness, and whether it is a reflector."""
     dx, dy = math.cos(angle), math.sin(angle)
     nearest: tuple[float, float, bool] = (math.inf, 0.0, False)
     for wall in walls:

@@ -1,7 +1,7 @@
-"""The server process of one board: `python -m minirospy.board.server FOLDER NAME`.
+"""A board's server process: `python -m minirospy.board.server FOLDER NAME`.
 
 The first client starts it, and it exits shortly after the last one has disconnected; a lock file ensures that only one
-runs. The board is saved to a file when it changes, so the next server continues with the same state.
+runs. The board is saved to a file when it changes, so that the next server continues with the same state.
 """
 
 from __future__ import annotations
@@ -39,24 +39,24 @@ from minirospy.board.protocol import (
 
 __all__ = ["main"]
 
-LINGER = 1.5  # seconds that a board without clients waits for the next one
+LINGER = 1.5  # seconds that a board without clients waits for the next client
 
 SAVE_AFTER = 0.05
-"""Seconds from a change to saving it: with a fast blinking LED the file is written 20 times a second, not at each change."""
+"""Seconds from a change to saving it, so that a fast-blinking LED causes at most 20 writes a second."""
 
-# Unsent bytes for a client; beyond that it is disconnected, and reconnects when it reads again
+# Maximum unsent bytes for a client; beyond that it is disconnected, and reconnects when it reads again
 MAX_UNSENT = 1 << 20
 
-LOCK_PATIENCE = 5.0  # seconds to wait for the lock of a server that is about to exit
+LOCK_PATIENCE = 5.0  # seconds to wait for the lock if another server is about to exit
 
 
 def main(argv: list[str]) -> int:
-    """Serve the board NAME of FOLDER until it has no clients; return 0 also if another server runs."""
+    """Serve the board NAME in FOLDER until it has no clients; return 0, also if another server is running."""
     directory = BoardDirectory(argv[1], Path(argv[0]))
     if sys.platform == "win32":
-        # Not an open file, as on other systems: Windows could not remove it, nor its folder.
+        # Do not use an open file as on other systems: Windows could remove neither the file nor its folder.
         sys.stderr = _LogOnDemand(directory.log_path)
-    # A board that already has saved state is kept, even if another process starts it again.
+    # A board that already has saved state is not temporary, even if another process starts it again.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not directory.state_path.exists()
     with _locked(directory) as owned:
         if owned:
@@ -69,7 +69,7 @@ def main(argv: list[str]) -> int:
 
 
 class _LogOnDemand(io.TextIOBase):
-    """A standard error that opens its file for each write, so that the file exists only after an error."""
+    """A standard error stream that opens its file for each write, so that the file exists only after an error."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -105,7 +105,7 @@ class _Server:
             await self._abandoned.wait()
         finally:
             server.close()
-            # If a client has it open, the next server replaces it.
+            # If a client has the file open, the next server replaces it.
             with contextlib.suppress(OSError):
                 private_files.remove_file(address)
             for client in list(self._clients):
@@ -127,7 +127,7 @@ class _Server:
             self._wait_for_clients()
 
     def carry_out(self, request: Request) -> Message:
-        """Apply a request and notify all clients; return the answer for the caller."""
+        """Apply a request and notify all clients; return the response for the caller."""
         if request.operation is None:
             return Done(request.number)
         try:
@@ -142,7 +142,7 @@ class _Server:
         return Done(request.number)
 
     def _apply(self, operation: Operation | MovePerson) -> list[Message]:
-        """Apply an operation and return the messages for all clients. Raise OperationError."""
+        """Apply an operation and return the messages for all clients. Raise OperationError if the operation is invalid."""
         if isinstance(operation, MovePerson):
             return [PersonMoved(operation.position)] if self._model.move_person(operation.position) else []
         now = time.time()
@@ -157,13 +157,13 @@ class _Server:
         if self._saving is not None:
             self._saving.cancel()
             self._saving = None
-        # A removed folder (a test's, a cleaned /tmp) must not cause errors in the clients.
+        # If the folder was removed (by a test, or by cleaning /tmp), the clients must not fail.
         with contextlib.suppress(OSError):
             _write_private(self._directory.state_path, encode_board(self._model.pins, self._model.person))
 
 
 class _Client(asyncio.Protocol):
-    """One connection: reads messages, passes them on, writes answers."""
+    """One connection: reads messages, passes them on, writes responses."""
 
     def __init__(self, server: _Server) -> None:
         self._server = server
@@ -183,7 +183,7 @@ class _Client(asyncio.Protocol):
         except ProtocolError:
             self.drop()
             return
-        # The last Done covers all before it, so a burst of outputs is answered once.
+        # The last Done covers all requests before it, so a burst of outputs gets a single response.
         done: list[Message] = [answer for answer in answers if isinstance(answer, Done)]
         refused: list[Message] = [answer for answer in answers if isinstance(answer, Refused)]
         if answers:
@@ -221,7 +221,7 @@ def _saved(directory: BoardDirectory) -> BoardModel:
 
 
 def _write_private(path: Path, data: bytes) -> None:
-    """Replace ``path`` atomically by a file that only this user can read."""
+    """Replace ``path`` atomically with a file that only this user can read."""
     fresh = path.with_name(path.name + ".new")
     with os.fdopen(private_files.create_file(fresh), "wb") as file:
         file.write(data)
@@ -230,7 +230,7 @@ def _write_private(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def _locked(directory: BoardDirectory) -> Iterator[bool]:
-    """Yield whether this process got the board's lock; waits shortly for a server that is about to exit."""
+    """Yield whether this process has acquired the board's lock; wait briefly for a server that is about to exit."""
     deadline = time.monotonic() + LOCK_PATIENCE
     with os.fdopen(
         private_files.open_file(directory.lock_path, os.O_RDWR | os.O_CREAT, 0o600), "r+b"

@@ -1,4 +1,4 @@
-"""The square wave of a PWM on the virtual board."""
+"""A PWM's square wave on the virtual board."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Output(Protocol):
 
 
 class Wave:
-    """The square wave of one PWM, on a separate thread."""
+    """One PWM's square wave, generated in a separate thread."""
 
     def __init__(self, gpio: Output, pin: int, frequency: float) -> None:
         self.pin = pin
@@ -40,7 +40,7 @@ class Wave:
         gpio.register_wave(self)
 
     def set(self, *, duty: float | None = None, frequency: float | None = None) -> None:
-        """Change the duty cycle (percent) or the frequency (Hz)."""
+        """Change the duty cycle (in percent) or the frequency (in Hz)."""
         if duty is not None:
             if not 0.0 <= duty <= 100.0:
                 raise ValueError("dutycycle must have a value from 0.0 to 100.0")
@@ -60,7 +60,7 @@ class Wave:
             self._thread.start()
 
     def stop(self) -> None:
-        """Stop, and set the pin low; another PWM may then use it."""
+        """Stop, and set the pin low; another PWM may then use the pin."""
         thread, self._thread = self._thread, None
         self._stopping = True
         self._changed.set()

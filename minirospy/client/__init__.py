@@ -211,7 +211,7 @@ def is_down() -> bool:
 
 
 def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None]:
-    """During the block, let a shutdown call ``interrupt``, in any thread; it must unblock calls made in the block."""
+    """Call ``interrupt``, in any thread, if the node shuts down during the block; it must unblock calls made in the block."""
     return current_session().lifecycle.interrupting(interrupt)
 
 

@@ -22,7 +22,7 @@ def report_waiting(*, is_leaving: bool) -> None:
 
 
 def _what_runs() -> str:
-    """Return the thread or process that delays the exit of this process, with its location in the program."""
+    """Return the thread or process that delays this process's exit, and its location in the program."""
     main = threading.main_thread()
     threads = [main, *(t for t in threading.enumerate() if t is not main and not t.daemon)]
     frames = sys._current_frames()

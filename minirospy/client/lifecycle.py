@@ -130,7 +130,7 @@ class Lifecycle:
         return True
 
     def interrupting(self, interrupt: Callable[[], object]) -> contextlib.AbstractContextManager[None]:
-        """During a block, let a shutdown call ``interrupt`` to unblock calls made in it.
+        """Call ``interrupt`` if the node shuts down during a block, to unblock calls made in the block.
 
         A signal handler may call ``interrupt`` at any point in the main thread, so the events that it sets are
         SignalSafeEvents.
@@ -162,7 +162,7 @@ class Lifecycle:
         return self._this_thread.state.awareness is Awareness.NOTIFIED
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
+        """Return whether the node has shut down, and record that the calling thread polls, or, if it has, was notified."""
         self.deferral.poll()
         is_shutdown = self.shutting_down.is_set()
         self._this_thread.state.awareness = Awareness.NOTIFIED if is_shutdown else Awareness.POLLS

@@ -1,4 +1,4 @@
-"""The parameter server functions of rospy. Source: http://wiki.ros.org/rospy/Overview/Parameter%20Server."""
+"""rospy's parameter server functions. Source: http://wiki.ros.org/rospy/Overview/Parameter%20Server."""
 
 from __future__ import annotations
 

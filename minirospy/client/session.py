@@ -38,7 +38,7 @@ _log = logging.getLogger(__name__)
 
 
 class Session:
-    """The process's node, from before init_node until after its shutdown: its name, lifecycle, clock, tables and loop."""
+    """The process's node, from before init_node until after the node's shutdown: its name, lifecycle, clock, tables and loop."""
 
     def __init__(self, previous: Session | None = None, *, is_fork: bool = False) -> None:
         """Replace the session ``previous``; its name, clock and listeners remain in use until init_node is called."""
@@ -199,7 +199,7 @@ class Session:
         return self.lifecycle.is_shutdown()
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down, and record that the calling thread polls, or was notified."""
+        """Return whether the node has shut down, and record that the calling thread polls, or, if it has, was notified."""
         if self._installs_signals:
             # A fork uses the default signal handling until it polls.
             self._installs_signals = False

@@ -1,1 +1,1 @@
-"""What `import RPi.GPIO` offers; its modules in `overlay/` are generated from these."""
+"""The packages that `import RPi.GPIO` finds; the modules in `overlay/` are generated from them."""

@@ -80,7 +80,7 @@ class ChunkStream:
         self._compared: set[int] = set()
 
     def header(self, position: int) -> StoredChunk:
-        """Return the header of the chunk at a position. Raise BagFormatError if there is no chunk."""
+        """Return the header of the chunk at a position. Raise BagFormatError if there is no valid chunk."""
         if position not in self._headers:
             limit = size_of(self.stream)
             if position > limit:

@@ -294,8 +294,7 @@ class Repair:
         """Recover the messages in an uncompressed chunk whose size is wrong; return whether there are any.
 
         At the end of the file recover every complete message; elsewhere recover all messages or none, checked against the
-        chunk's
-        index records.
+        chunk's index records.
         """
         record = _partial_chunk(self._stream, position, limit)
         if record is None:

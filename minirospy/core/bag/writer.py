@@ -215,8 +215,7 @@ class BagWriter:
         """Write a message received at ``time``, in nanoseconds; its bytes are ``body`` followed by ``tail``.
 
         ``bytes`` are referenced until the chunk is written, other buffers are copied. Raise BagFormatError if the message
-        or its
-        time exceeds a limit, OSError if the stream fails.
+        or its time exceeds a limit, OSError if the stream fails.
         """
         stream = self._streams[connection]
         length = len(body) + len(tail)

@@ -19,7 +19,7 @@ from minirospy.core.graph.shares import Excess, Shares, holder_of
 
 __all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 
-# nested namespaces and dictionaries; together with the response, they must fit into XML-RPC's 64 levels
+# levels of namespaces and dictionaries; together with the response, they must fit into XML-RPC's 64 levels
 _MAX_DEPTH = 56
 
 _MAX_INT = 2**31
@@ -136,8 +136,7 @@ class ParameterTree:
         """Set a value of ``weight`` bytes; a dictionary replaces the namespace.
 
         If a parameter has the name of a namespace in ``key``, the namespace replaces it. Raise ValueError if the root
-        would not
-        be a dictionary.
+        would not be a dictionary.
         """
         path = _split(key)
         if path:

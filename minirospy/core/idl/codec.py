@@ -1,9 +1,9 @@
 """Generate a message's ``serialize`` and ``deserialize`` as straight-line Python code.
 
-The fields are in byte order, with nested messages expanded. Consecutive fixed-size values, and the
-length of the following field, share one compiled ``struct``; an array of fixed-size messages
-is one ``iter_unpack``. Reading never goes beyond the data: ``struct`` raises, a slice that is too short is detected
-at the end, and the number of elements that consist of slices, or of no bytes, is checked before the loop.
+The fields are in byte order, with nested messages expanded. Consecutive fixed-size values, and the length of the
+following field, share one compiled ``struct``; an array of fixed-size messages is one ``iter_unpack``. Reading never goes
+beyond the data: ``struct`` raises, a slice that is too short is detected at the end, and the number of elements that
+consist of slices, or of no bytes, is checked before the loop.
 """
 
 from __future__ import annotations

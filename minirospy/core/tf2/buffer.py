@@ -1,7 +1,7 @@
-"""The transform buffer of tf2: transforms in, lookups between any two frames of the tree out.
+"""tf2's transform buffer: transforms in, lookups between any two frames in the tree out.
 
-Results, exceptions and their texts are those of tf2's BufferCore. Stamps are nanoseconds since the epoch, and exact;
-tf2_py rounds them to a float of seconds. Not thread-safe.
+Results, exceptions and their messages are the same as those of tf2's BufferCore. Stamps are nanoseconds since the epoch,
+and exact; tf2_py rounds them to a float of seconds. Not thread-safe.
 Source: http://wiki.ros.org/tf2/Design, http://docs.ros.org/en/noetic/api/tf2/html/classtf2_1_1BufferCore.html.
 """
 
@@ -29,7 +29,7 @@ _ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 class StampedTransform(NamedTuple):
-    """The result of a lookup: the pose of the source frame in the target frame, at ``stamp``."""
+    """The result of a lookup: the pose of the source frame in the target frame at ``stamp``."""
 
     stamp: int
     translation: Vector
@@ -37,7 +37,7 @@ class StampedTransform(NamedTuple):
 
 
 class _Walk(NamedTuple):
-    """The samples on the path between two frames, from each one up to their common ancestor, and their time."""
+    """The samples on the path between two frames, from each frame up to their common ancestor, and their time."""
 
     time: int
     from_source: list[Sample]
@@ -45,17 +45,18 @@ class _Walk(NamedTuple):
 
 
 class TransformBuffer(FrameTree):
-    """The tree of frames over the last ``cache_time`` nanoseconds, and lookups in it."""
+    """The frame tree over the last ``cache_time`` nanoseconds, and lookups in it."""
 
     # --- lookups
 
     def lookup(self, target: str, source: str, time: int) -> StampedTransform:
         """Return the pose of the frame ``source`` in the frame ``target`` at ``time``; 0 means the latest common time.
 
-        Raise LookupException, ConnectivityException, ExtrapolationException, InvalidArgumentException.
+        Raise LookupException if a frame does not exist, ConnectivityException if the frames are not connected,
+        ExtrapolationException if there is no data for the time, InvalidArgumentException if a name is invalid.
         """
         if target == source:
-            # As in tf2, the pose of a frame in itself is the identity, even for an unknown frame.
+            # As in tf2, a frame's pose in itself is the identity, even for an unknown frame.
             return StampedTransform(time or self._newest_of(target), _ORIGIN, IDENTITY)
         target_frame = self._valid(target, "lookupTransform argument target_frame")
         source_frame = self._valid(source, "lookupTransform argument source_frame")
@@ -66,7 +67,7 @@ class TransformBuffer(FrameTree):
     ) -> StampedTransform:
         """Return the pose of ``source`` at ``source_time`` in ``target`` at ``target_time``.
 
-        The frame ``fixed`` is assumed not to have moved meanwhile. Raise as :meth:`lookup` does.
+        Assume that the frame ``fixed`` has not moved in between. Raise the same exceptions as :meth:`lookup`.
         """
         self._valid(target, "lookupTransform argument target_frame")
         self._valid(source, "lookupTransform argument source_frame")
@@ -76,9 +77,9 @@ class TransformBuffer(FrameTree):
         return StampedTransform(second.stamp, *compose(second[1:], first[1:]))
 
     def why_not(self, target: str, source: str, time: int) -> str | None:
-        """Return None if :meth:`lookup` would succeed, else the text of tf2's can_transform.
+        """Return None if :meth:`lookup` would succeed, else the message from tf2's can_transform.
 
-        Raise InvalidArgumentException on a name that is invalid for a frame.
+        Raise InvalidArgumentException if a frame name is invalid.
         """
         if target == source:
             return None
@@ -92,9 +93,9 @@ class TransformBuffer(FrameTree):
     def why_not_full(
         self, target: str, target_time: int, source: str, source_time: int, fixed: str
     ) -> str | None:
-        """Return None if :meth:`lookup_full` would succeed, else the text of tf2's can_transform.
+        """Return None if :meth:`lookup_full` would succeed, else the message from tf2's can_transform.
 
-        Raise InvalidArgumentException on a name that is invalid for a frame.
+        Raise InvalidArgumentException if a frame name is invalid.
         """
         self._check_name(target, "canTransform argument target_frame")
         self._check_name(source, "canTransform argument source_frame")
@@ -102,7 +103,7 @@ class TransformBuffer(FrameTree):
         target_frame, source_frame = self._frames.get(target), self._frames.get(source)
         fixed_frame = self._frames.get(fixed)
         if target_frame is None or source_frame is None:
-            # Like tf2, which tests the wrong frame, report the fixed frame as missing if the source is missing.
+            # Report the fixed frame as missing if the source frame is, as tf2 does, which tests the wrong frame.
             missing = "" if source_frame else f" fixed_frame: {fixed}does not exist."
             return self._unknown(target, source) + missing
         if fixed_frame is None:
@@ -111,9 +112,10 @@ class TransformBuffer(FrameTree):
         return self._why_no_walk(fixed_frame, source_frame, source_time) if why is None else why
 
     def latest_common_time(self, target: str, source: str) -> int:
-        """Return the newest time at which :meth:`lookup` succeeds; 0 if all transforms between them are static.
+        """Return the newest time at which :meth:`lookup` succeeds, or 0 if all transforms between the frames are static.
 
-        Raise LookupException, InvalidArgumentException; a plain TransformException if they are not connected.
+        Raise LookupException if a frame does not exist, InvalidArgumentException if a name is invalid, and a plain
+        TransformException if the frames are not connected.
         """
         target_frame = self._valid(target, "get_latest_common_time")
         source_frame = self._valid(source, "get_latest_common_time")
@@ -123,7 +125,10 @@ class TransformBuffer(FrameTree):
             raise TransformException(*error.args) from None
 
     def chain(self, target: str, target_time: int, source: str, source_time: int, fixed: str) -> list[str]:
-        """Return the frames on the path from ``source`` to ``fixed``, and from there to ``target``. Raise as :meth:`lookup`."""
+        """Return the frames on the path from ``source`` to ``fixed``, and from there to ``target``.
+
+        Raise the same exceptions as :meth:`lookup`.
+        """
         first = self._path(fixed, source, source_time)
         second = self._path(target, fixed, target_time)
         return [*first, *second[1:]] if first else second
@@ -176,8 +181,8 @@ class TransformBuffer(FrameTree):
     def _walk(self, time: int, target: Frame, source: Frame) -> _Walk:
         """Return the samples from the source and from the target up to their common ancestor; the frames must differ.
 
-        Both paths go up to the root, or to a frame for which the source's path has no data: the part above the common
-        ancestor cancels out. Raise the exceptions of :meth:`lookup`.
+        Both paths lead up to the root, or to a frame for which the source's path has no data: the part above the common
+        ancestor cancels out. Raise the same exceptions as :meth:`lookup`.
         """
         if time == 0:
             time = self._common_time(target, source)
@@ -191,7 +196,7 @@ class TransformBuffer(FrameTree):
                 self._settle(frame)
             sample = cache.at(time)
             if sample is None:
-                # There may still be a path: the target's ancestors may include this frame.
+                # There may still be a path, because this frame may be one of the target's ancestors.
                 missed = frame
                 break
             if frame is target:
@@ -224,12 +229,12 @@ class TransformBuffer(FrameTree):
     def _common_time(self, target: Frame, source: Frame) -> int:
         """Return the newest time for which every frame between the two has data; static frames have data for every time.
 
-        Raise ConnectivityException, LookupException.
+        Raise ConnectivityException if the frames are not connected, LookupException if the transforms form a loop.
         """
         if target is source:
             return self._newest_of(target.name)
 
-        # Inlined from :meth:`_ancestors` for speed: most lookups need only this part.
+        # This is :meth:`_ancestors`, inlined for speed: most lookups need only this part.
         above_source: list[tuple[int, Frame]] = []
         common = _FOREVER
         frame, arrived = source, self._arrived
@@ -262,7 +267,7 @@ class TransformBuffer(FrameTree):
         raise _unconnected(target, source)
 
     def _ancestors(self, frame: Frame) -> Iterator[tuple[int, Frame]]:
-        """Yield the newest stamp and the parent of a frame and of each ancestor. Raise LookupException on a loop."""
+        """Yield the newest stamp and the parent, for a frame and for each ancestor. Raise LookupException if there is a loop."""
         depth = 0
         while (cache := frame.cache) is not None:
             if frame.settled != self._arrived:
@@ -313,9 +318,9 @@ def _accumulated(walk: _Walk) -> StampedTransform:
 
 
 def _composed(samples: list[Sample]) -> tuple[Vector, Quaternion]:
-    """Return the pose of the first sample's child in the last one's parent.
+    """Return the pose of the first sample's child in the last sample's parent.
 
-    The functions of `rotation` are inlined here, since a lookup spends most of its time in this function.
+    The functions from `rotation` are inlined here, because a lookup spends most of its time in this function.
     """
     _, a, b, c, x, y, z, w = samples[0]
     for _, ta, tb, tc, qx, qy, qz, qw in samples[1:]:

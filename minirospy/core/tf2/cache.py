@@ -1,6 +1,6 @@
 """The history of a frame's transforms: samples (stamp, parent, transform) in, the sample at a given time out.
 
-Times are nanoseconds since the epoch; time 0 means the newest. Source: http://wiki.ros.org/tf2/Design.
+Times are nanoseconds since the epoch; time 0 means the newest sample. Source: http://wiki.ros.org/tf2/Design.
 """
 
 from __future__ import annotations
@@ -12,25 +12,25 @@ from minirospy.core.tf2.rotation import slerp
 
 __all__ = ["Frame", "Misfit", "Sample", "StaticCache", "TimeCache", "seconds"]
 
-# Expired samples to keep before the lists are shortened, so that not each insertion moves all samples
+# Maximum expired samples before the lists are shortened, so that not every insertion moves all samples
 _COMPACT_ABOVE = 32
 
 
 def seconds(nanoseconds: int) -> float:
-    """Return a time in seconds, rounded like C++; for present times the last printed digits depend on it."""
+    """Return a time in seconds, rounded as in C++; for current times this determines the last digits that are printed."""
     whole, rest = divmod(nanoseconds, 1_000_000_000)
     return whole + 1e-9 * rest
 
 
 class Misfit(Enum):
-    """The reason why a cache refuses a sample."""
+    """The reason why a cache rejects a sample."""
 
     OLD = "TF_OLD_DATA ignoring data from the past (Possible reasons are listed at http://wiki.ros.org/tf/Errors%20explained)"
     REPEATED = "TF_REPEATED_DATA ignoring data with redundant timestamp"
 
 
 class Frame:
-    """A frame that a transform has named: its cache (None: it is only a parent) and the sender of its last sample."""
+    """A frame that occurs in a transform: its cache (None if it is only a parent), and the sender of its last sample."""
 
     __slots__ = ("authority", "cache", "name", "settled")
 
@@ -38,7 +38,8 @@ class Frame:
         self.name = name
         self.cache: TimeCache | StaticCache | None = None
         self.authority = ""
-        self.settled = 0  # number of lazy messages that had arrived when this frame's were last decoded
+        # number of lazy messages that had arrived when this frame's messages were last decoded
+        self.settled = 0
 
 
 # Parent, translation x, y, z, and rotation x, y, z, w
@@ -46,7 +47,7 @@ Sample = tuple[Frame, float, float, float, float, float, float, float]
 
 
 class TimeCache:
-    """The samples of the last ``span`` nanoseconds, in the order of their stamps, in parallel lists."""
+    """The samples from the last ``span`` nanoseconds, ordered by stamp, in parallel lists."""
 
     __slots__ = ("_first", "_samples", "_span", "_stamps")
 
@@ -70,7 +71,7 @@ class TimeCache:
         return self._stamps[self._first] if self._stamps else 0
 
     def insert(self, stamp: int, sample: Sample) -> Misfit | None:
-        """Insert a sample, and drop those older than the span; return the reason if the sample is refused."""
+        """Insert a sample, and drop samples older than the span; if the sample is rejected, return the reason."""
         stamps = self._stamps
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
@@ -89,7 +90,7 @@ class TimeCache:
         return None
 
     def at(self, time: int) -> Sample | None:
-        """Return the sample at ``time``, interpolated between its neighbours; None if there is none.
+        """Return the sample at ``time``, interpolated between its neighbours, or None if there is none.
 
         If the neighbours have different parents, return the older one.
         """
@@ -120,11 +121,11 @@ class TimeCache:
         )
 
     def latest(self) -> tuple[int, Frame] | None:
-        """Return the newest stamp and its parent; None if there are no samples."""
+        """Return the newest stamp and its parent, or None if there are no samples."""
         return (self._stamps[-1], self._samples[-1][0]) if self._stamps else None
 
     def why_not(self, time: int) -> str:
-        """Return the error text for a time without a sample; "" if there are no samples at all."""
+        """Return the error message for a time without a sample, or "" if there are no samples at all."""
         if not self._stamps:
             return ""
         if len(self) == 1:
@@ -170,7 +171,7 @@ class StaticCache:
         return 1
 
     def insert(self, stamp: int, sample: Sample) -> None:
-        """Replace the sample; the stamp is ignored."""
+        """Replace the sample. The stamp is ignored."""
         self._sample = sample
 
     def at(self, time: int) -> Sample:
@@ -182,8 +183,8 @@ class StaticCache:
         return 0, self._sample[0]
 
     def why_not(self, time: int) -> str:
-        """Return "", since there is a sample at every time."""
+        """Return "", because there is a sample for every time."""
         return ""
 
     def clear(self) -> None:
-        """Do nothing, since static transforms are kept."""
+        """Do nothing, because static transforms are kept."""

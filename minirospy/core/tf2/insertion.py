@@ -1,6 +1,6 @@
-"""The faults of a transform with tf2's error texts, and a rate-limited log of them.
+"""A transform's faults with tf2's error messages, and a rate-limited log of them.
 
-The texts are tf2's (noetic's: with the parent), since people search for them.
+The messages are tf2's (from noetic, with the parent), because people search for them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _MAX_KEYS = 1000
 
 
 class Refusal(NamedTuple):
-    """A refused transform: the child frame, tf2's name of the fault, and its text."""
+    """A rejected transform: the child frame, tf2's name for the fault, and the message."""
 
     frame: str
     kind: str
@@ -31,7 +31,7 @@ class Refusal(NamedTuple):
 def faults_of(
     parent: str, child: str, translation: Vector, rotation: Quaternion, authority: str
 ) -> list[Refusal]:
-    """Return all reasons why tf2 refuses this transform, independent of other data; in tf2's order."""
+    """Return all reasons why tf2 would reject this transform, independent of other data, in tf2's order."""
     found = []
 
     def add(kind: str, text: str) -> None:
@@ -72,7 +72,7 @@ def faults_of(
 
 
 def misfit_refusal(misfit: Misfit, parent: str, child: str, stamp: int, authority: str) -> Refusal:
-    """Return the refusal of a transform that a frame's cache did not accept."""
+    """Return the refusal for a transform that a frame's cache has rejected."""
     text = f"{misfit.value} for frame {child} (parent {parent}) at time {seconds(stamp):.6f} according to authority {authority}"
     return Refusal(child, misfit.value.partition(" ")[0], text, False)
 
@@ -80,7 +80,7 @@ def misfit_refusal(misfit: Misfit, parent: str, child: str, stamp: int, authorit
 class RefusalLog:
     """Passes a refusal to ``write`` at most once a second for each frame and fault; the next one includes the count.
 
-    ``clock`` returns seconds. tf2 writes each refusal, which floods terminals if two nodes publish one frame.
+    ``clock`` returns seconds. tf2 itself prints each refusal, which floods terminals if two nodes publish the same frame.
     """
 
     def __init__(self, write: Callable[[str, bool], object], clock: Callable[[], float]) -> None:

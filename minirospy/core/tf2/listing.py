@@ -1,6 +1,6 @@
-"""Listings of a buffer's frames: YAML as parsed by view_frames, and a graph in graphviz's language.
+"""Lists of a buffer's frames: YAML that view_frames can parse, and a graph in graphviz's language.
 
-Source: http://wiki.ros.org/tf2/view_frames; the texts are those of tf2's BufferCore, byte for byte, except that
+Source: http://wiki.ros.org/tf2/view_frames; the text equals that from tf2's BufferCore, byte for byte, except that
 quotation marks and backslashes in names are escaped in the graph, as graphviz requires.
 """
 
@@ -15,7 +15,7 @@ _MIN_SPAN = 0.0001  # seconds; the time span assumed for a single sample when co
 
 
 def frames_as_yaml(buffer: TransformBuffer) -> str:
-    """Return parent, broadcaster, rate and times of each frame that has a parent; ``{}`` if there are no frames."""
+    """Return parent, broadcaster, rate and times for each frame that has a parent, or ``{}`` if there are no frames."""
     if not buffer.frame_names():
         return "{}"
 
@@ -62,7 +62,7 @@ def _edge(frame: Frame, now: int) -> str:
 
 
 def _root(frame: Frame, now: int) -> str:
-    """Return the legend at a frame without a parent; a frame that never had one gets it only if ``now`` is given."""
+    """Return the legend at a frame without a parent; if the frame has never had one, only if ``now`` is given."""
     is_root = bool(now) if frame.cache is None else frame.cache.at(0) is None
     if not is_root:
         return ""

@@ -1,9 +1,9 @@
-"""Keep TFMessages as received, and decode the samples of a frame when that frame is looked up.
+"""Store TFMessages as received, and decode a frame's samples when that frame is looked up.
 
-A publisher sends the same frames in the same order again and again: two messages of one layout differ only in
-sequence numbers, stamps and transforms, which are at the same offsets. So a message of a known layout is recognized
-without decoding it, and kept as bytes. Messages may be dropped without decoding if the caches would have dropped their
-samples by now.
+A publisher sends the same frames in the same order again and again: two messages with the same layout differ only in
+sequence numbers, stamps and transforms, which are at the same offsets. Therefore a message with a known layout is
+recognized without decoding it, and stored as bytes. Messages are dropped without decoding if the caches would have dropped
+their samples by now.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _COUNT = struct.Struct("<I")
 _HEAD = struct.Struct("<4I")
 _STAMP = struct.Struct("<2I")
 _BODY = struct.Struct("<7d")
-_BLOCK = 64  # messages after which a layout drops expired ones, this many at a time
+_BLOCK = 64  # messages after which a layout drops expired ones, in blocks of this size
 _MAX_MESSAGES = 16_384
 _MAX_LAYOUTS = 16_384
 _MAX_SAME_LENGTH = 8
 
 
 class TransformSample(NamedTuple):
-    """One transform of a message; the stamp in nanoseconds."""
+    """One transform in a message. The stamp is in nanoseconds."""
 
     parent: str
     child: str
@@ -39,7 +39,7 @@ class TransformSample(NamedTuple):
 
 
 class Arrival(NamedTuple):
-    """A stored message: its number in the order of arrival, its sender, and its bytes."""
+    """A stored message: its number in order of arrival, its sender, and its bytes."""
 
     number: int
     authority: str
@@ -56,7 +56,10 @@ class _Offsets(NamedTuple):
 
 
 def read_transforms(data: bytes) -> list[TransformSample]:
-    """Return the transforms of a serialized tf2_msgs/TFMessage (tf/tfMessage is the same). Raise DeserializationError."""
+    """Return the transforms in a serialized tf2_msgs/TFMessage (tf/tfMessage is the same).
+
+    Raise DeserializationError if the bytes are not a TFMessage.
+    """
     return [_sample(data, offsets) for offsets in _find_transforms(data)]
 
 
@@ -75,7 +78,7 @@ class Layout:
 
     @property
     def children(self) -> list[str]:
-        """The child frames, in the order of the messages."""
+        """The child frames, in the order in the messages."""
         return [offsets.child for offsets in self._offsets]
 
     def keep(self, arrival: Arrival, span: int) -> list[str]:
@@ -84,7 +87,7 @@ class Layout:
         return [] if len(self._arrivals) % _BLOCK else self._drop_expired(span)
 
     def take(self, child: str) -> Iterator[tuple[int, str, TransformSample]]:
-        """Decode a frame's messages since the last time: yield (number of the arrival, authority, sample)."""
+        """Decode a frame's messages since the last call: yield (arrival number, authority, sample)."""
         index = self._index[child]
         start = max(0, self._decoded[index] - self._dropped)
         self._decoded[index] = self._dropped + len(self._arrivals)
@@ -100,9 +103,10 @@ class Layout:
     def _drop_expired(self, span: int) -> list[str]:
         """Drop the oldest blocks that no frame needs; return the frames to decode.
 
-        A frame does not need messages that it has decoded, or that its cache would have dropped. The cache drops samples older
-        than the newest message, if it accepts that one: a valid transform, later than those before. A frame whose newest one
-        would be refused must be decoded; then its messages can be dropped, too.
+        A frame does not need messages that it has decoded, or whose samples its cache would have dropped. The cache drops
+        samples that are too old compared with the newest message, if it accepts that message: a valid transform, later
+        than those before. A frame whose newest message would be rejected must be decoded; then its messages can be
+        dropped too.
         """
         newest = [_sample(self._arrivals[-1].data, offsets) for offsets in self._offsets]
         moves_on = [
@@ -135,7 +139,7 @@ class Layout:
 
 
 class Layouts:
-    """All known layouts, found by a message's bytes."""
+    """All known layouts, looked up by a message's bytes."""
 
     def __init__(self) -> None:
         # For messages with one transform: the bytes of its names, which are contiguous
@@ -151,7 +155,7 @@ class Layouts:
                 yield layout
 
     def find(self, data: bytes) -> Layout | None:
-        """Return the layout of a message; None if it is unknown, or the message is invalid."""
+        """Return a message's layout, or None if it is unknown or the message is invalid."""
         if data[:4] == b"\1\0\0\0":
             return self._single.get(data[16:-56])
         candidates = self._several.get(len(data))
@@ -164,7 +168,7 @@ class Layouts:
         return None
 
     def add(self, data: bytes) -> Layout | None:
-        """Add the layout of a message; return None if it has no frames, a duplicate, or there are too many layouts."""
+        """Add and return a message's layout; return None if it has no frames, a duplicate, or there are too many layouts."""
         found = _find_transforms(data)
         children = {offsets.child for offsets in found}
         if not found or len(children) < len(found) or self._count >= _MAX_LAYOUTS:

@@ -1,7 +1,7 @@
 """Operations on quaternions (x, y, z, w), vectors and rigid transforms as plain floats, without an array library.
 
-Quaternions need not have a length of exactly one: tf2 accepts a squared length within 0.01 of 1 and never
-normalizes, so neither do the functions here. Source: Shoemake, "Animating rotation with quaternion curves" (1985).
+A quaternion's length need not be exactly one: tf2 accepts a squared length within 0.01 of 1 and never
+normalizes, and neither do the functions here. Source: Shoemake, "Animating rotation with quaternion curves" (1985).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def rotate(q: Quaternion, v: Vector) -> Vector:
-    """Return ``q v q*``: the vector rotated, and scaled by the squared length of the quaternion."""
+    """Return ``q v q*``: the vector rotated, and scaled by the quaternion's squared length."""
     x, y, z, w = q
     a, b, c = v
     scale = w * w - x * x - y * y - z * z
@@ -43,7 +43,7 @@ def rotate(q: Quaternion, v: Vector) -> Vector:
 
 
 def invert(translation: Vector, rotation: Quaternion) -> tuple[Vector, Quaternion]:
-    """Return the inverse of a transform, with the conjugate as the inverse of the rotation."""
+    """Return the inverse of a transform; the conjugate is used as the inverse of the rotation."""
     x, y, z, w = rotation
     inverse = (-x, -y, -z, w)
     a, b, c = translation
@@ -51,7 +51,7 @@ def invert(translation: Vector, rotation: Quaternion) -> tuple[Vector, Quaternio
 
 
 def slerp(p: Quaternion, q: Quaternion, ratio: float) -> Quaternion:
-    """Return the rotation at ``ratio`` of the shortest path from ``p`` (0) to ``q`` (1), at constant angular speed."""
+    """Return the rotation at ``ratio`` on the shortest path from ``p`` (0) to ``q`` (1), at constant angular speed."""
     px, py, pz, pw = p
     qx, qy, qz, qw = q
     dot = px * qx + py * qy + pz * qz + pw * qw
@@ -116,7 +116,7 @@ def _product(m: _Matrix, n: _Matrix) -> _Matrix:
 
 
 def _quaternion(m: _Matrix) -> Quaternion:
-    """Return the quaternion of a rotation matrix, from its trace or, if that is small, its largest diagonal element."""
+    """Return a rotation matrix's quaternion, computed from the trace or, if that is small, the largest diagonal element."""
     trace = m[0][0] + m[1][1] + m[2][2]
     if trace > 0.0:
         root = math.sqrt(trace + 1.0)

@@ -1,7 +1,7 @@
 """Combine static transforms from many publishers in one latched message. Pure.
 
-A publisher latches only its last message, and the bridge is a single publisher for all publishers of the other ROS. So
-it publishes the newest transform of each frame, like a broadcaster of static transforms.
+A publisher latches only its last message, and the bridge is a single publisher for all publishers in the other ROS.
+Therefore it publishes the newest transform of each frame, as a static transform broadcaster does.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ TF_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 
 _LENGTH = struct.Struct("<I")
 _STAMP = 12
-_NUMBERS = 56  # bytes of a header's number and time, and of a translation and rotation
+_NUMBERS = 56  # bytes of a header's number and time, and a translation and rotation
 MAX_FRAMES = 10_000
 MAX_BYTES = 8 << 20
 
@@ -30,9 +30,9 @@ class StaticTransforms:
         self._bytes = 0
 
     def merged(self, data: bytes | memoryview) -> bytes:
-        """Return a ROS 1 message with all transforms so far, including those of ``data``.
+        """Return a ROS 1 message with all transforms so far, including those in ``data``.
 
-        Raise DeserializationError on bytes that are not a TFMessage.
+        Raise DeserializationError if the bytes are not a TFMessage.
         """
         data = bytes(data)
         try:

@@ -19,10 +19,10 @@ DEFAULT_CACHE_TIME = 10_000_000_000  # nanoseconds
 
 
 class FrameTree:
-    """The tree of frames over the last ``cache_time`` nanoseconds.
+    """The frame tree over the last ``cache_time`` nanoseconds.
 
-    ``on_refused`` is called with each refused transform, from inside the inserting call; for transforms of
-    :meth:`insert_message` this may happen when the frame is looked up.
+    ``on_refused`` is called with each rejected transform, inside the call that inserts it; for transforms from
+    :meth:`insert_message` this may be when the frame is looked up.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class FrameTree:
     ) -> None:
         self.cache_time = cache_time
         self._on_refused = on_refused
-        self._frames: dict[str, Frame] = {}  # in the order of first appearance, which is that of the listings
+        self._frames: dict[str, Frame] = {}  # in order of first appearance, as in the listings
         self._layouts = Layouts()
         self._lazy: dict[str, list[Layout]] = {}  # child frame -> layouts that contain it
         self._arrived = 0
@@ -52,15 +52,15 @@ class FrameTree:
     ) -> bool:
         """Insert the pose of ``child`` in ``parent`` at ``stamp``; return whether tf2 would accept it.
 
-        One leading slash is removed from names. ``is_static``: the pose is valid at every time, if the frame's first one was
-        static, too.
+        One leading slash is removed from names. ``is_static``: the pose is valid at every time, if the frame's first pose was
+        static too.
         """
         return self._insert(
             without_slash(parent), without_slash(child), stamp, translation, rotation, authority, is_static
         )
 
     def insert_message(self, data: bytes, authority: str = "", *, is_static: bool = False) -> None:
-        """Insert the transforms of a serialized TFMessage. Raise DeserializationError.
+        """Insert the transforms in a serialized TFMessage. Raise DeserializationError if the bytes are not a TFMessage.
 
         Messages with a known layout stay bytes until one of their frames is looked up.
         """
@@ -75,7 +75,7 @@ class FrameTree:
         is_regular = not is_static
         for parent, child, stamp, translation, rotation in read_transforms(data):
             self._insert(parent, child, stamp, translation, rotation, authority, is_static)
-            # A layout is added only if all its frames exist and have samples.
+            # The frame exists, because a layout is added only if all its frames exist and have samples.
             frame = self._frames.get(child)
             is_regular = (
                 is_regular and frame is not None and frame.cache is not None and parent in self._frames
@@ -84,7 +84,7 @@ class FrameTree:
             self._add_layout(data)
 
     def clear(self) -> None:
-        """Drop all transforms that are not static; the frames' names are kept."""
+        """Drop all transforms that are not static. The frames' names remain."""
         for layout in self._layouts:
             layout.forget()
         for frame in self._frames.values():
@@ -94,21 +94,21 @@ class FrameTree:
     # --- queries
 
     def frames(self) -> list[Frame]:
-        """Return every frame in the order of first appearance, after decoding all messages."""
+        """Decode all messages, and return every frame in order of first appearance."""
         for layout in self._layouts:
             self._settle_all(layout)
         return list(self._frames.values())
 
     def frame_names(self) -> list[str]:
-        """Return the names of all frames, in the order of their first appearance."""
+        """Return the names of all frames, in order of first appearance."""
         return list(self._frames)
 
     def frame_exists(self, name: str) -> bool:
-        """Return whether a transform has named the frame."""
+        """Return whether a transform has contained the frame."""
         return name in self._frames
 
     def frames_as_string(self) -> str:
-        """Return a line for each child frame, in the order of first appearance."""
+        """Return a line for each child frame, in order of first appearance."""
         lines = []
         for frame in self.frames():
             if frame.cache is not None:
@@ -130,7 +130,7 @@ class FrameTree:
         authority: str,
         is_static: bool,
     ) -> bool:
-        """Insert a transform after earlier ones of the same frame."""
+        """Insert a transform after earlier ones for the same frame."""
         if child in self._lazy:
             self._settle(self._frames[child])
         return self._take(parent, child, stamp, translation, rotation, authority, is_static)
@@ -147,7 +147,7 @@ class FrameTree:
     ) -> bool:
         x, y, z, w = rotation
         a, b, c = translation
-        # NaN compares false with everything, including itself.
+        # Comparing a value with itself detects NaN, which does not equal itself.
         is_sound = abs(x * x + y * y + z * z + w * w - 1.0) < 0.01 and a == a and b == b and c == c  # noqa: PLR0124
         if not (is_sound and child and parent and child != parent):
             for refusal in faults_of(parent, child, translation, rotation, authority):
@@ -180,7 +180,7 @@ class FrameTree:
     # --- messages to be decoded
 
     def _settle(self, frame: Frame) -> None:
-        """Insert a frame's messages since its last lookup, in the order of arrival."""
+        """Insert the messages for a frame that have arrived since its last lookup, in order of arrival."""
         frame.settled = self._arrived
         layouts = self._lazy.get(frame.name)
         if layouts is None:

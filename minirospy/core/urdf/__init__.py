@@ -1,4 +1,4 @@
-"""URDF: parse a robot's description into links, joints, their tree and its poses. Pure.
+"""URDF: parse a robot description into links, joints, their tree and its poses. Pure.
 
 Source: http://wiki.ros.org/urdf/XML.
 """

@@ -1,4 +1,4 @@
-"""A robot as text: its tree in the format of `check_urdf`, and as a graph for graphviz."""
+"""A robot as text: its tree in the format that `check_urdf` prints, and as a graph for graphviz."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ __all__ = ["dot_graph", "error_lines", "problem_lines", "tree_lines"]
 
 
 def tree_lines(robot: Robot) -> Iterator[str]:
-    """Yield the output lines of `check_urdf` for a robot."""
+    """Yield the lines that `check_urdf` prints for a robot."""
     yield f"robot name is: {robot.name}"
     yield "---------- Successfully Parsed XML ---------------"
     yield f"root Link: {robot.root} has {len(robot.child_joints(robot.root))} child(ren)"
-    # Iterates instead of recursing, and visits each link's children once, for deep trees and links with many parents.
+    # Iterate instead of recursing, and visit each link's children once, for deep trees and links with many parents.
     shown = {robot.root}
     waiting = [(1, *child) for child in _numbered(robot, robot.root)]
     while waiting:
@@ -28,12 +28,12 @@ def tree_lines(robot: Robot) -> Iterator[str]:
 
 
 def _numbered(robot: Robot, link: str) -> list[tuple[int, str]]:
-    """Return the children of a link with their numbers, in reverse order."""
+    """Return a link's children with their numbers, in reverse order."""
     return [*enumerate((joint.child for joint in robot.child_joints(link)), 1)][::-1]
 
 
 def dot_graph(robot: Robot) -> str:
-    """Return the links and joints as text for graphviz, in the format of `urdf_to_graphviz`."""
+    """Return the links and joints as text for graphviz, in the format that `urdf_to_graphviz` writes."""
     links, edges = [], []
     waiting = [robot.root]
     seen = set()
@@ -63,14 +63,14 @@ def _quoted(name: str) -> str:
 
 
 def error_lines(error: UrdfError) -> Iterator[str]:
-    """Yield the lines of ROS's parser about an invalid description, each with its location."""
+    """Yield the messages that ROS's parser prints about an invalid description, each with its location."""
     for text in error.trail:
         yield f"Error:   {text}"
         yield f"         at line {error.line} in {error.file}" if error.line else f"         in {error.file}"
 
 
 def problem_lines(problem: Problem, file: str) -> Iterator[str]:
-    """Yield the lines of ROS's parser about a part that it ignores."""
+    """Yield the messages that ROS's parser prints about a part that it ignores."""
     level = "Warning:" if problem.is_warning else "Error:  "
     for text in problem.trail:
         yield f"{level} {text}"

@@ -1,4 +1,4 @@
-"""Parse XML into elements with line numbers. Refuses text that is not XML, or nested too deeply."""
+"""Parse XML into elements with line numbers. Rejects text that is not XML, or is nested too deeply."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["Element", "parse_xml"]
 
 
 def parse_xml(text: str | bytes, file: str) -> Element:
-    """Return the root of an XML text; ``file`` is its name in errors. Raise UrdfError."""
+    """Return the root of an XML text; ``file`` is its name in errors. Raise UrdfError if the text is not accepted."""
     if not text.strip():
         raise UrdfError(file, 0, "Error document empty.")
     try:

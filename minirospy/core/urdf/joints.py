@@ -32,7 +32,7 @@ _IMMOBILE = (JointType.FIXED, JointType.FLOATING)
 
 
 def read_joint(element: Element) -> Joint:
-    """Return a joint. Raise ElementError."""
+    """Return a joint. Raise ElementError if it is invalid."""
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "unnamed joint found")
@@ -43,7 +43,7 @@ def read_joint(element: Element) -> Joint:
     limit = _part(element, "limit", _read_limit, f"Could not parse limit element for joint [{name}]")
     if limit is None and type_ in _NO_LIMITS:
         raise ElementError(element.line, f"Joint [{name}] {_NO_LIMITS[type_]}")
-    # Some texts contain two spaces, like those of ROS's parser.
+    # Some messages contain two spaces, like those of ROS's parser.
     safety = _part(
         element, "safety_controller", _read_safety, f"Could not parse safety element for joint [{name}]"
     )
@@ -103,7 +103,10 @@ def _link_of(element: Element, tag: str) -> str:
 
 
 def _part(element: Element, tag: str, read: Callable[[Element], _T], context: str) -> _T | None:
-    """Return the result of ``read`` for the first child with this tag; None if there is none. Raise ElementError."""
+    """Return the result of ``read`` for the first child with this tag, or None if there is none.
+
+    Raise ElementError if the child is invalid.
+    """
     part = element.first(tag)
     if part is None:
         return None

@@ -29,7 +29,7 @@ _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 class ElementError(ValueError):
-    """An element is invalid: its line, and ROS's lines about it, the cause first."""
+    """An element is invalid: its line, and the messages that ROS prints about it, the cause first."""
 
     def __init__(self, line: int, *trail: str) -> None:
         super().__init__(line, *trail)
@@ -38,7 +38,7 @@ class ElementError(ValueError):
 
 
 def read_link(element: Element, problems: list[Problem]) -> Link:
-    """Return a link without its invalid parts, which are added to ``problems``. Raise ElementError."""
+    """Return a link without its invalid parts, which are added to ``problems``. Raise ElementError if the link is unusable."""
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "No name given for the link.")
@@ -60,7 +60,7 @@ def read_link(element: Element, problems: list[Problem]) -> Link:
 
 
 def read_material(element: Element, problems: list[Problem]) -> Material:
-    """Return a material; a reference by name has neither colour nor texture. Raise ElementError."""
+    """Return a material; a reference by name has neither colour nor texture. Raise ElementError if it has no name."""
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "Material must contain a name attribute")
@@ -71,7 +71,7 @@ def read_material(element: Element, problems: list[Problem]) -> Material:
 
 
 def read_origin(element: Element) -> Origin:
-    """Return the ``<origin>`` in an element. Raise ElementError."""
+    """Return the ``<origin>`` in an element. Raise ElementError if it is invalid."""
     origin = element.first("origin")
     if origin is None:
         return Origin()

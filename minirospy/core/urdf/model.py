@@ -1,6 +1,6 @@
-"""The parts of a robot: frozen records as described in http://wiki.ros.org/urdf/XML.
+"""A robot's parts: frozen records as described in http://wiki.ros.org/urdf/XML.
 
-Lengths are metres, angles radians, masses kilograms; a prismatic joint's position is in metres.
+Lengths are in metres, angles in radians, masses in kilograms; a prismatic joint's position is in metres.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Color = tuple[float, float, float, float]
 
 
 class JointType(Enum):
-    """The kind of a joint; the value is that of its ``type`` attribute."""
+    """A joint's kind; the value is the text in its ``type`` attribute."""
 
     REVOLUTE = "revolute"
     CONTINUOUS = "continuous"
@@ -52,14 +52,14 @@ class JointType(Enum):
 
 
 class Origin(NamedTuple):
-    """A pose: ``xyz``, and ``rpy``, rotations about the fixed axes x, y, z in this order."""
+    """A pose: ``xyz``, and ``rpy``, rotations about the fixed axes x, y, z, in this order."""
 
     xyz: Vector = (0.0, 0.0, 0.0)
     rpy: Vector = (0.0, 0.0, 0.0)
 
 
 class Box(NamedTuple):
-    """A box, by the lengths of its sides."""
+    """A box, defined by its side lengths."""
 
     size: Vector
 
@@ -78,7 +78,7 @@ class Sphere(NamedTuple):
 
 
 class Mesh(NamedTuple):
-    """The file of a mesh: a path or ``package://PACKAGE/PATH``."""
+    """A mesh's file: a path or ``package://PACKAGE/PATH``."""
 
     filename: str
     scale: Vector = (1.0, 1.0, 1.0)
@@ -88,7 +88,7 @@ Geometry = Box | Cylinder | Sphere | Mesh
 
 
 class Material(NamedTuple):
-    """A colour (red, green, blue, opacity from 0 to 1) or a texture's file, or both."""
+    """A colour (red, green, blue, opacity from 0 to 1), a texture file, or both."""
 
     name: str
     color: Color | None = None
@@ -96,7 +96,7 @@ class Material(NamedTuple):
 
 
 class Visual(NamedTuple):
-    """A visible shape. ``material``: its name if it is defined elsewhere."""
+    """A visible shape. ``material`` is only a name if the material is defined elsewhere."""
 
     geometry: Geometry
     origin: Origin = Origin()
@@ -113,7 +113,7 @@ class Collision(NamedTuple):
 
 
 class Inertial(NamedTuple):
-    """The mass of a link, and its inertia about its centre: ixx, ixy, ixz, iyy, iyz, izz."""
+    """A link's mass, and its inertia about its centre: ixx, ixy, ixz, iyy, iyz, izz."""
 
     mass: float
     inertia: tuple[float, float, float, float, float, float]
@@ -138,7 +138,7 @@ class Mimic(NamedTuple):
 
 
 class Safety(NamedTuple):
-    """Limits for a controller, inside those of the joint."""
+    """Limits for a controller, inside the joint's own limits."""
 
     k_velocity: float
     k_position: float = 0.0
@@ -162,7 +162,7 @@ class Dynamics(NamedTuple):
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint: the frame of ``child`` is at ``origin`` in that of ``parent``, moved along or about ``axis``."""
+    """A joint: the frame of ``child`` is at ``origin`` in the frame of ``parent``, moved along or about ``axis``."""
 
     name: str
     type: JointType
@@ -180,7 +180,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid body, and a frame."""
+    """A rigid body, which is also a frame."""
 
     name: str
     line: int
@@ -190,7 +190,7 @@ class Link:
 
 
 class Problem(NamedTuple):
-    """A fault that ROS's parser reports before it continues; ``trail``: its lines, the cause first."""
+    """A fault that ROS's parser reports before it continues; ``trail``: the messages that it prints, the cause first."""
 
     line: int
     trail: tuple[str, ...]
@@ -219,7 +219,7 @@ class Robot:
         return self._below.get(link, [])
 
     def parent_joint(self, link: str) -> Joint | None:
-        """Return the joint above a link; None for the root. If there are several, the last one by name, as in ROS."""
+        """Return the joint above a link, or None for the root. If there are several, return the last one by name, as in ROS."""
         return self._above.get(link)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Poses of joints, computed with plain floats in the same steps as urdfdom and KDL, for equal signs and zeros.
+"""Joint poses, computed with plain floats in the same steps as in urdfdom and KDL, so that signs and zeros are equal.
 
 Quaternions are (x, y, z, w); a matrix is nine numbers, row by row.
 """
@@ -24,11 +24,11 @@ Quaternion = tuple[float, float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
 
 _EPSILON = 1e-12
-_POLE = 0.99999  # sine of the pitch beyond which roll and yaw cannot be distinguished
+_POLE = 0.99999  # sine of the pitch above which roll and yaw cannot be distinguished
 
 
 class Pose(NamedTuple):
-    """A frame's pose in its parent: metres, and a unit quaternion."""
+    """A frame's pose in its parent, in metres and as a unit quaternion."""
 
     translation: Vector
     rotation: Quaternion
@@ -47,7 +47,7 @@ class Segment:
         self._is_sliding = joint.type is JointType.PRISMATIC
         length = math.hypot(*joint.axis)
         x, y, z = joint.axis
-        # Like KDL's normalization, use x for an axis of length zero.
+        # Like KDL's normalization, use the x axis if the axis has length zero.
         self._axis = (x / length, y / length, z / length) if length >= _EPSILON else (1.0, 0.0, 0.0)
 
     @property
@@ -56,7 +56,7 @@ class Segment:
         return self._is_turning or self._is_sliding
 
     def pose(self, position: float = 0.0) -> Pose:
-        """Return the pose of the child link, for a position in radians or metres."""
+        """Return the child link's pose for a position in radians or metres."""
         x, y, z = self.joint.origin.xyz
         if self._is_sliding:
             dx, dy, dz = _turned(self._origin, self._axis)
@@ -85,7 +85,7 @@ def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def rpy_from_quaternion(rotation: Quaternion) -> Vector:
-    """Return roll, pitch and yaw of a rotation; at a pitch of +-90 degrees the roll is 0."""
+    """Return a rotation's roll, pitch and yaw; at a pitch of +-90 degrees the roll is 0."""
     x, y, z, w = rotation
     xx, yy, zz, ww = x * x, y * y, z * z, w * w
     sine = -2 * (x * z - w * y) / (xx + yy + zz + ww)
@@ -101,7 +101,7 @@ def rpy_from_quaternion(rotation: Quaternion) -> Vector:
 
 
 def matrix_from_quaternion(rotation: Quaternion) -> Matrix:
-    """Return the matrix of a unit quaternion."""
+    """Return a unit quaternion's matrix."""
     x, y, z, w = rotation
     xx, yy, zz, ww = x * x, y * y, z * z, w * w
     return (
@@ -112,7 +112,7 @@ def matrix_from_quaternion(rotation: Quaternion) -> Matrix:
 
 
 def quaternion_from_matrix(matrix: Matrix) -> Quaternion:
-    """Return the unit quaternion of a matrix; its largest component is positive."""
+    """Return a matrix's unit quaternion; the largest component is positive."""
     xx, xy, xz, yx, yy, yz, zx, zy, zz = matrix
     trace = xx + yy + zz
     if trace > _EPSILON:
@@ -129,7 +129,7 @@ def quaternion_from_matrix(matrix: Matrix) -> Quaternion:
 
 
 def _turn(axis: Vector, angle: float) -> Matrix:
-    """Return the matrix of a rotation about a unit vector."""
+    """Return the matrix for a rotation about a unit vector."""
     x, y, z = axis
     c, s = math.cos(angle), math.sin(angle)
     v = 1 - c

@@ -1,7 +1,7 @@
-"""Parse a robot description into a Robot. As strict as ROS's parser if a robot would move wrongly.
+"""Parse a robot description into a Robot. As strict as ROS's parser about faults that would make a robot move wrongly.
 
 If ROS's parser reports a fault and continues (an invalid shape or mass), the part is ignored and recorded in
-:attr:`Robot.problems`. Texts are those of ROS's parser; line numbers are those of the description.
+:attr:`Robot.problems`. Messages are the same as in ROS's parser; line numbers refer to the description.
 
 Source: http://wiki.ros.org/urdf/XML/model, and the output of Debian's `check_urdf`.
 """
@@ -23,12 +23,12 @@ _ROOT = "Failed to find root link"
 
 
 def read_robot(path: str | Path) -> Robot:
-    """Return the robot described in a file. Raise UrdfError, OSError."""
+    """Return the robot described in a file. Raise UrdfError if the description is invalid, OSError if it cannot be read."""
     return parse_robot(Path(path).read_bytes(), str(path))
 
 
 def parse_robot(text: str | bytes, file: str = "robot_description") -> Robot:
-    """Return the robot of a description; ``file`` is its name in errors. Raise UrdfError."""
+    """Return the robot in a description; ``file`` is its name in errors. Raise UrdfError if the description is invalid."""
     root = parse_xml(text, file)
     if root.tag != "robot":
         raise UrdfError(file, root.line, "Could not find the 'robot' element in the xml file")
@@ -92,7 +92,7 @@ def _read_links(
     if not links:
         raise UrdfError(file, root.line, "No link elements found in urdf file")
 
-    # A material may be defined at its first use.
+    # Check this after reading all links, because a material may be defined where it is first used.
     for link in links.values():
         for visual in link.visuals:
             if visual.material and (visual.material.color or visual.material.texture):
@@ -120,7 +120,7 @@ def _read_joints(root: Element, file: str) -> dict[str, Joint]:
 
 
 def _check_joints(file: str, links: dict[str, Link], joints: dict[str, Joint]) -> None:
-    """Raise UrdfError for a joint between links that do not exist."""
+    """Raise UrdfError if a joint refers to a link that does not exist."""
     for name in sorted(joints):
         joint = joints[name]
         if not joint.parent or not joint.child:
@@ -155,7 +155,7 @@ def _find_root(file: str, line: int, links: dict[str, Link], joints: dict[str, J
 
 
 def _suspicions(robot: Robot) -> list[Problem]:
-    """Return the faults that ROS's parser silently accepts, but that a tree of frames cannot have."""
+    """Return the faults that ROS's parser silently accepts, but that a frame tree cannot have."""
     found = []
     for joint in robot.joints.values():
         above = robot.parent_joint(joint.child)

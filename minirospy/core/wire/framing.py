@@ -1,11 +1,11 @@
-"""Frames: a 4-byte little-endian length, then that many bytes, in which TCPROS sends every message.
+"""Frames: a 4-byte little-endian length, then that many bytes. TCPROS sends every message as a frame.
 
-The reader owns the buffer that a socket receives into, so bytes are copied only once:
+The reader owns the buffer that a socket receives into, so that bytes are copied only once:
 ``n = sock.recv_into(reader.space()); for frame in reader.received(n): ...``
 
 If a subscriber's header has ``split_frames=1``, a large message that ends with a byte array is sent as a
-split frame: the length with its highest bit set, 4 bytes with the array's size, then the unchanged message. So the
-subscriber reads the array into a separate object, which becomes the field without another copy.
+split frame: the length with its highest bit set, 4 bytes with the array's size, then the unchanged message. The
+subscriber can then read the array into a separate object, which becomes the field without another copy.
 Source: http://wiki.ros.org/ROS/TCPROS, docs/transports.md.
 """
 
@@ -35,11 +35,11 @@ __all__ = [
 
 CHUNK = 64 * 1024  # bytes per receive while messages are small
 
-LENGTH_BYTES = 4  # bytes of the length prefix of a frame or a connection header
+LENGTH_BYTES = 4  # bytes in the length prefix of a frame or a connection header
 
-MAX_FRAME = 1024 * 1024 * 1024  # bytes; a longer frame is refused as invalid
+MAX_FRAME = 1024 * 1024 * 1024  # bytes; a longer frame is rejected as invalid
 
-SPLIT = 1 << 31  # bit of the length which means that the size of the array at the end follows
+SPLIT = 1 << 31  # bit in the length which means that the size of the array at the end follows
 
 _FIRST_CLAIM = 16 * 1024 * 1024
 _LENGTH = struct.Struct("<I")
@@ -57,7 +57,7 @@ def parse_length(data: bytes) -> int:
 
 
 class LargeFrame(NamedTuple):
-    """A message to be sent that is too large to be joined: the pieces, in order, and their total size."""
+    """A message to send that is too large to be joined: the pieces, in order, and their total size."""
 
     pieces: tuple[bytes, ...]
     size: int
@@ -71,26 +71,26 @@ class LargeFrame(NamedTuple):
 
 
 class Pieces(list[Any]):
-    """The target of a message's ``serialize``: joins the bytes once, but large ones never."""
+    """The target for a message's ``serialize``: joins small byte strings once, and large ones never."""
 
     __slots__ = ()
     write = list.append
 
     def frame(self) -> bytes | LargeFrame:
-        """Return everything written as one frame."""
+        """Return all bytes written, as one frame."""
         size = len(self[0]) if len(self) == 1 else sum(map(len, self))
         if size < CHUNK:
             self.insert(0, _LENGTH.pack(size))
             frame = b"".join(self)
             if len(frame) == size + 4:
                 return frame
-            # The len() of an array.array does not count bytes.
+            # Join the pieces, because the len() of an array.array is not its number of bytes.
             return serialize_frame(frame[4:])
 
         joined: list[bytes] = []
         small: list[bytes] = []
         for piece in self:
-            # Copy other types than bytes, since the caller may change them before they are sent.
+            # Copy types other than bytes, because the caller may change them before they are sent.
             whole = piece if isinstance(piece, bytes) else bytes(piece)
             if len(whole) < CHUNK:
                 small.append(whole)
@@ -104,9 +104,9 @@ class Pieces(list[Any]):
 
 
 class SplitFrame(bytes):
-    """A message in two parts, for ``deserialize``: the first part's bytes, followed by those of ``tail``.
+    """A message in two parts, for ``deserialize``: the first part's bytes, followed by the bytes of ``tail``.
 
-    Length and slices are those of the whole; the slice that equals ``tail`` is that object, without a copy.
+    Its length and slices are those of the whole message; the slice that equals ``tail`` is that object, without a copy.
     ``bytes(frame)`` joins the parts. A memoryview contains only the first part.
     """
 
@@ -144,12 +144,12 @@ Frame = memoryview | bytes  # a message's bytes as delivered
 
 
 def may_split(head: bytes, tail: int) -> bool:
-    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes: then it may be split there."""
+    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes, so that it may be split there."""
     return tail >= CHUNK and len(head) >= 4 and int.from_bytes(head[-4:], "little") == tail
 
 
 def split_sizes(size: int, tail: int) -> tuple[int, int]:
-    """Return (bytes before the array, bytes of the array) of a split frame. Raise WireError."""
+    """Return (bytes before the array, bytes in the array) for a split frame. Raise WireError if the sizes are inconsistent."""
     if not CHUNK <= tail <= size - 4:
         raise WireError(f"a split message of {size} bytes says that it ends with an array of {tail}")
     return size - tail, tail
@@ -158,7 +158,7 @@ def split_sizes(size: int, tail: int) -> tuple[int, int]:
 class FrameReader:
     """Bytes in, frames out.
 
-    A frame is a memoryview that is valid until the next call of :meth:`space`, except that a frame longer
+    A frame is a memoryview that is valid until the next call to :meth:`space`, except that a frame longer
     than ``chunk`` gets a separate buffer, which is not reused. With ``gathers`` false the caller must read such a frame
     itself: :attr:`unfinished` contains its first bytes. A frame of more than ``limit`` bytes raises WireError, or with
     ``skips`` is skipped and counted in :attr:`skipped`.
@@ -178,15 +178,15 @@ class FrameReader:
         self._start = 0
         self._end = 0
         self._large: bytearray | None = None
-        # The number of bytes received of the large frame, and its total size.
+        # The number of bytes received from the large frame, and its total size.
         self._filled: int
         self._wanted = 0
-        # The number of bytes of a skipped frame that are still to come.
+        # The number of bytes in a skipped frame that have not been received yet.
         self._left_out = 0
 
     @property
     def wanted(self) -> int:
-        """The size of the present large frame, or of the last one."""
+        """The size of the current large frame, or of the last one."""
         return self._wanted
 
     def put_back(self, data: bytes) -> None:
@@ -195,10 +195,11 @@ class FrameReader:
         self._small[: self._end] = data
 
     def space(self) -> memoryview:
-        """Return the memory for the next bytes; never empty."""
+        """Return the memory for the next bytes. It is never empty."""
         if self._large is not None:
             if self._filled == len(self._large):
-                # A length prefix must not allocate all memory in advance: the buffer grows with the received bytes.
+                # Grow the buffer with the received bytes, so that a length prefix cannot allocate all the memory in
+                # advance.
                 grown = bytearray(min(self._wanted, 2 * len(self._large)))
                 grown[: self._filled] = self._large
                 self._large = grown
@@ -212,7 +213,7 @@ class FrameReader:
         return self._small[self._end :]
 
     def received(self, count: int) -> Iterator[memoryview]:
-        """Return the frames completed by ``count`` more bytes in :meth:`space`. Raise WireError."""
+        """Return the frames that ``count`` more bytes in :meth:`space` complete. Raise WireError if a frame is too long."""
         if self._large is not None:
             self._filled += count
             if self._filled == self._wanted:

@@ -20,14 +20,14 @@ _LENGTH = struct.Struct("<I")
 
 
 def serialize_header(fields: Mapping[str, str]) -> bytes:
-    """Return the header with its length prefix, and its fields sorted like those of rospy and roscpp."""
+    """Return the header with its length prefix; the fields are sorted as in rospy and roscpp."""
     pairs = [f"{name}={fields[name]}".encode() for name in sorted(fields)]
     body = b"".join(_LENGTH.pack(len(pair)) + pair for pair in pairs)
     return _LENGTH.pack(len(body)) + body
 
 
 def parse_header(body: bytes) -> Header:
-    """Return the fields of a header without its length prefix. Raise WireError."""
+    """Return the fields of a header without its length prefix. Raise WireError if the header is invalid."""
     fields: Header = {}
     at = 0
     while at < len(body):
@@ -41,7 +41,7 @@ def parse_header(body: bytes) -> Header:
         at += length
         if not separator:
             raise WireError(f"connection header's field {name[:40]!r} has no '='")
-        # Third-party nodes send names and definitions in any encoding; a definition's comment must not cause a
-        # failure.
+        # Accept names and definitions in any encoding, because third-party nodes send them; a comment in a definition
+        # must not cause a failure.
         fields[name.decode("utf-8", "replace")] = value.decode("utf-8", "replace")
     return fields

@@ -1,4 +1,4 @@
-"""HTTP/1.1 for XML-RPC: POST requests and their answers, with keep-alive.
+"""HTTP/1.1 for XML-RPC: POST requests and their responses, with keep-alive.
 
 Pure: bytes in, messages out. Source: RFC 9112.
 """
@@ -39,52 +39,53 @@ _REASONS = {
 }
 
 
-# body of a message; a long one is not copied from the buffer in which it was collected
+# A message's body; a long one is not copied from the buffer in which it was collected
 Body = bytes | bytearray
 
 
 class HttpHead(NamedTuple):
-    """The first line and the headers of a message; ``headers`` have lower-case names."""
+    """A message's first line and headers; ``headers`` have lower-case names."""
 
     start: str
     headers: dict[str, str]
-    method: str  # method of a request
-    keep_alive: bool  # the connection serves another request after this one
-    plain_length: int  # length of the body if only a Content-Length specifies it; else -1
+    method: str  # the method of a request
+    keep_alive: bool  # the connection can be used for another request after this one
+    # length of the body if a Content-Length is the only header that specifies it, else -1
+    plain_length: int
 
 
 class HttpMessage(NamedTuple):
-    """A request or an answer."""
+    """A request or a response."""
 
     head: HttpHead
     body: Body
 
     @property
     def start(self) -> str:
-        """The first line of the message."""
+        """The message's first line."""
         return self.head.start
 
     @property
     def keep_alive(self) -> bool:
-        """Return whether the connection serves another request after this one."""
+        """Return whether the connection can be used for another request after this one."""
         return self.head.keep_alive
 
     @property
     def method(self) -> str:
-        """The method of a request."""
+        """The request's method."""
         return self.head.method
 
     @property
     def status(self) -> int:
-        """The status code of an answer; 0 if there is none."""
+        """The response's status code, or 0 if there is none."""
         parts = self.head.start.split(" ", 2)
         return int(parts[1]) if len(parts) > 1 and re.fullmatch(r"[0-9]{3}", parts[1]) else 0
 
 
 class HttpReader:
-    """Bytes in, complete messages out, several of them if they were pipelined.
+    """Bytes in, complete messages out; several of them if they were pipelined.
 
-    Optimized for the usual case: a single message in one piece, or as its head and then its body.
+    Optimized for the usual case: a single message in one piece, or its head and then its body.
     """
 
     __slots__ = (
@@ -101,7 +102,7 @@ class HttpReader:
 
     def __init__(self, max_body: int = MAX_BODY) -> None:
         self._max_body = max_body
-        # The head of the next message, if its body may come in one piece.
+        # The head of the next message, if its body may arrive in one piece.
         self._head: HttpHead | None = None
         self._parser: Generator[HttpMessage | None, None, None] | None = None
         self._buffer = bytearray()
@@ -109,7 +110,7 @@ class HttpReader:
         self._in_body = False
         # The bytes fed so far may contain another message.
         self._has_more = False
-        # The body in chunks, as far as removed from the buffer.
+        # The part of a chunked body that has been removed from the buffer.
         self._chunked: bytearray | None = None
         self.wants_continue = False  # the peer waits for :meth:`continue_line` before it sends its body
 
@@ -120,18 +121,18 @@ class HttpReader:
 
     @property
     def in_chunks(self) -> bool:
-        """Return whether the present message has a chunked body, since a few bytes may contain many chunks."""
+        """Return whether the current message has a chunked body, for which a few bytes may contain many chunks."""
         return self._chunked is not None
 
     @property
     def held(self) -> int:
-        """The number of bytes of an incomplete message."""
+        """The number of bytes in an incomplete message."""
         return len(self._buffer) + len(self._chunked or b"")
 
     def feed(self, data: bytes) -> list[HttpMessage]:
         """Return the messages that ``data`` completes; b"" means that the peer has closed.
 
-        Raise RpcProtocolError.
+        Raise RpcProtocolError if the data is not HTTP.
         """
         messages: list[HttpMessage] = []
         message = self.feed_one(data)
@@ -143,7 +144,7 @@ class HttpReader:
     def feed_one(self, data: bytes) -> HttpMessage | None:
         """Return the first message that ``data`` completes, and leave the others to :meth:`next_message`.
 
-        Return None if the first one is incomplete. Raise RpcProtocolError.
+        Return None if the first message is incomplete. Raise RpcProtocolError if the data is not HTTP.
         """
         head = self._head
         if head is not None:
@@ -173,7 +174,7 @@ class HttpReader:
         return self.next_message()
 
     def next_message(self) -> HttpMessage | None:
-        """Return the next complete message in the bytes fed so far. Raise RpcProtocolError."""
+        """Return the next complete message in the bytes fed so far. Raise RpcProtocolError if the bytes are not HTTP."""
         if not self._has_more:
             return None
         assert self._parser
@@ -190,17 +191,17 @@ class HttpReader:
         self._in_body = False
 
     def continue_line(self) -> bytes:
-        """Return the response that a peer waits for after sending ``Expect: 100-continue``."""
+        """Return the response for which a peer waits after it has sent ``Expect: 100-continue``."""
         self.wants_continue = False
         return _CONTINUE
 
     def _parse(self, head: HttpHead | None) -> Generator[HttpMessage | None, None, None]:
-        """Yield the messages in the buffer, and None when it must be filled; ``head`` has been removed already."""
+        """Yield the messages in the buffer, and None when more bytes are needed; ``head`` has been removed already."""
         while True:
             if head is None:
                 head = _parse_head((yield from self._until(_end_of_head)))
             self.wants_continue = head.headers.get("expect", "").lower() == "100-continue"
-            # Not in a variable, which would keep the body in memory until the next one.
+            # Do not use a variable, which would keep the body in memory until the next message.
             yield HttpMessage(head, (yield from self._whole_body(head)))
             head = None
 
@@ -216,7 +217,7 @@ class HttpReader:
         length = head.headers.get("content-length")
         if length is None:
             if head.start.startswith("HTTP/"):
-                # An answer without a length extends to the end of the connection.
+                # A response without a length extends to the end of the connection.
                 while not self._ended:
                     self._check(len(self._buffer))
                     yield None
@@ -240,7 +241,7 @@ class HttpReader:
                 self._chunked = None
                 return body
 
-            # In pieces, since moving a long chunk at once would take long.
+            # Move a long chunk in pieces, because moving it in one step would take long.
             while left:
                 if not self._buffer:
                     yield from self._more()
@@ -294,7 +295,7 @@ class HttpReader:
 
 
 def _end_of_line(data: bytearray, start: int) -> tuple[int, int]:
-    """Return the end of the first line that ends after ``start``, and the start of the next one; -1 if there is none.
+    """Return the end of the first line that ends after ``start``, and the start of the next line; -1 if there is none.
 
     A line feed alone also ends a line, for requests written by hand.
     """
@@ -303,8 +304,8 @@ def _end_of_line(data: bytearray, start: int) -> tuple[int, int]:
 
 
 def _end_of_head(data: bytearray, start: int) -> tuple[int, int]:
-    """Return the end of the line before the first empty one, and the position after both; -1 if there is none."""
-    # Without a regular expression, which is slow for many short lines.
+    """Return the end of the line before the first empty line, and the position after both; -1 if there is none."""
+    # Do not use a regular expression, which is slow for many short lines.
     found = [(at, len(mark)) for mark in (b"\n\r\n", b"\n\n") if (at := data.find(mark, start)) >= 0]
     if not found:
         return -1, -1
@@ -322,7 +323,7 @@ def serialize_request(host: str, path: str, body: bytes) -> bytes:
 
 
 def serialize_request_head(host: str, path: str, length: int) -> bytes:
-    """Return the part of a POST request before its body."""
+    """Return the part of a POST request that precedes its body."""
     head = (
         f"POST {path or '/'} HTTP/1.1\r\nHost: {host}\r\nUser-Agent: minirospy\r\n"
         f"Content-Type: text/xml\r\nContent-Length: {length}\r\n\r\n"
@@ -336,7 +337,7 @@ def serialize_response(body: bytes, *, keep_alive: bool = True) -> bytes:
 
 
 def serialize_response_head(length: int, *, keep_alive: bool = True) -> bytes:
-    """Return the part of a successful response before its body of ``length`` bytes."""
+    """Return the part of a successful response that precedes its body of ``length`` bytes."""
     connection = "" if keep_alive else "Connection: close\r\n"
     return (
         f"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\n{connection}Content-Length: {length}\r\n\r\n".encode()
@@ -353,7 +354,7 @@ def serialize_error(status: int, text: str) -> bytes:
 
 
 def _parse_head(data: bytes) -> HttpHead:
-    # The heads of one client differ only in the length.
+    # Cache short heads, because the heads from one client differ only in the length.
     return _short_head(data) if len(data) <= _SHORT_HEAD else _read_head(data)
 
 
@@ -370,7 +371,8 @@ def _read_head(data: bytes) -> HttpHead:
     headers: dict[str, str] = {}
     for line in lines:
         name, separator, value = line.partition(":")
-        # A proxy that interprets a space before the colon differently would see another request (request smuggling).
+        # Reject spaces before the colon: a proxy that interprets them differently would see another request (request
+        # smuggling).
         if not separator or not name or name[-1] in " \t" or name[0] in " \t":
             raise RpcProtocolError(f"not an HTTP header: {line[:60]!r}")
         name, value = name.lower(), value.strip()

@@ -1,8 +1,8 @@
 """The master's journal as bytes: one record per change, each with a length prefix and a checksum.
 
 Pure. A file is the line ``minirospy journal 1``, then records: length (4 bytes, little-endian), CRC-32 of the
-rest (4 bytes), a msgpack array ``[what, argument, ...]``. An incomplete record ends the file: the bytes after
-it may be inconsistent with the records before.
+rest (4 bytes), a msgpack array ``[what, argument, ...]``. Reading stops at an incomplete record, because the bytes after
+it may be inconsistent with the records before it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ HEAD = b"minirospy journal 1\n"
 
 _STEP_ITEMS = 500
 _STEP_BYTES = 65536
-# Msgpack's type bytes of a long string and of long bytes, before a 4-byte length
+# Msgpack's type bytes for a long string and for long bytes, which precede a 4-byte length
 _TEXT_32, _BINARY_32 = b"\xdb", b"\xc6"
 
 _FRAME = struct.Struct("<II")
@@ -32,7 +32,7 @@ _DATE, _DATE_TEXT = 1, 2
 
 
 class Recovered(NamedTuple):
-    """The complete records, their size in bytes including the head, and the fault after them."""
+    """The complete records, their size in bytes including the file's first line, and the fault after them."""
 
     records: list[list[Any]]
     size: int
@@ -40,13 +40,16 @@ class Recovered(NamedTuple):
 
 
 def serialize_record(record: list[object]) -> bytes:
-    """Return a record's bytes in the file. Raise ValueError or TypeError on a value that msgpack cannot represent."""
+    """Return a record's bytes in the file. Raise ValueError or TypeError if msgpack cannot represent a value."""
     body = _pack(record)
     return _FRAME.pack(len(body), zlib.crc32(body)) + body
 
 
 def pack_in_steps(value: object) -> Iterator[bytes]:
-    """Yield a large value in pieces; :func:`unpack` takes them joined. Raise as :func:`serialize_record`."""
+    """Yield a large value in pieces, which :func:`unpack` accepts joined.
+
+    Raise ValueError or TypeError if msgpack cannot represent a value.
+    """
     packer = msgpack.Packer(default=_encode_other, strict_types=True, autoreset=False)
     yield from _pack_in_steps(value, packer)
     yield packer.bytes()
@@ -103,7 +106,7 @@ def _taken(packer: msgpack.Packer) -> bytes:
 
 
 def unpack(data: bytes) -> object:
-    """Return the value packed by :func:`pack_in_steps`. Raise ValueError."""
+    """Return the value packed by :func:`pack_in_steps`. Raise ValueError if the data is invalid."""
     try:
         return msgpack.unpackb(data, ext_hook=_decode_other, strict_map_key=False)
     except (msgpack.UnpackException, TypeError) as error:

@@ -1,7 +1,7 @@
-"""Requests and responses of a service, which TCPROS sends after the connection headers.
+"""A service's requests and responses, which TCPROS sends after the connection headers.
 
 A request is its length (4 bytes, little-endian) and its body. A response is the byte 1 for success, the length, and the
-body; or the byte 0, the length, and the text of an error. Source: http://wiki.ros.org/ROS/TCPROS ("Services").
+body; or the byte 0, the length, and an error message. Source: http://wiki.ros.org/ROS/TCPROS ("Services").
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _OK_LENGTH = struct.Struct("<BI")
 
 REQUEST_HEAD = _LENGTH.size  # bytes before a request's body
 
-RESPONSE_HEAD = _OK_LENGTH.size  # bytes before a response's body, or before the text of an error
+RESPONSE_HEAD = _OK_LENGTH.size  # bytes before a response's body, or before an error message
 
 
 def serialize_request(body: bytes) -> bytes:
@@ -40,8 +40,8 @@ def serialize_response(body: bytes) -> bytes:
 
 
 def serialize_failure(error: Exception) -> bytes:
-    """Return the bytes of a server's response after a failed call, with the text of ``error``."""
-    # An error's text may contain characters that UTF-8 cannot encode, for example from a file's name.
+    """Return the bytes of a server's response after a failed call, with the message of ``error``."""
+    # An error message may contain characters that UTF-8 cannot encode, for example from a file name.
     text = str(error).encode(errors="backslashreplace")
     return _OK_LENGTH.pack(0, len(text)) + text
 

@@ -40,14 +40,14 @@ class InterfaceType(NamedTuple):
 
     @classmethod
     def of(cls, described: Any) -> InterfaceType:
-        """Return the type of a message's or service's class; a service's type has no full text."""
+        """Return the type of a message or service class; a service's type has no full text."""
         return cls(described._type, described._md5sum, getattr(described, "_full_text", ""))
 
 
 def subscriber_header(
     topic: str, type_: InterfaceType, caller_id: str, *, tcp_nodelay: bool = False, split_frames: bool = False
 ) -> Header:
-    """Return the header that a subscriber sends first; ``split_frames``: it supports them (``core/wire/framing``)."""
+    """Return the header that a subscriber sends first. ``split_frames``: it supports split frames (``core/wire/framing``)."""
     return {
         **({"split_frames": "1"} if split_frames else {}),
         "callerid": caller_id,
@@ -62,9 +62,9 @@ def subscriber_header(
 def publisher_header(
     topic: str, type_: InterfaceType, caller_id: str, *, latch: bool, extra: Mapping[str, str] | None = None
 ) -> Header:
-    """Return the header that a publisher answers with; ``extra`` are the user's fields.
+    """Return the header with which a publisher replies; ``extra`` are the user's fields.
 
-    As in rospy, these override others: a relay of AnyMsg sends the type of the relayed messages.
+    As in rospy, the user's fields override others: a relay of AnyMsg sends the type of the relayed messages.
     """
     return {
         "callerid": caller_id,
@@ -78,7 +78,7 @@ def publisher_header(
 
 
 def check_subscriber(fields: Header, topic: str, type_: InterfaceType) -> str | None:
-    """Return the reason why a publisher of ``type_`` refuses the subscriber with these fields; None accepts it."""
+    """Return the reason why a publisher of ``type_`` refuses the subscriber with these fields, or None if it accepts it."""
     for name in ("md5sum", "callerid"):
         if name not in fields:
             return f"Missing required '{name}' field"
@@ -96,7 +96,7 @@ def check_subscriber(fields: Header, topic: str, type_: InterfaceType) -> str | 
 
 
 def check_publisher(fields: Header, topic: str, type_: InterfaceType) -> None:
-    """Raise HandshakeRefused unless a publisher's answer matches ``type_``."""
+    """Raise HandshakeRefused unless a publisher's reply matches ``type_``."""
     _raise_error_field(fields)
     for name in ("md5sum", "type"):
         if name not in fields:
@@ -134,7 +134,7 @@ def service_client_header(
 def service_header(
     service: str, type_: InterfaceType, caller_id: str, request_type: str, response_type: str
 ) -> Header:
-    """Return the header that a service answers with: rospy's fields, and roscpp's types of request and response."""
+    """Return the header with which a service replies: rospy's fields, and roscpp's request and response types."""
     return {
         "callerid": caller_id,
         "md5sum": type_.md5sum,
@@ -146,7 +146,7 @@ def service_header(
 
 
 def check_service_client(fields: Header, type_: InterfaceType) -> str | None:
-    """Return the reason why a service of ``type_`` refuses the client with these fields; None accepts it."""
+    """Return the reason why a service of ``type_`` refuses the client with these fields, or None if it accepts it."""
     for name in ("service", "md5sum", "callerid"):
         if name not in fields:
             return f"Missing required '{name}' field"
@@ -161,7 +161,7 @@ def check_service_client(fields: Header, type_: InterfaceType) -> str | None:
 
 
 def check_service(fields: Header) -> None:
-    """Raise HandshakeRefused if a service answered with an error, WireError if there is no md5sum."""
+    """Raise HandshakeRefused if a service replied with an error, WireError if there is no md5sum."""
     _raise_error_field(fields)
     if "md5sum" not in fields:
         raise WireError("header missing required field [md5sum]")

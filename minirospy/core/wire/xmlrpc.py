@@ -1,7 +1,7 @@
-"""XML-RPC: convert calls and answers to bytes and back.
+"""XML-RPC: convert calls and responses to bytes and back.
 
 Pure; parses with expat (``core/wire/xmlrpc_reader.py``), and plain documents without it (``core/wire/xmlrpc_plain.py``).
-For a server that must not block, long documents can be read and written in short steps.
+Long documents can be read and written in short steps, for a server that must not block.
 Source: http://xmlrpc.com/spec.md, and http://wiki.ros.org/ROS/Master_API for the types that ROS uses.
 """
 
@@ -45,7 +45,7 @@ class Call(NamedTuple):
 
 
 class Serialized:
-    """An answer that is already XML, in pieces, since joining a long one takes time."""
+    """A response that is already XML, in pieces, because joining a long one takes time."""
 
     __slots__ = ("pieces",)
 
@@ -54,7 +54,7 @@ class Serialized:
 
 
 def serialize_call(method: str, args: Sequence[object]) -> bytes:
-    """Return a call as XML. Raise RpcProtocolError on a value that XML-RPC has no type for."""
+    """Return a call as XML. Raise RpcProtocolError if XML-RPC has no type for a value."""
     parts = [_HEAD, "<methodCall><methodName>", escape(method), "</methodName><params>"]
     for value in args:
         parts.append("<param>")
@@ -65,7 +65,7 @@ def serialize_call(method: str, args: Sequence[object]) -> bytes:
 
 
 def serialize_response(value: object) -> bytes:
-    """Return a successful answer as XML."""
+    """Return a successful response as XML."""
     if type(value) is Serialized:
         return b"".join(value.pieces)
     parts = [_HEAD, "<methodResponse><params><param>"]
@@ -83,7 +83,7 @@ def serialize_fault(code: int, text: str) -> bytes:
 
 
 def serialize_call_in_steps(method: str, args: Sequence[object], most: int) -> Steps[list[bytes]]:
-    """Return a call as pieces of XML, like :func:`serialize_response_in_steps` for an answer."""
+    """Return a call as XML in pieces, as :func:`serialize_response_in_steps` does for a response."""
     out = Output(most)
     out.parts += [_HEAD, "<methodCall><methodName>", escape(method), "</methodName><params>"]
     for value in args:
@@ -95,7 +95,7 @@ def serialize_call_in_steps(method: str, args: Sequence[object], most: int) -> S
 
 
 def serialize_response_in_steps(value: object, most: int) -> Steps[list[bytes]]:
-    """Return a successful answer as pieces of XML. Raise RpcProtocolError if it exceeds ``most`` bytes."""
+    """Return a successful response as XML in pieces. Raise RpcProtocolError if it exceeds ``most`` bytes."""
     out = Output(most)
     out.parts += [_HEAD, "<methodResponse><params><param>"]
     yield from write_in_steps(value, out, 0)
@@ -104,7 +104,7 @@ def serialize_response_in_steps(value: object, most: int) -> Steps[list[bytes]]:
 
 
 def parse_call_in_steps(body: bytes | bytearray) -> Steps[Call]:
-    """Return the call in a long ``body``. Raise RpcProtocolError."""
+    """Return the call in a long ``body``. Raise RpcProtocolError if it is malformed."""
     plain = read_plain(body) if len(body) <= _PLAIN_BYTES else None
     if plain and plain[0] is not None:
         return Call(plain[0], plain[1])
@@ -120,7 +120,7 @@ def parse_call_in_steps(body: bytes | bytearray) -> Steps[Call]:
 
 
 def parse_call(body: bytes | bytearray) -> Call:
-    """Return the call in ``body``. Raise RpcProtocolError."""
+    """Return the call in ``body``. Raise RpcProtocolError if it is malformed."""
     plain = read_plain(body)
     if plain and plain[0] is not None:
         return Call(plain[0], plain[1])
@@ -128,7 +128,7 @@ def parse_call(body: bytes | bytearray) -> Call:
 
 
 def parse_response(body: bytes | bytearray) -> Any:
-    """Return the value in an answer. Raise RpcFault if the peer answered with a fault, RpcProtocolError on invalid XML-RPC."""
+    """Return the value in a response. Raise RpcFault if the response is a fault, RpcProtocolError if it is malformed."""
     plain = read_plain(body)
     if plain and plain[0] is None and len(plain[1]) == 1:
         return plain[1][0]

@@ -1,6 +1,6 @@
 """Read plain XML-RPC without an XML parser: five times as fast, with the same results.
 
-Pure. Nearly all documents of ROS are plain: ASCII without references; strings, numbers, booleans, arrays
+Pure. Nearly all documents that ROS sends are plain: ASCII without references; strings, numbers, booleans, arrays
 and structs, without spaces inside the tags. Any other document, valid or not, is left to the parser
 (``core/wire/xmlrpc_reader.py``).
 """
@@ -15,10 +15,11 @@ from typing import Any, NamedTuple
 __all__ = ["read_plain"]
 
 _MAX_TAGS = 2_000_000
-_MAX_OPEN = 60  # below the parser's limit on nesting; deeper documents are left to the parser
+# open elements; less than the parser's nesting limit: deeper documents are left to the parser
+_MAX_OPEN = 60
 
 _SPACE = r"[ \t\r\n]*"
-# No references, nor "]]>", and no characters that XML changes or forbids.
+# Excludes references, "]]>", and characters that XML changes or forbids.
 _TEXT = r"[\t\n !-%'-;=?-~]*"
 _STRING = rf"<value>(?:<string>({_TEXT})</string>|({_TEXT}))</value>"
 
@@ -30,7 +31,7 @@ class _Patterns(NamedTuple):
 
 
 def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | None:
-    """Return the method of the call in ``body`` (None: an answer), and the parameters; None if it is not plain."""
+    """Return the method of the call in ``body`` (None for a response), and the parameters; None if it is not plain."""
     try:
         text = body.decode("ascii")
         if text.count("<") > _MAX_TAGS:
@@ -38,7 +39,7 @@ def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | Non
         head_of, tail_of, token_of = _patterns()
         head, end = head_of.match(text), text.rfind("</params>")
         tail = tail_of.fullmatch(text, max(0, end))
-        # Head and tail must both belong to a call, or both to an answer.
+        # Head and tail must both belong to a call, or both to a response.
         if not head or not tail or (head[1] is None) is not (tail[1] is None):
             return None
         params = _read(token_of.findall(text, head.end(), end))
@@ -48,7 +49,10 @@ def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | Non
 
 
 def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
-    """Return the values that the tokens represent; None if the tokens are inconsistent. Raise ValueError."""
+    """Return the values that the tokens represent, or None if the tokens are inconsistent.
+
+    Raise ValueError if a number is invalid.
+    """
     if tokens and tokens[-1][4] not in {"", "</param>"}:
         # An unexpected part always becomes the last token.
         return None
@@ -112,7 +116,7 @@ _NUMBERS: dict[str, Callable[[str], object]] = {
 
 @cache
 def _patterns() -> _Patterns:
-    # Compiled at first use, since this takes a millisecond.
+    # Compile this at first use, because compiling takes a millisecond.
     utf8 = "(?: encoding=(?:'utf-8'|\"utf-8\"|'UTF-8'|\"UTF-8\"))?"
     declaration = rf"<\?xml version=(?:'1\.0'|\"1\.0\"){utf8} ?\?>"
     call = rf"Call>{_SPACE}<methodName>({_TEXT})</methodName>"
@@ -128,7 +132,7 @@ def _patterns() -> _Patterns:
         "</member>",
         "<value><struct>",
         rf"</struct>{_SPACE}</value>",
-        # Text in an unexpected place, with everything after it, becomes an unknown token.
+        # Unexpected text, with everything after it, becomes an unknown token.
         "(?s:.+)",
     )
 

@@ -1,7 +1,7 @@
 """Parse XML-RPC documents to values with expat, as their bytes arrive.
 
-Pure. Refuses input that could do harm: document types (and so entities), nesting beyond 64 levels, a million elements,
-tags of 64 KiB, strings of 64 MiB in memory. Source: http://xmlrpc.com/spec.md.
+Pure. Rejects input that could do harm: document types (and therefore entities), nesting beyond 64 levels, a million
+elements, tags of 64 KiB, strings of 64 MiB in memory. Source: http://xmlrpc.com/spec.md.
 """
 
 from __future__ import annotations
@@ -23,20 +23,22 @@ _MIB = 1024 * 1024
 _MAX_MEMORY = 64 * _MIB  # memory limit for all long strings in one document
 
 _MAX_WIDE = 16 * _MIB
-"""Bytes of one string with a character beyond U+00FF, which makes each character take 2 or 4 bytes and copies the string."""
+"""Maximum bytes of one string with a character beyond U+00FF: each of its characters then uses 2 or 4 bytes, and the string
+is copied.
+"""
 
-_MAX_TOKEN = 65536  # bytes of a tag, a comment or similar
+_MAX_TOKEN = 65536  # bytes in a tag, a comment or similar
 
-_MAX_SCALAR = 2048  # characters of a number, a boolean or a date
+_MAX_SCALAR = 2048  # characters in a number, a boolean or a date
 
-_LONG_TEXT = 16  # pieces, of 8 KiB each, after which a string is long
+_LONG_TEXT = 16  # 8-KiB pieces after which a string counts as long
 
 _GROWTH_SHIFT = 17
-"""A long string is joined each time it has grown by a sixteenth: its length shifted by this is a number of 8-KiB pieces."""
+"""A string's length shifted right by this is a sixteenth of it, in 8-KiB pieces; joining waits until it has grown so much."""
 
 
 class DateTime(NamedTuple):
-    """A date in another format than XML-RPC's, as received; other implementations accept any text."""
+    """A date, as received, that is not in XML-RPC's format; other implementations accept any text."""
 
     value: str
 
@@ -77,10 +79,10 @@ _SCALARS: dict[str, Callable[[str], object]] = {
 
 
 class Reader:
-    """Reads a document, as its bytes arrive, into ``root``, ``method``, ``params`` and ``is_fault``.
+    """Reads a document into ``root``, ``method``, ``params`` and ``is_fault`` as its bytes arrive.
 
     ``_containers`` contains the incomplete lists and dictionaries; ``_values`` has an entry for each incomplete
-    ``<value>``: an empty list, or a list of one element once the value is known.
+    ``<value>``: an empty list, or a list with one element once the value is known.
     """
 
     def __init__(self) -> None:
@@ -98,7 +100,7 @@ class Reader:
         self._depth = 0
         self._left = _MAX_ELEMENTS
         self._tag: str
-        # The number of bytes fed, and the memory that the long strings take.
+        # The number of bytes fed, and the memory that the long strings use.
         self._fed = 0
         self._memory = 0
         # The joined part of a long string, and its bytes per character.
@@ -115,13 +117,13 @@ class Reader:
         parser.StartDoctypeDeclHandler = self._refuse_doctype
 
     def feed(self, data: bytes | bytearray | memoryview, *, is_last: bool = False) -> None:
-        """Parse more data. Raise RpcProtocolError."""
+        """Parse more data. Raise RpcProtocolError if the document is invalid or exceeds a limit."""
         try:
             self._parser.Parse(data, is_last)
         except self._errors as error:
             raise RpcProtocolError(f"not XML-RPC: {error}") from error
         self._fed += len(data)
-        # The parser scans an incomplete tag or comment again each time more data arrives.
+        # Limit incomplete tags and comments, because the parser scans them again each time more data arrives.
         if not is_last and self._fed - self._parser.CurrentByteIndex > _MAX_TOKEN:
             raise RpcProtocolError(f"a tag or comment of more than {_MAX_TOKEN} bytes")
         if len(self._text) - _LONG_TEXT > len(self._joined) >> _GROWTH_SHIFT:
@@ -138,7 +140,7 @@ class Reader:
 
     def _start(self, tag: str, _: object) -> None:
         self._depth += 1
-        # Each level of a value needs at most four elements (struct, member, value; array, data, value).
+        # Each level of a value uses at most four elements (struct, member, value; array, data, value).
         if self._depth > 4 * MAX_DEPTH:
             raise RpcProtocolError(f"a value is nested deeper than {MAX_DEPTH} levels")
         self._left -= 1
@@ -210,13 +212,16 @@ class Reader:
             self._binary = None
 
     def _whole_text(self) -> str:
-        """Return the text of the present element."""
+        """Return the text of the current element."""
         if len(self._text) > 1 or self._joined:
             self._join_text()
         return self._joined or "".join(self._text)
 
     def _join_text(self) -> None:
-        """Join the received pieces of a long string, which would take too long at its end. Raise RpcProtocolError."""
+        """Join the pieces of a long string received so far, because joining all at the end would take too long.
+
+        Raise RpcProtocolError if the strings exceed the memory limit.
+        """
         if self._tag == "base64":
             self._decode_base64()
             return
@@ -224,7 +229,7 @@ class Reader:
         self._text.clear()
         joined, self._joined = self._joined, ""
 
-        # All characters of a string take as many bytes as the widest one.
+        # All characters in a string use as many bytes as the widest one.
         width = max(self._width, _width(more))
         memory = width * (len(joined) + len(more))
         self._memory += memory - self._width * len(joined)
@@ -248,12 +253,12 @@ class Reader:
 
 
 def _width(text: str) -> int:
-    """Return the bytes that each character of a long string takes in memory."""
+    """Return the bytes that each character of a long string uses in memory."""
     return 1 if text.isascii() else min(4, sys.getsizeof(text) // len(text))
 
 
 def read_document(body: bytes | bytearray) -> Reader:
-    """Read a whole document. Raise RpcProtocolError."""
+    """Read a whole document. Raise RpcProtocolError if it is invalid or exceeds a limit."""
     reader = Reader()
     try:
         reader.feed(body, is_last=True)

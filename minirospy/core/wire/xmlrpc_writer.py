@@ -1,4 +1,4 @@
-"""Convert values to XML, at once, or in steps if they are large.
+"""Convert values to XML, in one go, or in steps if they are large.
 
 Pure. Source: http://xmlrpc.com/spec.md.
 """
@@ -17,11 +17,11 @@ __all__ = ["Output", "escape", "write", "write_in_steps"]
 _STEP_BYTES = 8192
 _STEP_ITEMS = 300
 _STEP_LETTERS = 65536
-_ALONE_BYTES = 1024 * 1024  # size of an answer, after which it demands to be written alone
+_ALONE_BYTES = 1024 * 1024  # size of a response above which it requests to be written alone
 
 
 def escape(text: str) -> str:
-    """Return a text escaped for XML."""
+    """Return a string escaped for XML."""
     if "&" in text:
         text = text.replace("&", "&amp;")
     if "<" in text:
@@ -45,7 +45,7 @@ def _write_bool(value: bool, parts: list[str], depth: int) -> None:
 
 
 def _write_float(value: float, parts: list[str], depth: int) -> None:
-    # A subclass, such as numpy's, may have another repr.
+    # Call float's own repr, because a subclass, such as numpy's, may have another one.
     parts.append(f"<value><double>{float.__repr__(value)}</double></value>")
 
 
@@ -56,7 +56,7 @@ def _write_str(value: str, parts: list[str], depth: int) -> None:
 def _write_list(value: Sequence[object], parts: list[str], depth: int) -> None:
     parts.append("<value><array><data>")
     for item in value:
-        # Most lists contain strings.
+        # Check for strings first, because most lists contain strings.
         if type(item) is str:
             parts.append(f"<value><string>{escape(item)}</string></value>")
         else:
@@ -99,7 +99,7 @@ _WRITERS: dict[type, _Writer] = {
 
 
 def write(value: object, parts: list[str], depth: int) -> None:
-    """Append a value's XML to ``parts``. Raise RpcProtocolError on a value for which XML-RPC has no type."""
+    """Append a value's XML to ``parts``. Raise RpcProtocolError if XML-RPC has no type for it."""
     if depth > MAX_DEPTH:
         raise RpcProtocolError(f"a value is nested deeper than {MAX_DEPTH} levels")
     writer = _WRITERS.get(type(value))
@@ -119,7 +119,7 @@ class Output:
         self._is_alone = False
 
     def step(self) -> Need | None:
-        """Complete a piece from the current parts; return the value to yield. Raise RpcProtocolError above the limit."""
+        """Complete a piece from the current parts; return the value to yield. Raise RpcProtocolError if the limit is exceeded."""
         piece = "".join(self.parts).encode()
         self.parts.clear()
         self._pieces.append(piece)
@@ -195,7 +195,7 @@ def _write_bytes_in_steps(value: bytes, out: Output) -> Steps[None]:
     import base64
 
     out.parts.append("<value><base64>")
-    # Three bytes are encoded as four characters.
+    # Base64 encodes three bytes as four characters.
     size = 3 * _STEP_BYTES
     for at in range(0, len(value), size):
         out.parts.append(base64.b64encode(value[at : at + size]).decode())
@@ -204,7 +204,7 @@ def _write_bytes_in_steps(value: bytes, out: Output) -> Steps[None]:
 
 
 def _writer_of_kin(value: object) -> _Writer:
-    """Return the writer for a subclass of a known type, a date, or xmlrpc.client's wrappers."""
+    """Return the writer for a subclass of a known type, a date, or one of xmlrpc.client's wrappers."""
     for kind, writer in _WRITERS.items():
         if isinstance(value, kind):
             return writer

@@ -69,7 +69,7 @@ class Registrations:
         workers: Workers,
         watch_seconds: float,
     ) -> None:
-        """Register the entries of ``tables``: kind ("Publisher") -> the node's publications, or other objects, by name.
+        """Register the entries of ``tables``: kind ("Publisher") -> name -> publication, subscription or service.
 
         Every ``watch_seconds`` :meth:`watch` checks whether the node is still registered with the master.
         """
@@ -294,7 +294,7 @@ class Registrations:
 
     async def _unregister_all(self, *, announces: bool) -> None:
         """Unregister everything that the node has registered with the master, in as few calls as possible."""
-        # Unregister a name with a call in progress after that call, which would otherwise register it again.
+        # If a name has a call in progress, unregister it after that call, which might otherwise register it again.
         under_way = {key for key, turn in self._turns.items() if turn.locked()}
         calls = [self._unregistration(key) for key in self._known if key not in under_way]
         calls += [("unsubscribeParam", (self.uri, parameter)) for parameter in self.parameters]

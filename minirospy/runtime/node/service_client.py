@@ -80,8 +80,7 @@ class ServiceClient:
         """Receive the server's header. On an error, close the connection and raise the same exceptions as the constructor.
 
         The ``request`` of the following :meth:`call` is sent first if the server is known to accept that, so that both
-        responses
-        need only one wait. If the server sends no header, it has not started to process the request.
+        responses need only one wait. If the server sends no header, it has not started to process the request.
         """
         try:
             # Do this only on a Unix socket, which only minirospy serves: rospy may lose data that arrives together

@@ -178,7 +178,7 @@ class SlaveApi:
         return [SUCCESS, "", 0]
 
     def request_topic(self, caller_id: str, topic: str, protocols: object) -> Answer:
-        """Return the address of the topic for the first protocol that both nodes support."""
+        """Return the topic's address for the first protocol that both nodes support."""
         if topic not in self._node.publications:
             return [ERROR, f"Not a publisher of [{topic}]", []]
         host, port = self._node.environment.host, self._node.tcpros_port
@@ -195,8 +195,7 @@ class SlaveApi:
         """Shut the node down.
 
         When a new node with the same name registers, the master calls the old node's address. The old node may have
-        exited long
-        ago and this node may be using its port, so check that the reason contains this node's name.
+        exited long ago and this node may be using its port, so check that the reason contains this node's name.
         """
         meant = _BUMPED.fullmatch(reason) if caller_id == "/master" and isinstance(reason, str) else None
         if meant and meant[1] != self._node.name:

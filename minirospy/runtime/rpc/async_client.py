@@ -60,8 +60,7 @@ class AsyncRpcClient:
         """Call ``method`` at ``uri`` and return the value in the response, within ``timeout`` seconds.
 
         Raise RpcUnreachable if the server does not respond, RpcFault if the call fails there, RpcProtocolError if the
-        response is
-        invalid.
+        response is invalid.
         """
         answer: asyncio.Future[Body] = asyncio.get_running_loop().create_future()
         call = self.start(uri, serialize_call(method, args), timeout, partial(_settle, answer))

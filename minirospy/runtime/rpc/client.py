@@ -46,8 +46,7 @@ class RpcClient:
         """Call ``method`` and return the value in the response.
 
         Raise RpcUnreachable if the server does not respond, RpcFault if the call fails there, RpcProtocolError if the
-        response is
-        invalid or an argument has no XML-RPC type.
+        response is invalid or an argument has no XML-RPC type.
         """
         request = serialize_request(f"{self._host}:{self._port}", self._path, serialize_call(method, args))
         message = self._exchange(request)

@@ -36,7 +36,8 @@ _log = logging.getLogger(__name__)
 _MAX_HELD = 72 * 1024 * 1024
 _LARGE = 32 * 1024  # bytes; requests up to this size are not refused because of that limit
 
-# Maximum bytes that all clients have not read; then the client that has read nothing for longest is disconnected
+# Maximum bytes of responses that all clients together have not read; beyond that, the client that has read nothing
+# for longest is disconnected
 _MAX_UNREAD_OF_ALL = 72 * 1024 * 1024
 
 _BACKLOG = 4096

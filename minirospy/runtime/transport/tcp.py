@@ -133,8 +133,8 @@ class Listener:
     """A listening TCP socket; each connection is passed to ``accept`` in a separate task.
 
     ``accept(socket, address)`` does the handshake. If it raises OSError or WireError, the error is logged and the
-    connection closed. The number of unfinished handshakes is limited. ``allows(peer's
-    address, own address)`` returns whether a peer may connect.
+    connection closed. The number of unfinished handshakes is limited. ``allows(peer's address, own address)`` returns
+    whether a peer may connect.
     """
 
     def __init__(

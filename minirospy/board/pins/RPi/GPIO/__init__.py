@@ -1,6 +1,6 @@
-"""RPi.GPIO on minirospy's virtual board; an installed RPi.GPIO or rpi-lgpio comes first on sys.path."""
+"""RPi.GPIO on minirospy's virtual board; an installed RPi.GPIO or rpi-lgpio is found first on sys.path."""
 
-from minirospy.board import rpi as _rpi  # warns where a Raspberry Pi lacks its library
+from minirospy.board import rpi as _rpi  # warns if this is a Raspberry Pi without the real library
 from minirospy.board.rpigpio import (
     BCM,
     BOARD,
