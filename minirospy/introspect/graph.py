@@ -94,10 +94,7 @@ class Graph:
         return self.master.get_system_state()
 
     def node_uri(self, node: str) -> str | None:
-        """Return the URI of a node's Slave API, which takes one call to the master.
-
-        None if the master does not know the node.
-        """
+        """Return the URI of a node's Slave API (one call to the master), or None if the master does not know the node."""
         if node not in self._uris:
             uri: str | None = None
             with contextlib.suppress(RpcRefused):
