@@ -1,4 +1,4 @@
-"""`minirospy fleet`: many robots, each with its own master, in one graph. How to use it: docs/fleet.md."""
+"""`minirospy fleet`: many robots, each with its own master, in one graph. docs/fleet.md describes how to use it."""
 
 from __future__ import annotations
 
@@ -241,7 +241,7 @@ def _gateway(
         (),
         start,
         started,
-        # A thousand robots have thousands of topics: a master that does not register them is one line.
+        # A thousand robots have thousands of topics: print one line if the master does not register them.
         registration_fault_lines=1,
         connect=Gateway.connect,
     )
@@ -343,7 +343,10 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
 
 
 def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts: bool) -> NetworkOptions:
-    """Return the endpoints to connect to and to listen on. Raise BridgeError without the library, Misuse if one is invalid."""
+    """Return the endpoints to connect to and to listen on.
+
+    Raise BridgeError if the library is missing, Misuse if an endpoint is invalid.
+    """
     from minirospy.base.environment import Environment
     from minirospy.fleet.network import (
         EndpointError,
