@@ -114,8 +114,8 @@ class Ros1Side:
     async def start(self) -> None:
         """Pass topics and services until :meth:`close`.
 
-        Raise BridgeError if the fleet cannot be joined, or MasterUnreachableError or RpcError if a call to the master
-        fails.
+        Raise BridgeError if another node on this master passes these keys already, or MasterUnreachableError or RpcError
+        if a call to the master fails.
         """
         self._marker = await self._node.subscribe_raw(_MARKER, lambda *_: None, type_=_MARKER_TYPE)
         await self.graph.look()

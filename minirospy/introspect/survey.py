@@ -51,7 +51,10 @@ class Survey:
 
 
 def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
-    """Query the master and all nodes in parallel; with ``processes``, also measure loads. Raise MasterUnreachableError."""
+    """Query the master and all nodes in parallel; with ``processes``, also measure loads.
+
+    Raise MasterUnreachableError if no master answers.
+    """
     state = graph.state()
     answers = ask_nodes(graph, state, with_stats=True)
     host, port = host_port(graph.master.uri)

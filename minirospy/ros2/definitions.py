@@ -121,7 +121,7 @@ _BASES = {"char": "uint8", "time": _STAMP, "duration": "builtin_interfaces/Durat
 class Definitions:
     """ROS 2's types, ``pkg/Name``, with fields from ROS 1's definitions and the rules.
 
-    All methods raise TypesDiffer if a type is unknown.
+    All methods raise TypesDiffer if a type cannot be derived.
     """
 
     def __init__(self, rules: Rules, catalogue: Catalogue) -> None:

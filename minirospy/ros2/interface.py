@@ -84,7 +84,7 @@ class Ros2ActionClient(Reachable, Protocol):
 class Ros2Parameters(Protocol):
     """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread.
 
-    All raise BridgeError if the node does not respond.
+    All raise BridgeError if the call fails.
     """
 
     def names(self, node: str) -> list[str]: ...

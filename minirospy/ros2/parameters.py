@@ -31,7 +31,7 @@ _LENGTH = struct.Struct("<I")
 class Ros1Parameters:
     """The master's parameters, with names and values as in ROS 2.
 
-    Runs on the node's loop; all methods raise MinirospyError if the master refuses.
+    Runs on the node's loop; all methods raise MinirospyError if a call to the master fails.
     """
 
     def __init__(self, node: Node) -> None:

@@ -26,7 +26,7 @@ _Handler = Callable[[Message, Message], Coroutine[object, None, None]]
 class ParameterStore(Protocol):
     """The ROS 1 parameters; with names and values as in ROS 2.
 
-    Runs on the node's loop; all methods raise MinirospyError if the master refuses.
+    Runs on the node's loop; all methods raise MinirospyError if a call to the master fails.
     """
 
     async def names(self) -> list[str]: ...
@@ -128,7 +128,7 @@ class ParameterServer:
 class NodeParameters:
     """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread.
 
-    All raise BridgeError if the node does not respond.
+    All raise BridgeError if the call fails.
     """
 
     def __init__(self, calls: Calls) -> None:

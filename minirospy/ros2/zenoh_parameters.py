@@ -108,7 +108,7 @@ class ZenohParameterServer:
 class ZenohNodeParameters:
     """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread.
 
-    All raise BridgeError if the node does not respond.
+    All raise BridgeError if the call fails.
     """
 
     def __init__(self, side: Ros2Side, fields: Callable[[str], Fields]) -> None:

@@ -82,7 +82,7 @@ def access_of(
     """Return the access rules, with the tokens from the environment.
 
     If other machines may connect and the environment has no tokens, use this user's stored tokens. Raise BridgeError if a
-    parameter or token is invalid.
+    parameter is invalid or the tokens cannot be stored.
     """
     beyond = not is_loopback(address_of(private))
     tokens = Tokens(environ.get("MINIROSPY_BRIDGE_TOKEN", ""), environ.get("MINIROSPY_BRIDGE_READ_TOKEN", ""))

@@ -35,7 +35,7 @@ class NewPackage(NamedTuple):
 def create_package(parent: Path, package: NewPackage) -> list[Path]:
     """Create the package's folder below ``parent``; return the created files and folders.
 
-    Raise UsageError if the name is invalid or the folder exists.
+    Raise UsageError if the description is invalid or the package exists.
     """
     if not _NAME.match(package.name):
         raise UsageError(

@@ -19,7 +19,7 @@ _SHEBANG = re.compile(rb"^#!\s*\S*/(?:env\s+)?python[\d.]*\s*$")
 
 
 def install(workspace: Workspace, plan: Plan) -> int:
-    """Copy the files that one package installs; return the number of files. Raise BuildError if a file is missing."""
+    """Copy the files that one package installs; return their number. Raise BuildError if a folder is in a file's place."""
     copies = dict(_copies(workspace, plan))
     for target, (source, program) in copies.items():
         if target.is_symlink() or target.is_dir():

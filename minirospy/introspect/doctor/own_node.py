@@ -82,12 +82,15 @@ class DoctorNode:
     def register(self) -> None:
         """Register the node's topics: its own message's topic, and /rosout, which every node publishes.
 
-        Raise MasterUnreachableError if no master answers, or RpcError if it refuses.
+        Raise MasterUnreachableError if no master answers, or RpcError if the call fails.
         """
         self._loop.run(self._register())
 
     def serve(self, name: str, handler: Handler) -> None:
-        """Provide a std_srvs/Trigger service. Raise MasterUnreachableError if no master answers, or RpcError if it refuses."""
+        """Provide a std_srvs/Trigger service.
+
+        Raise MasterUnreachableError if no master answers, or RpcError if the call fails.
+        """
         type_ = service_class("std_srvs/Trigger")
         server = self.node.make_service(
             name,

@@ -208,7 +208,7 @@ def read_topic(
 ) -> tuple[Header, bytes]:
     """Return the connection header of the publisher at ``uri`` (its Slave API) and, with ``wait``, its first message.
 
-    Each step has its own ``timeout`` in seconds. Raise RpcError if the node refuses, WireError if its data is invalid, or
+    Each step has its own ``timeout`` in seconds. Raise RpcError if the call fails, WireError if its data is invalid, or
     OSError if the connection fails.
     """
     look_up(host_port(uri)[0])

@@ -65,9 +65,9 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         self.changed()
 
     async def restart(self, run: LaunchRun) -> None:
-        """Stop a launch, and start its file again with the same arguments. Raise UsageError.
+        """Stop a launch, and start its file again with the same arguments.
 
-        Do nothing if another client is restarting or has restarted it.
+        Do nothing if another client is restarting or has restarted it. Raise UsageError if the file cannot be started.
         """
         if run.id in self._restarting or run.id not in self.runs:
             return
