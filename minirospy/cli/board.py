@@ -29,9 +29,9 @@ __all__ = ["FAMILY", "Picture", "main", "render"]
 _STEP = 0.05
 """The person's step per key in metres; also the width of a map cell, and half its height."""
 
-_MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # metres that the map shows
+_MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # metres that the map shows, ahead and to each side
 
-_START: Position = (0.6, 0.0)  # where the person enters
+_START: Position = (0.6, 0.0)  # where the person first appears
 
 _STEPS = {"up": (_STEP, 0.0), "down": (-_STEP, 0.0), "left": (0.0, _STEP), "right": (0.0, -_STEP)}
 
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if words[:1] in (["-b"], ["--board"]):
         if len(words) == 1:
             return run(FAMILY.name, _missing_name)
-        # Set the variable, which nodes read as well, for the boards that the verbs open.
+        # Set the variable, which nodes read as well, so that the verbs open the same board.
         os.environ["MINIROSPY_BOARD"] = words[1]
         words = words[2:]
     if not words:
@@ -101,7 +101,7 @@ class Picture:
 
 
 def _map(person: Position, ascii_only: bool) -> list[Text]:
-    """Return the floor in front of the scanner, seen from above: the scanner's two fields and the person."""
+    """Return a map of the floor in front of the scanner, seen from above: the scanner's two fields and the person."""
     from rich.text import Text
 
     body = Circle(*person)
@@ -177,7 +177,7 @@ def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
 
 
 def _act(board: Board, key: str) -> None:
-    """Apply a key to the board."""
+    """Apply a key press to the board."""
     if key.isdecimal() and 1 <= int(key) <= len(BUTTONS):
         pin = BUTTONS[int(key) - 1]
         (board.release if board.get(pin) else board.press)(pin)

@@ -1,4 +1,4 @@
-"""`minirospy bridge`: the graph for browsers, phones and programs without ROS. How to use it: docs/bridge.md."""
+"""`minirospy bridge`: the graph for browsers, phones and programs without ROS. docs/bridge.md describes how to use it."""
 
 from __future__ import annotations
 
@@ -253,7 +253,7 @@ def _show_status(port: int | None, rosbridge_port: int | None, token: str, *, as
     ports = [each for each in (port, rosbridge_port) if each is not None]
     for each in ports:
         _check_range("port", each, 1, 65535)
-    # The default ports of Foxglove, rosbridge and web_video_server.
+    # These are the default ports of Foxglove, rosbridge and web_video_server.
     return show_status(ports or (8765, 9090, 8080), token, as_json=as_json)
 
 
@@ -263,7 +263,7 @@ def _check_range(name: str, value: int, low: int, high: int) -> None:
 
 
 def _given_token(option: str, given: str | None, variable: str) -> str:
-    """Return the token from an option, else from a variable, "" if there is none."""
+    """Return the token from an option, else from a variable, or "" if there is none."""
     if given is None:
         return os.environ.get(variable, "")
     if not given:
@@ -291,8 +291,8 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
     is_any = options.address in ("0.0.0.0", "::")
     addresses = ["localhost"] if is_any or is_loopback(options.address) else [options.address]
     if options.access.requires_token and not listener.is_encrypted and addresses == ["localhost"]:
-        # localhost may resolve to ::1, and another user's server there would receive the token. A certificate would
-        # identify the server.
+        # localhost may resolve to ::1, and another user's server at that address would receive the token. With a
+        # certificate this cannot happen, because it identifies the server.
         addresses = ["::1" if options.address in ("::", "::1") else "127.0.0.1"]
     found = links(addresses, listener.port, encrypted=listener.is_encrypted)
     print(f"Foxglove protocol at {found.websocket[0]}", flush=True)

@@ -1,4 +1,4 @@
-"""`minirospy bridge --status`: what running bridges serve, and their clients."""
+"""`minirospy bridge --status`: show the protocols that running bridges serve, and their clients."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ _Json = Any
 
 
 class _Token(NamedTuple):
-    """A token. ``is_kept``: it is from ROS_HOME, where this user's bridges store theirs."""
+    """A token. ``is_kept``: the token is from ROS_HOME, where this user's bridges store their tokens."""
 
     text: str
     is_kept: bool
 
 
 class _NoBridgeError(BridgeError):
-    """No bridge answers at a port."""
+    """No bridge responds at a port."""
 
 
 def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
     """Print the status of the local bridges at these ports; return the exit status.
 
-    Raise BridgeError if none answers, or one refuses access.
+    Raise BridgeError if no bridge responds, or one refuses access.
     """
     found: dict[str, _Json] = {}
     faults: list[BridgeError] = []
@@ -40,7 +40,7 @@ def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
         except BridgeError as error:
             faults.append(error)
         else:
-            # A bridge has several ports, one per protocol: list it once.
+            # A bridge has several ports, one per protocol: list each bridge once.
             found.setdefault(status["node"], status)
 
     if as_json and found:

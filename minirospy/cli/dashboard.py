@@ -1,4 +1,4 @@
-"""`minirospy dashboard`, `rqt` and its tools: the graph and the board in a browser. How to use it: docs/dashboard.md."""
+"""`minirospy dashboard`, `rqt` and its tools: the graph and the board in a browser. docs/dashboard.md describes how to use it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard"]
 
-Fields = Mapping[str, Sequence[str]]  # a view's settings, as in its link
+Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the view's link
 
 
 def dashboard(argv: Sequence[str] | None = None) -> int:
@@ -28,7 +28,7 @@ def dashboard(argv: Sequence[str] | None = None) -> int:
 
 
 def __getattr__(name: str) -> Any:
-    """Return the function of a command of rqt (``rqt_plot``), or its Command (``RQT_PLOT``), from COMMANDS."""
+    """Return the function for an rqt command (``rqt_plot``), or its Command (``RQT_PLOT``), from COMMANDS."""
     command = COMMANDS.get(name.lower())
     if command is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -36,7 +36,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _main(command: Command, argv: Sequence[str] | None = None) -> int:
-    """Run a command. Launch files start it as a node, so its arguments may contain remappings."""
+    """Run a command. Its arguments may contain remappings, because launch files start it as a node."""
     words = list(sys.argv[1:] if argv is None else argv)
     remappings = [word for word in words if ":=" in word]
     body = partial(command.body, arguments=remappings)
@@ -72,7 +72,7 @@ def _parser(name: str, what: str) -> Parser:
 
 
 def _add_ignored(parser: Parser, *words: str, takes_value: bool = False) -> None:
-    """Accept an option of rqt that has no effect on the page."""
+    """Accept an rqt option that has no effect on the page."""
     if takes_value:
         parser.add_argument(
             *words, dest="ignored", metavar="X", help="accepted, without effect", completer="nothing"
@@ -145,9 +145,10 @@ def _window(
     add_arguments: Callable[[Parser], None] | None = None,
     chosen: Callable[..., tuple[str, Fields]] | None = None,
 ) -> Command:
-    """Return the command of a window of rqt.
+    """Return the command that opens an rqt window.
 
-    ``what`` is the description; ``add_arguments`` adds its arguments, which ``chosen`` converts to the view and its settings.
+    ``what`` is the description; ``add_arguments`` adds the command's arguments, and ``chosen`` converts these to the view
+    and its settings.
     """
 
     def make_parser() -> Parser:
@@ -291,7 +292,7 @@ def _serve(
 ) -> int:
     """Serve the page until Ctrl-C, SIGTERM or `rosnode kill`; return the exit status.
 
-    ``node_name``: the name of joint_state_publisher_gui, which publishes joints; by default the dashboard's own.
+    ``node_name``: set by joint_state_publisher_gui, which publishes joints; the default is the dashboard's own name.
     """
     from minirospy.web.serve import require_libraries
 
@@ -309,7 +310,7 @@ def _serve(
     from minirospy.web.dashboard.dashboard import PORT, Dashboard
     from minirospy.web.serve import run
 
-    # Bags on the command line may be in any folder.
+    # Bags on the command line may be in any folder, not only below the working folder.
     given = fields.get("file", ()) if view == "bag" else ()
     bags = BagFolder(Path.cwd(), [Path(name) for name in given])
     address = address or ("0.0.0.0" if listen else "127.0.0.1")
@@ -325,7 +326,7 @@ def _serve(
     )
 
     class Started:
-        """Opens the dashboard on the given port; by default on PORT, or on any free port if that one is in use."""
+        """Opens the dashboard on the given port; by default on PORT, or on any free port if PORT is in use."""
 
         dashboard: Dashboard
 
@@ -378,9 +379,10 @@ def _serve(
 
 
 def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
-    """Return this user's tokens; if they cannot be stored in ROS_HOME, new ones, unless ``must_be_kept``.
+    """Return this user's tokens, or new ones if they cannot be stored in ROS_HOME, unless ``must_be_kept``.
 
-    Even on loopback the page needs the token to start programs and open files: other users of the machine can connect to it.
+    Even on loopback, the page needs the token to start programs and open files, because other users of the machine can
+    connect.
     """
     from minirospy.base.errors import BridgeError
     from minirospy.web.access import new_token
@@ -410,9 +412,9 @@ def _announce(
     from minirospy.web.dashboard.views import link
 
     is_any = address in ("0.0.0.0", "::")
-    # Do not use localhost: a browser may try ::1 first, and another user's program may listen there on this port.
+    # Do not use localhost: a browser may try ::1 first, and another user's program may listen on this port at ::1.
     host = ("127.0.0.1" if address != "::" else "::1") if is_any or address == "localhost" else address
-    # The local user's link gets the rights of the user's own programs.
+    # A local user's link gets the same rights as the user's own programs.
     own = tokens.read if read_only else tokens.write
     here = link(host, port, view, fields, token=own)
     is_opened = not no_browser and _open_browser(partial(link, host, port, view, fields), own, codes)
@@ -441,7 +443,7 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
         codes.redeem(code)
         return False
     codes.when_ended(code, remove)
-    # Check after the code has expired by its own clock.
+    # Check after the code has expired according to its own clock.
     asyncio.get_running_loop().call_later(LIFETIME + 1, codes.forget_expired)
     return True
 
@@ -456,7 +458,10 @@ _ARGUMENTS: Mapping[str, tuple[Callable[[Parser], None] | None, Callable[..., tu
     "rqt_reconfigure": (_add_nodes, _nodes),
     "rqt_top": (None, _top),
 }
-"""Commands with arguments: the function that adds them, and the function that converts them to a view and its settings."""
+"""Commands with arguments:
+
+the function that adds the arguments, and the function that converts them to a view and its settings.
+"""
 
 COMMANDS = {
     window.command: Command("rviz", _rviz_parser, _rviz)

@@ -29,10 +29,13 @@ __all__ = ["COMMAND", "main"]
 
 BUTTON, LED = 11, 7
 _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
-"""Between two of the button's ten polls per second, so that the LED reacts after its typical delay."""
+"""Seconds for which the button is pressed and released.
+
+Each is between two of the node's ten polls per second, so that the LED reacts after its typical delay.
+"""
 _FOLLOW_SECONDS = 10.0
 _START_SECONDS = 180.0
-"""Timeout, long enough for Windows with a virus scanner or a Raspberry Pi. A failed launch ends the wait early."""
+"""Timeout, long enough for Windows with a virus scanner or for a Raspberry Pi. A failed launch ends the wait early."""
 _WAY = (
     "button_publisher.py --- /button_state (std_msgs/Bool) ---> led_actuator.py",
     "  reads GPIO 11, ten times a second                          sets GPIO 7",
@@ -82,7 +85,7 @@ def _demo(presses: int | None) -> int:
 
 
 def _is_dumb() -> bool:
-    """Return whether this is a terminal that cannot move the cursor back, such as in an editor."""
+    """Return whether the output is a terminal that cannot move the cursor back, as in an editor."""
     from rich.console import Console
 
     return Console().is_dumb_terminal
@@ -104,8 +107,8 @@ def _own_world() -> Iterator[Path]:
 def _free_port() -> int:
     """Return a free port for the master, which starts later.
 
-    Do not use the system's choice, an ephemeral port from 32768 or 49152 on: another program's connection may get it
-    meanwhile.
+    Do not let the system choose: it returns an ephemeral port (32768 or 49152 and up), which another program's connection
+    may use before the master starts.
     """
     for port in random.sample(range(20_000, 32_000), 100):
         with socket.socket() as probe, contextlib.suppress(OSError):
@@ -150,7 +153,10 @@ def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) -> None:
-    """Press the button until the LED lights, which shows that both nodes are connected. Raise MinirospyError."""
+    """Press the button until the LED lights, which shows that both nodes are connected.
+
+    Raise MinirospyError if that takes too long.
+    """
     print("Starting the master, button_publisher.py and led_actuator.py ...", flush=True)
     end = time.monotonic() + _START_SECONDS
     while time.monotonic() < end:
@@ -166,7 +172,7 @@ def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) 
 
 
 def _follow(board: Board, level: int) -> float | None:
-    """Press or release the button; return the seconds until the LED followed, None if it did not."""
+    """Press or release the button; return the seconds until the LED followed, or None if it did not."""
     start = time.monotonic()
     (board.press if level else board.release)(BUTTON)
     return None if _wait_for(board, level, _FOLLOW_SECONDS) is None else time.monotonic() - start
@@ -193,7 +199,7 @@ def _rest(board: Board, launch: subprocess.Popen[bytes], show: _Lines | _Picture
 
 
 class _Lines:
-    """The demo as one line per press, for outputs that are not a terminal or cannot be redrawn."""
+    """Prints the demo as one line per press, for outputs that are not a terminal or cannot be redrawn."""
 
     def __enter__(self) -> None:
         print("\n".join(_WAY), flush=True)
@@ -213,7 +219,7 @@ class _Lines:
 
 
 class _Picture:
-    """The demo on a terminal: the board, and the current step."""
+    """Shows the demo on a terminal: the board and the current step."""
 
     def __init__(self, board: Board) -> None:
         from rich.console import Console

@@ -1,4 +1,4 @@
-"""`minirospy fleet`: many robots, each with its own master, in one graph. How to use it: docs/fleet.md."""
+"""`minirospy fleet`: many robots, each with its own master, in one graph. docs/fleet.md describes how to use it."""
 
 from __future__ import annotations
 
@@ -342,7 +342,10 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
 
 
 def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts: bool) -> NetworkOptions:
-    """Return the endpoints to connect to and to listen on. Raise BridgeError without the library, Misuse if one is invalid."""
+    """Return the endpoints to connect to and to listen on.
+
+    Raise BridgeError if the library is missing, Misuse if an endpoint is invalid.
+    """
     from minirospy.base.environment import Environment
     from minirospy.fleet.network import (
         EndpointError,

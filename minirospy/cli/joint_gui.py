@@ -1,4 +1,4 @@
-"""`rosrun joint_state_publisher_gui joint_state_publisher_gui`: sliders in a browser, or in a terminal without a display."""
+"""`rosrun joint_state_publisher_gui joint_state_publisher_gui`: sliders in a browser or, without a display, in a terminal."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ _NAME = "joint_state_publisher_gui"
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the node; return its exit status.
 
-    The sliders are a page if a browser can be opened, and also if there is neither a display nor a terminal: then its link is
-    printed. ``--page`` and ``--terminal`` override this; without the page's libraries the terminal is used.
+    The sliders are shown on a page if a browser can be opened. They are also on a page, whose link is printed, if there
+    is neither a display nor a terminal. ``--page`` and ``--terminal`` override this. If the page's libraries are missing,
+    the terminal is used.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if "--terminal" in words or not (_uses_page(words) and _has_libraries()):

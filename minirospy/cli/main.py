@@ -15,7 +15,7 @@ __all__ = ["main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the given verb; return the exit status as in minirospy.command.command."""
+    """Run the given verb; return the exit status as minirospy.command.command defines it."""
     words = list(sys.argv[1:] if argv is None else argv)
     return run("minirospy", lambda: _dispatch(words))
 

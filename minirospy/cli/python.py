@@ -1,6 +1,7 @@
 """`minirospy python FILE`: run a program with the Python in which minirospy is installed.
 
-For a separate installation (`pipx install minirospy`, `uv tool install minirospy`), where `python` is another Python.
+Needed for a separate installation (`pipx install minirospy`, `uv tool install minirospy`), because `python` is then
+another Python.
 """
 
 from __future__ import annotations

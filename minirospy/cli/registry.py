@@ -47,7 +47,7 @@ class Entry(NamedTuple):
         return main
 
     def load_grammar(self) -> Command | Family | None:
-        """Import the module; return the Command or Family that it defines, None if it has only a function."""
+        """Import the module; return the Command or Family that it defines, or None if it defines only a function."""
         grammar: Command | Family | None = (
             getattr(self._load_module(), self.grammar) if self.grammar else None
         )
@@ -92,7 +92,7 @@ COMMANDS = (
     Entry("ros.roswtf.commands.doctor", "main", "DOCTOR", "", "doctor",
           "what is wrong here, in the network, in the graph (as roswtf)"),
     Entry("cli.completion.shell", "main", "COMMAND", "", "shell", 'roscd and completion: eval "$(minirospy shell)"'),
-    # Called by shells, not by people.
+    # Shells call this command, not users.
     Entry("cli.completion.complete", "main", "", "", "complete"),
     Entry("ros.rosmaster.commands.master", "roscore", "ROSCORE", "roscore"),
     Entry("ros.rosmaster.commands.master", "rosmaster", "ROSMASTER", "rosmaster"),
@@ -117,7 +117,7 @@ COMMANDS = (
     Entry("ros.catkin.commands.find", "catkin_find_pkg", "FIND_PKG", "catkin_find_pkg"),
     Entry("ros.catkin.commands.find", "catkin_topological_order", "TOPOLOGICAL_ORDER", "catkin_topological_order"),
 )  # fmt: skip
-"""Verbs in the order of `minirospy -h`, then commands that are only console scripts."""
+"""Verbs in the order of `minirospy -h`, followed by commands that are only console scripts."""
 
 SHELL_FUNCTIONS = {
     "roscd": "package_folders",
@@ -137,10 +137,10 @@ def console_scripts() -> dict[str, str]:
 
 
 def find_script(name: str) -> Entry | None:
-    """Return the command whose console script is called ``name``."""
+    """Return the command whose console script is ``name``."""
     return next((entry for entry in COMMANDS if entry.script == name), None)
 
 
 def find_verb(name: str) -> Entry | None:
-    """Return the command of `minirospy NAME`."""
+    """Return the command for `minirospy NAME`."""
     return next((entry for entry in COMMANDS if entry.verb == name), None)

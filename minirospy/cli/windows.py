@@ -1,4 +1,4 @@
-"""A table of the windows of rqt, and RViz: each is a command, an rqt plugin with its view, and a ROS package. Pure.
+"""A table of rqt's windows and RViz. Each is a command, an rqt plugin with its view, and a ROS package. Pure.
 
 The build writes the packages (`rosrun rqt_plot rqt_plot`, `rospack find rqt_plot`) into ``ros/``, as it does for messages.
 """
@@ -37,10 +37,11 @@ class Window(NamedTuple):
     command: str
     view: str
     what: str  # the command's description, without "in a browser"
-    version: str  # of the ROS package
-    description: str  # of the ROS package
-    package: str = ""  # package name, if it differs from the command
-    programs: tuple[str, ...] = ()  # the package's programs, if they differ from the package name
+    version: str  # the ROS package's version
+    description: str  # the ROS package's description
+    package: str = ""  # the ROS package's name, if it differs from the command
+    # the names of the package's programs, if they differ from the package name
+    programs: tuple[str, ...] = ()
 
 
 WINDOWS = (
@@ -80,14 +81,14 @@ WINDOWS = (
 
 def view_of_plugin(plugin: str) -> str:
     """Return the view for a name given to `rqt --standalone`. Raise UsageError if there is none."""
-    # Imported late, because every command imports this module.
+    # Imported here because every command imports this module.
     from minirospy.base.errors import UsageError
     from minirospy.web.dashboard.views import VIEWS
 
     plugins = {each.command: each.view for each in WINDOWS if each.command.startswith("rqt_")}
     name = plugin.rpartition("/")[0] or plugin
     for known, view in plugins.items():
-        # rqt itself accepts a part of the name.
+        # rqt itself accepts a part of the plugin's name.
         if name.lower().replace(".", "/").split("/")[0] == known:
             return view
     if name in VIEWS:
@@ -96,7 +97,7 @@ def view_of_plugin(plugin: str) -> str:
 
 
 def write_packages(folder: Path) -> list[str]:
-    """Write the ROS package of each window below a folder; return their names."""
+    """Write the ROS package for each window below a folder; return the packages' names."""
     from xml.sax.saxutils import escape
 
     names = []

@@ -1,1 +1,1 @@
-"""The parts of every command: its parser, its verbs, its errors and exit statuses."""
+"""The parts that all commands share: parser, verbs, errors and exit statuses."""

@@ -68,13 +68,13 @@ _IN_ARCHIVE = (
 )
 
 INTERRUPTED = 130
-"""The shell's status for a program that SIGINT has ended: `catkin_make && roslaunch ...` stops."""
+"""The shell's exit status for a program that SIGINT has ended, so that `catkin_make && roslaunch ...` stops."""
 
 
 class RosText(NamedTuple):
     """ROS's message for an error, and its exit status.
 
-    ``text`` may contain ``{name}`` and ``{uri}`` of the error.
+    ``text`` may contain ``{name}`` and ``{uri}``, which are replaced by the error's name and URI.
     """
 
     text: str
@@ -82,7 +82,7 @@ class RosText(NamedTuple):
 
 
 class WordedError(MinirospyError):
-    """An error whose ROS message depends on more than the error: ``ros`` is printed first."""
+    """An error whose ROS message depends on the command as well as the error: ``ros`` is printed first."""
 
     def __init__(self, error: Exception, ros: RosText) -> None:
         super().__init__(str(error))
@@ -90,13 +90,13 @@ class WordedError(MinirospyError):
 
 
 Wording = Mapping[str, RosText]
-"""ROS's messages by kind of a NotFoundError, ``no answer from`` + kind of a NodeUnreachableError, or ``master``."""
+"""ROS's messages by the kind of a NotFoundError, ``no answer from`` + the kind of a NodeUnreachableError, or ``master``."""
 
 NO_MASTER = RosText("ERROR: Unable to communicate with master!")
 
 
 def ros_words(error: Exception, wording: Wording) -> RosText:
-    """Return ROS's message for an error; its text is empty if ROS has none."""
+    """Return ROS's message for an error; its text is empty if ROS has no message."""
     if isinstance(error, CommandLineError):
         return RosText(error.ros_text, 2)
     if isinstance(error, WordedError):
@@ -114,7 +114,7 @@ def ros_words(error: Exception, wording: Wording) -> RosText:
 
 
 _WITH_ROS2 = ("minirospy", "minirospy ros2-bridge")
-"""Commands whose process may need ROS 2's packages; `minirospy VERB` runs the verb's own command."""
+"""Commands whose process may need ROS 2's packages; `minirospy VERB` runs the command for that verb."""
 
 
 def run(
@@ -151,7 +151,7 @@ def run(
         wrong = error.object[error.start : error.end]
         return complain(name, UsageError(f"the argument {wrong!r} is not UTF-8 text"), 2)
     except BrokenPipeError:
-        # The reader of stdout (`| head`) has exited.
+        # The program that reads stdout (`| head`) has exited.
         _flush()
         return 0
     except OSError as error:
@@ -163,9 +163,9 @@ def run(
 
 
 def _offer_overlay() -> None:
-    """Make rospy importable in this process and its children even if no `.pth` file is read: `pip install --target`.
+    """Make rospy importable in this process and its children even if no `.pth` file is read, as after `pip install --target`.
 
-    The folder is appended to the path, as by the `.pth` file.
+    The folder is appended to the path, as the `.pth` file would do.
     """
     overlay = os.path.join(_PACKAGE, "overlay")
     if overlay in sys.path:
@@ -176,7 +176,7 @@ def _offer_overlay() -> None:
 
 
 def _heed_break() -> None:
-    """On Windows, end at Ctrl-Break as at Ctrl-C: launchers send it, and by default it ends a process without cleanup."""
+    """On Windows, treat Ctrl-Break like Ctrl-C: launchers send it, and by default it ends a process without cleanup."""
     import signal
     import threading
 
@@ -191,7 +191,8 @@ def _heed_break() -> None:
 def _heed_interrupts() -> None:
     """End at SIGINT even if a script has started the command with `&`, for which the shell sets the signal to be ignored.
 
-    ROS's commands do so as well: they are nodes and install their own handlers. A build keeps the shell's setting.
+    ROS's commands also end then, because they are nodes and install their own handlers. A build keeps the shell's
+    setting.
     """
     import signal
     import threading
@@ -206,8 +207,8 @@ def _heed_interrupts() -> None:
 def _open_streams() -> None:
     """Open missing standard streams, and make all of them able to print any string.
 
-    A closed stream (`rostopic list >&-`, a Windows program without a console) would be None. An output that cannot encode a
-    character (a pipe with a Windows code page) gets escapes instead.
+    A closed stream (`rostopic list >&-`, a Windows program without a console) would be None. Characters that an output
+    cannot encode (a pipe with a Windows code page) are printed as escapes.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -222,17 +223,17 @@ def _open_streams() -> None:
 
 
 def warn(what: str, name: str = "") -> None:
-    """Print one line on stderr after flushing stdout; add the reason if ``name`` is not legal."""
+    """Print one line on stderr after flushing stdout; if ``name`` is not legal, add the reason."""
     from minirospy.introspect.graph import why_illegal
 
     why = why_illegal(name) if name else ""
     sys.stdout.flush()
-    # Use one write: other threads may print at the same time.
+    # Use a single write, because other threads may print at the same time.
     print(escaped(f"WARNING: {what}{why and f'; {why}'}\n", "\n"), end="", file=sys.stderr)
 
 
 def warn_unpublished(graph: Graph, topic: str) -> None:
-    """Warn that the master does not know a topic, and print similar names."""
+    """Warn that the master does not know a topic, and print similar topic names."""
     warn(f"topic [{topic}] does not appear to be published yet", topic)
     hint_near(topic, graph.state().publishers)
 
@@ -240,8 +241,8 @@ def warn_unpublished(graph: Graph, topic: str) -> None:
 def warn_no_subscribers(topic: str, subscribed: Iterable[str]) -> None:
     """Warn that ``topic`` has no subscribers if ``subscribed`` contains a name that is almost equal.
 
-    A publisher may start first, so only a likely typing error is reported: /robot2/scan is not one if /robot1/scan has
-    subscribers.
+    A publisher may start first, so only a likely typing error is reported. If /robot1/scan has subscribers, /robot2/scan
+    is not a typing error.
     """
     others = [each for each in subscribed if _without_digits(each) != _without_digits(topic)]
     if near := did_you_mean(topic, others, only_slips=True):
@@ -253,7 +254,7 @@ def _without_digits(name: str) -> str:
 
 
 def hint_near(name: str, known: Iterable[str]) -> None:
-    """Print names similar to ``name`` on stderr, below the warning that the command waits for it."""
+    """Print names similar to ``name`` on stderr, after the warning that the command is waiting for ``name``."""
     near = did_you_mean(name, (each for each in known if each != name))
     if near:
         print(escaped(f"{near.removeprefix('; ')}\n", "\n"), end="", file=sys.stderr)
@@ -261,9 +262,9 @@ def hint_near(name: str, known: Iterable[str]) -> None:
 
 @contextlib.contextmanager
 def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool = False) -> Iterator[ToolNode]:
-    """Yield the node of a command that listens or publishes; unregister it even if `kill` ends the command.
+    """Yield the node for a command that listens or publishes; unregister the node even if `kill` ends the command.
 
-    ``arguments``: the arguments that a launch file passes to nodes: `__name:=`, `__ns:=`, `__master:=`.
+    ``arguments``: the arguments that a launch file passes to nodes, such as `__name:=`, `__ns:=`, `__master:=`.
     """
     import signal
 
@@ -276,7 +277,7 @@ def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool =
         host=special.get("__hostname") or special.get("__ip", ""),
         namespace=special.get("__ns", ""),
     )
-    # Raise KeyboardInterrupt, as for Ctrl-C.
+    # Raise KeyboardInterrupt on SIGTERM, as on Ctrl-C.
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with ToolNode(environment, tool, name=special.get("__name", ""), ros_time=ros_time) as node:
@@ -297,7 +298,7 @@ def complain(name: str, error: Exception, status: int = 1, ros_text: str = "") -
 
 
 def _flush() -> None:
-    """Flush stdout; if that fails, discard the output, also for the interpreter's own flush at exit."""
+    """Flush stdout; if that fails, discard the output, so that the interpreter's own flush at exit does not fail, too."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -1,4 +1,7 @@
-"""A message as a form on the terminal: a prompt per field, with its value as the default; answers are YAML."""
+"""A form on the terminal for a message: a prompt per field, with the field's value as the default.
+
+The user's input is YAML.
+"""
 
 from __future__ import annotations
 
@@ -39,11 +42,11 @@ def ask_for(
     complain: Callable[[Exception], None],
     known: Collection[str] = (),
 ) -> _M:
-    """Fill ``message`` from the answers to a prompt per field, and return it; an empty answer keeps the value.
+    """Fill ``message`` from the user's input at a prompt per field, and return it; empty input keeps the value.
 
     Skip the top-level fields in ``known``.
 
-    ``ask(question)`` returns the answer. If the answer is invalid, call ``complain(error)``, which may raise, and prompt
+    ``ask(question)`` returns the input. If the input is invalid, call ``complain(error)``, which may raise, and prompt
     again.
     """
     for field in list(fields(message)):
@@ -52,7 +55,7 @@ def ask_for(
         answer = ask(_question(field)).strip()
         while answer:
             try:
-                # Try the value on a separate message first: an invalid one must not remain in ``message``.
+                # Try the value on a separate message first, so that an invalid value does not remain in ``message``.
                 values = _nested(field.path, _value(field, answer))
                 check(fill(type(message)(), [values]))
             except (MessageException, ValueTextError) as error:
@@ -83,14 +86,14 @@ def _question(field: Field) -> str:
 
 
 def _value(field: Field, answer: str) -> object:
-    """Parse an answer; a string needs no quotes."""
+    """Parse the user's input; a string needs no quotes."""
     if field.type == "string" and answer[0] not in "'\"":
         return answer
     return parse_value(answer)
 
 
 def _nested(path: str, value: object) -> object:
-    """Return a value as nested dictionaries: ``a.b`` gives {a: {b: value}}."""
+    """Return a value as nested dictionaries: ``a.b`` becomes {a: {b: value}}."""
     for name in reversed(path.split(".")):
         value = {name: value}
     return value

@@ -1,7 +1,8 @@
 """Command-line parsing: an argument parser whose usage, help and errors are printed as ROS prints them.
 
-Most of ROS's commands use optparse: `Usage: ...`, `Options:`, `rostopic: error: ...`. Scripts and ROS's own tests match these
-lines, so a :class:`Parser` that is given ROS's usage prints exactly them; minirospy's additions follow on separate lines.
+Most of ROS's commands use optparse: `Usage: ...`, `Options:`, `rostopic: error: ...`. Scripts and ROS's own tests match
+these lines, so a :class:`Parser` with ROS's usage prints exactly these lines; minirospy's additions follow on separate
+lines.
 """
 
 from __future__ import annotations
@@ -56,7 +57,10 @@ class Misuse(UsageError):
 
 
 class _Help(argparse.HelpFormatter):
-    """Help as wide as the terminal; argparse gets the width from shutil, whose import takes longer than argparse's own."""
+    """Formats help as wide as the terminal.
+
+    By default, argparse gets the width from shutil, whose import takes longer than argparse's own.
+    """
 
     def __init__(self, prog: str, *args: int, **kwargs: Any) -> None:
         try:
@@ -79,11 +83,11 @@ class _Accepted(argparse.Action):
 class Parser(argparse.ArgumentParser):
     """An argument parser whose errors end with the command that prints the help.
 
-    ``ros_usage`` is ROS's usage; with it options and positional arguments may alternate, as with optparse, and help and
-    errors have
-    optparse's form. ``missing`` and ``surplus`` are ROS's messages for a missing or a surplus argument; ``missing`` may be
-    a dict by argument name. ``about`` and ``ros_epilog`` are ROS's texts above and below the options. ``ros_argparse``: the
-    program's name in ROS's errors if ROS itself uses argparse; help and errors then have argparse's form.
+    ``ros_usage`` is ROS's usage. If it is set, options and positional arguments may alternate, as with optparse, and help
+    and errors are formatted like optparse's. ``missing`` and ``surplus`` are ROS's messages for a missing or a surplus
+    argument; ``missing`` may be a dict by argument name. ``about`` and ``ros_epilog`` are ROS's texts above and below the
+    options. ``ros_argparse``: the program's name in ROS's errors if ROS itself uses argparse; help and errors are then
+    formatted like argparse's.
     """
 
     def __init__(
@@ -132,7 +136,7 @@ class Parser(argparse.ArgumentParser):
         group: argparse._ArgumentGroup | None = None,
         **kwargs: Any,
     ) -> None:
-        """Add an option of ROS that has no effect here; ``nargs`` is 0 unless given."""
+        """Add a ROS option that has no effect here; ``nargs`` is 0 by default."""
         action = (group or self).add_argument(*names, action="accepted", help=help, **kwargs)
         if action.nargs != 0:
             attach_completer(action, completer)
@@ -147,7 +151,7 @@ class Parser(argparse.ArgumentParser):
         return group
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, as the command's function takes them. Raise CommandLineError."""
+        """Return the arguments by name, as the command's function takes them. Raise CommandLineError if they are invalid."""
         parsed = self.parse_intermixed_args(words) if self._intermixed else self.parse_args(words)
         return vars(parsed)
 
@@ -160,7 +164,7 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_intermixed_args(args, namespace)
 
     def error(self, message: str, ros: str = "") -> NoReturn:
-        """Raise CommandLineError with ``message``; ``ros`` is ROS's message if it differs."""
+        """Raise CommandLineError with ``message``; ``ros`` is ROS's message if that differs."""
         ros_text = ""
         if self._ros_argparse:
             ros_text = f"{self.format_usage()}{self._ros_argparse}: error: {ros or _without_hint(message)}"
@@ -175,13 +179,13 @@ class Parser(argparse.ArgumentParser):
         return self._ros_help() if self.ros_usage else super().format_help()
 
     def usage_line(self) -> str:
-        """Return ROS's usage, the first line of its errors."""
+        """Return ROS's usage, which is the first line of its error messages."""
         return f"Usage: {self.ros_usage}"
 
     def _check_options(self, args: Sequence[str] | None) -> None:
-        """Report an unknown long option before a missing argument: the option may have consumed the argument."""
+        """Report an unknown long option before a missing argument, because the option may have consumed the argument."""
         if any(action.nargs == argparse.REMAINDER for action in self._actions):
-            return  # the remaining options are for another program
+            return  # the remaining options belong to another program
         for word in itertools.takewhile("--".__ne__, sys.argv[1:] if args is None else args):
             option = word.partition("=")[0]
             if option.startswith("--") and not any(
@@ -194,7 +198,7 @@ class Parser(argparse.ArgumentParser):
                 )
 
     def _ros_message(self, message: str) -> str:
-        """Return the message of optparse, or of ROS's command, for argparse's ``message``."""
+        """Return the message that optparse, or ROS's command, prints in place of argparse's ``message``."""
         import re
 
         if match := re.match(r"unrecognized arguments: (-\S)", message):
@@ -226,7 +230,7 @@ class Parser(argparse.ArgumentParser):
     # --- help in optparse's form
 
     def _ros_argparse_help(self) -> str:
-        """Return the help as argparse prints it, with ROS's text above the arguments and minirospy's at the end."""
+        """Return the help as argparse prints it, with ROS's text above the arguments and minirospy's text at the end."""
         own, self.description = self.description, self._about
         try:
             return super().format_help() + ("\n" + _filled(own) if own else "")
@@ -234,7 +238,7 @@ class Parser(argparse.ArgumentParser):
             self.description = own
 
     def _ros_help(self) -> str:
-        """Return ROS's help byte for byte, then minirospy's additions."""
+        """Return ROS's help byte for byte, followed by minirospy's additions."""
         groups = [group for group in self._action_groups if group.title != _OWN_OPTIONS]
         options = [action for group in groups for action in group._group_actions if action.option_strings]
         parts = [f"{self.usage_line()}\n"]
@@ -258,21 +262,21 @@ class Parser(argparse.ArgumentParser):
 
 
 class AssignmentParser(Parser):
-    """A parser that accepts NAME:=VALUE between the other arguments, as for a launch file."""
+    """A parser that accepts NAME:=VALUE between the other arguments, as roslaunch does."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, with the assignments as ``args``. Raise CommandLineError."""
+        """Return the arguments by name, with the assignments as ``args``. Raise CommandLineError if they are invalid."""
         plain, assigned = split_assignments(words)
         return {**super().parse(plain), "args": assigned}
 
 
 def split_assignments(words: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Return the other arguments, and the values by name; drop special names such as __ns, which nodes read."""
+    """Return the other arguments, and the assigned values by name; drop special names such as __ns, which nodes read."""
     return [word for word in words if ":=" not in word], names.parse_launch_arguments(words)
 
 
 def integer(name: str) -> Callable[[str], int]:
-    """Return a parser of integers; ``name`` is the value's name in ROS's error."""
+    """Return a function that parses an integer; ``name`` is the value's name in ROS's error."""
 
     def read(text: str) -> int:
         try:
@@ -284,7 +288,7 @@ def integer(name: str) -> Callable[[str], int]:
 
 
 def attach_completer(action: argparse.Action, completer: str) -> None:
-    """Set the completer of an argument, by name: see :meth:`Parser.add_argument`."""
+    """Set an argument's completer, by name: see :meth:`Parser.add_argument`."""
     setattr(action, _COMPLETER, completer)
 
 
@@ -294,12 +298,12 @@ def completer_of(action: argparse.Action) -> str:
 
 
 def _without_hint(message: str) -> str:
-    """Return argparse's own part of ``message``, without the suggestions after it."""
+    """Return the part of ``message`` that argparse wrote, without the suggestions after it."""
     return message.partition("; did you mean ")[0]
 
 
 def _width() -> int:
-    """Return the width of optparse's help."""
+    """Return the width that optparse uses for help."""
     columns = os.environ.get("COLUMNS", "")
     return int(columns) - 2 if columns.isdecimal() else 78
 
@@ -311,7 +315,7 @@ def _filled(text: str) -> str:
 
 
 def _ros_options(title: str, actions: Iterable[argparse.Action]) -> str:
-    """Return a section of options: ``-b BAGFILE, --bag=BAGFILE``, with the help next to or below each."""
+    """Return a section of options: ``-b BAGFILE, --bag=BAGFILE``, with the help next to or below each option."""
     rows = []
     for action in actions:
         if action.help == argparse.SUPPRESS:

@@ -1,8 +1,8 @@
 """Commands, each a parser and a typed function, and families of such verbs under one name.
 
-The function's parameters have the names of the parser's arguments: `Command.run` passes them by name. So the parser is
-available without running the command, and the function can be called without a command line. A function with many arguments
-takes one record of them: see :func:`with_options`.
+The function's parameters have the names of the parser's arguments: `Command.run` passes them by name. Thus the parser is
+available without running the command, and the function can be called without a command line. A function with many
+arguments takes one record that contains them: see :func:`with_options`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ _Options = TypeVar("_Options")
 
 
 class Command(NamedTuple):
-    """A command without verbs. ``interrupted`` is the exit status after Ctrl-C, ``misuse_status`` that of a usage error."""
+    """A command without verbs.
+
+    ``interrupted`` is the exit status after Ctrl-C, ``misuse_status`` the status after a usage error.
+    """
 
     name: str
     parser: Callable[[], Parser]
@@ -52,8 +55,8 @@ class Command(NamedTuple):
 class Verb(NamedTuple):
     """One verb of a family: its name, one line of help, its parser, and the function that is called with the parsed arguments.
 
-    In a family that is a node, the function also takes ``arguments``, the remapping arguments. ``wording`` has ROS's
-    messages for errors of this verb.
+    In a family that is a node, the function also takes ``arguments``, the remapping arguments. ``wording`` contains ROS's
+    messages for this verb's errors.
     """
 
     name: str
@@ -76,13 +79,13 @@ def deferred_verb(name: str, summary: str, module: str, attribute: str = "VERB")
 def with_options(
     options: Callable[..., _Options], body: Callable[[_Options], int | None]
 ) -> Callable[..., int | None]:
-    """Return a function that takes a parser's arguments by name and calls ``body`` with a record of them.
+    """Return a function that takes a parser's arguments by name and calls ``body`` with a record that contains them.
 
-    ``options`` is the record's class, whose fields have the names of the parser's arguments: a NamedTuple, since importing
-    dataclasses takes longer than a command does.
+    ``options`` is the record's class, whose fields have the names of the parser's arguments: a NamedTuple, because
+    importing dataclasses takes longer than a command runs.
     """
 
-    @functools.wraps(options)  # so that inspect.signature lists the fields
+    @functools.wraps(options)  # lets inspect.signature list the fields
     def call(**arguments: object) -> int | None:
         return body(options(**arguments))
 
@@ -118,7 +121,7 @@ class Family(NamedTuple):
     shows_help_on_error: bool = False
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """Run the given verb; return the exit status as :func:`minirospy.command.command.run` does."""
+        """Run the chosen verb; return the exit status as :func:`minirospy.command.command.run` does."""
         words = list(sys.argv[1:] if argv is None else argv)
         return run(self.name, lambda: self._dispatch(words), self.interrupted, self.wording)
 
@@ -173,7 +176,7 @@ class Family(NamedTuple):
 def _call(
     parser: Parser, body: Callable[..., int | None], words: Sequence[str], **others: object
 ) -> int | None:
-    """Parse ``words`` and call ``body`` with the arguments."""
+    """Parse ``words`` and call ``body`` with the resulting arguments."""
     options = parser.parse(words)
     try:
         return body(**options, **others)

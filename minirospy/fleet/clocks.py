@@ -1,4 +1,4 @@
-"""Estimate a peer's clock offset from its answers, and measure message delays. Pure. Times in nanoseconds."""
+"""Estimate a peer's clock offset from its replies, and measure message delays. Pure. Times are in nanoseconds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _SHARE = 0.1  # weight of a new message in the mean delay
 
 
 class Ping(NamedTuple):
-    """A request and its answer: when it was sent and received, by the local clock, and the peer's time in the answer."""
+    """A request and its reply: the local times when they were sent and received, and the peer's time in the reply."""
 
     sent: int
     theirs: int
@@ -20,7 +20,7 @@ class Ping(NamedTuple):
 
 
 class ClockOffset(NamedTuple):
-    """Subtract ``offset`` from the peer's times to get local times. The offset is exact to half the round trip."""
+    """Subtract ``offset`` from the peer's times to get local times. The offset is accurate to half the round trip."""
 
     offset: int
     round_trip: int
@@ -35,7 +35,7 @@ class Delay:
     count: int = 0
 
     def add(self, delay: int) -> None:
-        """Record a message's delay; a negative one, which comes from an inexact offset, counts as 0."""
+        """Record a message's delay. A negative delay, which results from an inexact offset, counts as 0."""
         delay = max(0, delay)
         self.mean = delay if not self.count else self.mean + _SHARE * (delay - self.mean)
         self.longest = max(self.longest, delay)
@@ -43,7 +43,7 @@ class Delay:
 
 
 def offset_of(pings: Iterable[Ping]) -> ClockOffset | None:
-    """Return the peer's offset, from the answer with the shortest round trip; None without an answer."""
+    """Return the peer's clock offset, from the reply with the shortest round trip, or None if there was no reply."""
     best = min(pings, key=lambda ping: ping.received - ping.sent, default=None)
     if best is None:
         return None

@@ -1,7 +1,7 @@
 """The contents of the fleet, from its liveliness tokens: robots, their gateways, topics and services. Pure.
 
-Tokens arrive and disappear one by one and in any order; a robot's other tokens may come before its claim. Tokens
-that exceed the limits, or do not have the form of :mod:`minirospy.fleet.keys`, are ignored and counted.
+Tokens arrive and disappear one by one and in any order; a robot's other tokens may arrive before its claim. Tokens that
+exceed the limits, or do not match the formats in :mod:`minirospy.fleet.keys`, are ignored and counted.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ _Token = TypeVar("_Token", TopicToken, ServiceToken)
 __all__ = ["MAX_GATEWAYS", "MAX_NAMES", "MAX_TOKENS", "FleetContents", "Refused", "Robot"]
 
 MAX_GATEWAYS = 5_000
-MAX_NAMES = 2_000  # topics that one gateway may announce, and the same number of services
-MAX_TOKENS = 200_000  # topics and services of all gateways together: some 100 MiB
+MAX_NAMES = 2_000  # topics that one gateway may announce; services have the same limit
+MAX_TOKENS = 200_000  # limit for topics and services of all gateways together: some 100 MiB
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot that is visible to others. ``duplicates``: other claims to its name, which are ignored."""
+    """A robot that is visible to other gateways. ``duplicates``: other claims to its name, which are ignored."""
 
     claim: Claim
     topics: dict[str, TopicToken]
@@ -54,7 +54,7 @@ class _Gateway:
 
 
 class FleetContents:
-    """The tokens that exist now."""
+    """Records the tokens that exist now."""
 
     def __init__(self, allows: Callable[[str], bool], clock: Callable[[], float] = time.monotonic) -> None:
         """``allows(robot)`` returns whether a robot is of interest. ``clock`` returns monotonic seconds."""
@@ -62,14 +62,14 @@ class FleetContents:
         self.waiting: tuple[Refused, ...] = ()
         """The gateways that :meth:`robots` left out because another one holds their name."""
         self.refused = 0  # tokens that were ignored
-        self.refusal = ""  # reason for the last of these
+        self.refusal = ""  # reason for the last ignored token
         self._count = 0
         self._allows = allows
         self._orders = itertools.count()
         self._gateways: dict[tuple[str, str], _Gateway] = {}
 
     def add(self, key: str) -> bool:
-        """Add a token; return whether it changes anything."""
+        """Add a token; return whether that changes the contents."""
         token = parse_claim(key) or parse_topic(key) or parse_service(key)
         if token is None:
             return self._refuse("a key is not that of a robot, a topic or a service")
@@ -98,7 +98,7 @@ class FleetContents:
         return changed
 
     def remove(self, key: str) -> bool:
-        """Remove a token; return whether it changes anything."""
+        """Remove a token; return whether that changes the contents."""
         token = parse_claim(key) or parse_topic(key) or parse_service(key)
         if token is None:
             return False
@@ -132,7 +132,7 @@ class FleetContents:
         return {gateway for _, gateway in self._gateways}
 
     def robots(self, lost: Collection[str] = ()) -> dict[str, Robot]:
-        """Return the robots by name, each as announced by the gateway that holds its name; ignore ``lost`` gateways."""
+        """Return the robots by name, each as the gateway that holds its name announces it; ignore ``lost`` gateways."""
         there = [
             (gateway.order, gateway.claim)
             for gateway in self._gateways.values()

@@ -1,4 +1,7 @@
-"""The full definitions of message types, from packages, publishers and peers; a peer's is checked against its md5sum."""
+"""Full definitions of message types, from packages, publishers and peers.
+
+A peer's definition is checked against its md5sum.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +25,8 @@ __all__ = ["Definitions", "checked_specs"]
 
 _MOST = 5_000
 _SECONDS = 10.0
-MAX_CHARACTERS = 64 << 20  # in all cached definitions; those of ROS's own packages have 3 million
-MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4  # concurrent; an unanswered one times out after _SECONDS
+MAX_CHARACTERS = 64 << 20  # in all cached definitions; ROS's own packages define 3 million characters
+MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4  # concurrent; an unanswered query times out after _SECONDS
 _NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
 
 
@@ -36,7 +39,7 @@ def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
 
 
 class Definitions:
-    """The types that this gateway knows. Generates no message classes: messages stay bytes."""
+    """The types that this gateway knows. Generates no message classes, because messages stay serialized."""
 
     def __init__(self, node: Node, network: FleetNetwork) -> None:
         self.texts = TypeTexts(node)
@@ -71,7 +74,7 @@ class Definitions:
         return found.md5sum if found else ""
 
     async def text(self, name: str, md5sum: str) -> str:
-        """Return the locally known definition of a type, "" if there is none."""
+        """Return the locally known definition of a type, or "" if there is none."""
         if (name, md5sum) not in self._known:
             installed = await self.texts.installed(name)
             if installed is None or installed.md5sum != md5sum:
@@ -80,13 +83,13 @@ class Definitions:
         return self._known.get((name, md5sum), "")
 
     async def interface(self, name: str, md5sum: str, gateway: str) -> InterfaceType:
-        """Return a type, with its definition if it is known here or to ``gateway`` ("" for none).
+        """Return a type, with its definition if this gateway or ``gateway`` ("" for none) knows it.
 
-        Messages pass without one, too.
+        Messages are passed even without a definition.
         """
         text = await self.text(name, md5sum)
         if not text and gateway and md5sum != _NO_FIELDS:
-            # Each gateway is queried separately, so one that does not answer delays only its own topics.
+            # Each gateway is queried separately, so one that does not respond delays only its own topics.
             key = name, md5sum, gateway
             task = self._finding.get(key)
             if task is None:
@@ -116,7 +119,8 @@ class Definitions:
         if share is None:
             share = self._shares[gateway] = asyncio.Semaphore(MAX_QUERIES_OF_GATEWAY)
         try:
-            # Acquire the gateway's own share first: a gateway that does not answer cannot use up all query slots.
+            # Acquire the gateway's own share first, so that a gateway that does not respond cannot use up all query
+            # slots.
             async with share, self._querying:
                 if (name, md5sum) in self._known:
                     return self._known[name, md5sum]

@@ -39,11 +39,11 @@ __all__ = ["Exporter"]
 _log = logging.getLogger(__name__)
 _MAX_IN_FLOWS = 1_000
 _MAX_WANTED, _MAX_READERS = 10_000, 1_000
-"""Topics that readers may request, and readers per topic; peers choose both."""
+"""Topics that readers may request, and readers per topic: limited because peers choose both."""
 
 
 class Exporter:
-    """Shows one robot's graph to the fleet. Runs on the node's loop."""
+    """Announces one robot's graph to the fleet. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class Exporter:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """``hidden``: names of other robots whose topics are imported here, and not announced again."""
+        """``hidden``: names of other robots whose topics are imported here, and which are not announced again."""
         self.claim = claim
         self.duplicates: tuple[Claim, ...] = ()
         self.graph = RobotGraph(node, definitions, claim, rules, hidden)
@@ -80,7 +80,10 @@ class Exporter:
         self._declared: list[Deferred] = []
 
     async def start(self) -> None:
-        """Announce the robot until :meth:`close`. Raise MasterUnreachableError or RpcError."""
+        """Announce the robot until :meth:`close`.
+
+        Raise MasterUnreachableError if no master answers, or RpcError if the call fails.
+        """
         await self.look()
         network, ends = self._network, f"{self.claim.name}/{self.claim.gateway}"
         self._declared = [
@@ -113,7 +116,10 @@ class Exporter:
         self.outbound, self.inbound = {}, {}
 
     async def look(self) -> bool:
-        """Announce the current graph; return whether it has changed. Raise MasterUnreachableError or RpcError."""
+        """Announce the current graph; return whether it has changed.
+
+        Raise MasterUnreachableError if no master answers, or RpcError if the call fails.
+        """
         changed = await self.graph.look()
         self._announce()
         await self._adjust()
@@ -182,7 +188,7 @@ class Exporter:
 
     async def _adjust(self) -> None:
         """Open and close outbound and inbound topics to match the graph and the readers' requests."""
-        # Closing awaits the master: other calls of this method run meanwhile and change both tables.
+        # Closing awaits the master: meanwhile, other calls of this method change both tables.
         for topic, outbound in list(self.outbound.items()):
             token = self.graph.topics.get(topic)
             if self.outbound.get(topic) is outbound and (
@@ -215,7 +221,7 @@ class Exporter:
     # --- messages, calls and questions of others
 
     def _inbound_of(self, topic: str) -> InboundTopic | None:
-        """Return the publisher for messages that arrive for a topic; the topic must have subscribers here."""
+        """Return the publisher for messages that arrive on a topic; the topic must have subscribers here."""
         inbound = self.inbound.get(topic)
         token = self.graph.topics.get(topic)
         if inbound is None and token is not None and token.is_subscribed:
@@ -230,7 +236,7 @@ class Exporter:
         return inbound
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
-        """Queue a message for this robot. Runs in a thread of Zenoh's."""
+        """Queue a message for this robot. Runs in one of Zenoh's threads."""
         parsed = parse_in(key)
         token = self.graph.topics.get(parsed[0]) if parsed else None
         if parsed is None or token is None or not token.is_subscribed:

@@ -1,7 +1,7 @@
-"""Fair queues of messages to send or deliver; a full flow drops its oldest messages. Pure.
+"""Fair queues for messages to send or deliver; a full flow drops its oldest messages. Pure.
 
-A flow is the messages of one topic at the sender, or of one robot's topic at the receiver. Each flow keeps its
-newest messages, and flows are served round-robin, so one that floods loses only its own messages.
+A flow contains one topic's messages at the sender, or one robot's topic's messages at the receiver. Each flow keeps its
+newest messages, and flows are served round-robin, so that a flooding flow loses only its own messages.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _T = TypeVar("_T")
 
 @dataclass(eq=False)
 class Flow(Generic[_T]):
-    """The queued messages of one flow: at most ``most`` messages, and ``most_bytes`` unless there is only one message."""
+    """The queued messages of one flow: at most ``most`` messages and ``most_bytes`` bytes; a single message may be larger."""
 
     most: int
     most_bytes: int
@@ -29,7 +29,7 @@ class Flow(Generic[_T]):
 
 
 class FlowQueue(Generic[_T]):
-    """Flows that are served round-robin. Not thread-safe: its owner has a lock."""
+    """Flows that are served round-robin. Not thread-safe: the owner must hold a lock."""
 
     def __init__(self) -> None:
         self._ready: OrderedDict[Flow[_T], None] = OrderedDict()

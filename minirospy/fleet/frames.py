@@ -33,7 +33,7 @@ class _Text(NamedTuple):
 
 
 class _Array(NamedTuple):
-    """An array: ``steps`` for each element; ``length`` is None if the message contains the length."""
+    """An array: ``steps`` for each element; ``length`` is None if the message itself contains the length."""
 
     length: int | None
     steps: tuple[_Step, ...]
@@ -46,7 +46,7 @@ class FrameRewriter:
     """Rewrites the frame ids in messages of one type."""
 
     def __init__(self, spec: MessageSpec, lookup: Lookup) -> None:
-        """Raise DefinitionError, or an error from ``lookup``."""
+        """Raise DefinitionError if the spec is invalid, or an error from ``lookup``."""
         self._steps = _trimmed(_steps(spec, lookup))
 
     @property
@@ -62,7 +62,7 @@ class FrameRewriter:
         pieces: list[bytes] = []
         try:
             copied, _ = _run(self._steps, data, 0, 0, change, pieces)
-        except (struct.error, OverflowError) as error:  # OverflowError: an offset that does not fit 32 bits
+        except (struct.error, OverflowError) as error:  # OverflowError: an offset that exceeds 32 bits
             raise DeserializationError("the message ends too early") from error
         pieces.append(data[copied:])
         return b"".join(pieces)

@@ -38,10 +38,10 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class GatewayOptions:
-    """``name``: the robot's name, "" for only a control room. ``imports``: whether to show the fleet's robots here.
+    """``name``: the robot's name, "" if it is only a control room. ``imports``: whether to show the fleet's robots here.
 
-    ``ros1_namespace``: the namespace of the keys of zenoh-bridge-ros1 to pass as well, "" for none.
-    ``clock`` returns the time in ns, ``host`` identifies the machine ("" for the default); tests replace both.
+    ``ros1_namespace``: the namespace of zenoh-bridge-ros1's keys to pass as well, "" for none. ``clock`` returns the time
+    in ns, ``host`` identifies the machine ("" for the default); tests replace both.
     """
 
     name: str = ""
@@ -54,7 +54,7 @@ class GatewayOptions:
 
 
 class Gateway:
-    """Passes topics and services between a master and the fleet. Runs on its node's loop."""
+    """Passes topics and services between a master and the fleet. Runs on the node's loop."""
 
     def __init__(self, node: Node, options: GatewayOptions) -> None:
         """Raise BridgeError if the name is not legal for a robot."""
@@ -81,14 +81,18 @@ class Gateway:
         self._failures = RateLimitedLogger(_log)
 
     async def connect(self) -> None:
-        """Open the session; wait for the router if one is configured. The node need not be started. Raise BridgeError."""
+        """Open the session; wait for the router if one is configured. The node need not be started.
+
+        Raise BridgeError if the configuration is invalid.
+        """
         if self.network is None:
             self.network = await FleetNetwork.open(self.options.network)
 
     async def start(self) -> None:
-        """Connect to the fleet unless :meth:`connect` has, and pass topics and services until :meth:`close`.
+        """Connect to the fleet, unless :meth:`connect` already has, and pass topics and services until :meth:`close`.
 
-        Raise BridgeError, MasterUnreachableError or RpcError, or ROSInterruptException if the node is shut down before that.
+        Raise BridgeError if the fleet cannot be joined, MasterUnreachableError or RpcError if a call to the master fails,
+        or ROSInterruptException if the node is shut down first.
         """
         options = self.options
         await self._wait_for_network()
@@ -171,7 +175,7 @@ class Gateway:
             self._receiver.close()
 
     def status(self) -> dict[str, object]:
-        """Return this gateway's configuration and counters, in types that JSON can represent."""
+        """Return this gateway's configuration and counters, as values that JSON can represent."""
         found: dict[str, object] = {
             "name": self.options.name,
             "gateway": self.id,
@@ -276,7 +280,7 @@ class Gateway:
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # A task that is cancelled before its first step has not started the coroutine: close it.
+        # A task that is cancelled before its first step has not started the coroutine, so close the coroutine.
         task.add_done_callback(lambda _: work.close())
         return task
 

@@ -1,8 +1,8 @@
 """Choose the gateway that represents a robot if several claim its name: the first one seen, or the operator's choice. Pure.
 
-Peers' clocks do not decide. A machine that holds a name keeps it until it has been gone for :data:`HOLD_SECONDS`, so that
-another machine cannot claim the name during a short loss of the link. A gateway on the same machine, such as one that was
-restarted, replaces it immediately.
+Peers' clocks do not affect the choice. A machine that holds a name keeps the name until it has been absent for
+:data:`HOLD_SECONDS`, so that another machine cannot claim the name during a short loss of the link. A gateway on the same
+machine, for example after a restart, replaces the previous one immediately.
 """
 
 from __future__ import annotations
@@ -15,18 +15,19 @@ from minirospy.fleet.keys import Claim, is_machine
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
 HOLD_SECONDS = 10.0  # Zenoh's default lease: a link that is silent for longer is closed
-MAX_HOLDS = 5_000  # names of robots that have left, kept for HOLD_SECONDS; peers choose names
+# names of robots that have left, remembered for HOLD_SECONDS; limited because peers choose names
+MAX_HOLDS = 5_000
 
 
 @dataclass
 class _Hold:
     claim: Claim
     left: float | None = None
-    """When the gateway left, in seconds of the clock; None while it is present."""
+    """Time when the gateway left, in seconds of the clock; None while the gateway is present."""
 
 
 class Holders:
-    """Chooses among the claims to each name, and remembers the choice."""
+    """Chooses among the claims to each name, and remembers the choices."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         """``clock`` returns monotonic seconds."""
@@ -37,11 +38,14 @@ class Holders:
         self._given_up: set[Claim] = set()
 
     def give_up(self, claim: Claim) -> None:
-        """Release a claim to other gateways of its machine: its gateway does not answer, though its token still exists."""
+        """Release a claim, whose gateway does not respond, to other gateways on its machine.
+
+        The gateway's token may still exist.
+        """
         self._given_up.add(claim)
 
     def holder(self, name: str) -> Claim | None:
-        """Return the claim that holds a name, including one that has just left."""
+        """Return the claim that holds a name, even if its gateway has just left."""
         hold = self._holds.get(name)
         return hold.claim if hold else None
 
@@ -69,7 +73,7 @@ class Holders:
         return self._hold(name, present)
 
     def forget(self, present: Collection[str]) -> None:
-        """Forget the names whose holders left more than HOLD_SECONDS ago; ``present``: the names that are still claimed."""
+        """Forget the names whose holders left more than HOLD_SECONDS ago; ``present``: names that are still claimed."""
         now = self._clock()
         for name in self._holds.keys() - present:
             hold = self._holds[name]
@@ -83,7 +87,7 @@ class Holders:
             self._given_up = {claim for claim in self._given_up if claim.name in present}
 
     def pause(self, names: Collection[str]) -> float | None:
-        """Return the seconds until the first of these names is free; None if no holder of them has left."""
+        """Return the seconds until the first of these names becomes free; None if no holder has left."""
         ends = [
             hold.left + HOLD_SECONDS
             for name in names
@@ -99,7 +103,7 @@ class Holders:
 
 
 def parse_machines(value: object) -> dict[str, str]:
-    """Return the operator's choices from a parameter's value, machines by robot name; ignore invalid entries."""
+    """Return the operator's choices (machines by robot name) from a parameter's value; ignore invalid entries."""
     if not isinstance(value, dict):
         return {}
     return {str(name): machine for name, machine in value.items() if is_machine(machine)}

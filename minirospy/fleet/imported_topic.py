@@ -1,4 +1,7 @@
-"""A robot's topic in the local graph: published while it has subscribers here, offered while it has publishers here."""
+"""A robot's topic in the local graph.
+
+It is published here while it has subscribers here, and offered to the robot while it has publishers here.
+"""
 
 from __future__ import annotations
 
@@ -48,7 +51,8 @@ _QUEUE = 100
 _FRAME_TOPICS = ("/tf", "/tf_static")
 _MAX_MESSAGE = 256 << 20
 _MAX_OFFERS = 10
-MAX_REGISTERING = 50  # topics registered at a time: each is a call to the master, on its own connection
+# topics registered concurrently: each makes a call to the master on its own connection
+MAX_REGISTERING = 50
 
 
 @dataclass
@@ -71,10 +75,10 @@ class Shared:
 
 
 class ImportedTopic:
-    """One topic of one robot. Runs on the loop, except for messages."""
+    """One topic of one robot. Runs on the loop, except for message handling."""
 
     def __init__(self, shared: Shared, token: TopicToken, offset: Callable[[], ClockOffset | None]) -> None:
-        """``offset()`` returns the offset of the robot's clock, None before it has been measured."""
+        """``offset()`` returns the offset of the robot's clock, or None before it has been measured."""
         self.token = token
         is_global = token.has_frames and token.topic in _FRAME_TOPICS
         self.name = token.topic if is_global else f"/{token.robot}{token.topic}"
@@ -103,12 +107,15 @@ class ImportedTopic:
 
     @property
     def needs_snapshot(self) -> bool:
-        """Return whether only the local graph shows that others publish the topic, because this gateway publishes it itself."""
+        """Return whether only the local graph shows the topic's other publishers.
+
+        This is so if this gateway publishes the topic itself.
+        """
         return self.token.is_subscribed and self.token.is_published and not self._is_global
 
     @property
     def dropped(self) -> int:
-        """Return how many messages from the robot were dropped here because the local subscribers were slower."""
+        """Return how many of the robot's messages were dropped here because the local subscribers were slower."""
         return self._flow.dropped
 
     @property
@@ -121,7 +128,7 @@ class ImportedTopic:
         self._shared.spawn(self._open())
 
     def update(self, token: TopicToken) -> bool:
-        """Apply a changed token; return False if the topic must be closed and created again."""
+        """Apply a changed token; return False if the topic must be closed and recreated."""
         before, self.token = self.token, token
         if token == before:
             return True
@@ -138,7 +145,7 @@ class ImportedTopic:
         return True
 
     def look(self, snapshot: Snapshot | None) -> None:
-        """Update from the local graph."""
+        """Update the topic to match the local graph."""
         if self._is_closed:
             return
         if self.needs_snapshot and snapshot is not None:
@@ -172,7 +179,7 @@ class ImportedTopic:
                 self._advertise(interface)
             elif token.is_subscribed:
                 self._subscribe()
-            # Limited: the master answers the 8,000 calls for a thousand robots one by one.
+            # Limited, because the master handles the 8,000 calls for a thousand robots one by one.
             handle = self._publisher or self._subscription
             if handle is not None:
                 await handle.wait_until_registered()
@@ -198,7 +205,7 @@ class ImportedTopic:
     # --- from the robot
 
     def _links_changed(self) -> None:
-        """Request the topic from the robot while nodes other than this one subscribe to it here."""
+        """Request the topic from the robot while nodes other than this gateway subscribe to it here."""
         publisher = self._publisher
         if publisher is None or self._is_closed:
             return
@@ -216,7 +223,7 @@ class ImportedTopic:
         shared, token = self._shared, self.token
         ends = token.robot, token.gateway
         network = shared.network
-        # Declare the token last: the robot starts sending as soon as it appears.
+        # Declare the token last, because the robot starts sending as soon as the token appears.
         self._wanted = [
             network.subscribe(out_key(*ends, token.md5sum, token.topic), self._arrived),
             network.subscribe(replay_key(*ends, token.md5sum, token.topic, shared.gateway), self._arrived),
@@ -232,12 +239,11 @@ class ImportedTopic:
             declared.undeclare()
         self._numbers.clear()
         if wanted and self._publisher and not self._is_global:
-            # The robot sends its latched message again to the next subscriber; the copy kept here may be outdated by
-            # then.
+            # The robot sends its latched message again to the next subscriber; by then the copy here may be outdated.
             self._publisher.forget_latched()
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
-        """Queue a message. Runs in a thread of Zenoh's."""
+        """Queue a message. Runs in one of Zenoh's threads."""
         if len(message) > _MAX_MESSAGE:
             self._misfits.error(
                 "a message on %s of %d bytes is left out: it is too large", self.name, len(message)
@@ -257,7 +263,7 @@ class ImportedTopic:
         if stamp:
             before = self._numbers.get("out")
             self._numbers["out"] = stamp.number
-            # The numbers restart if the robot has reopened the topic: do not count that as a loss.
+            # The numbers restart after the robot has reopened the topic: do not count that as lost messages.
             if before is not None and before < stamp.number <= before + 1_000_000:
                 self.lost += stamp.number - before - 1
             offset = self._offset()
@@ -275,7 +281,7 @@ class ImportedTopic:
         except DeserializationError as error:
             self._misfits.error("a message on %s: %s", self.name, error)
         except ROSException:
-            return  # closed during the await
+            return  # the topic was closed during the await
 
     # --- to the robot
 
@@ -292,7 +298,7 @@ class ImportedTopic:
         )
 
     async def _unsubscribe(self) -> None:
-        # Clear all of it before the await: meanwhile the topic may be subscribed to again, with another outflow.
+        # Clear all attributes before the await: meanwhile the topic may be subscribed to again, with another outflow.
         subscription, self._subscription = self._subscription, None
         offers, self._offers = self._offers, {}
         outflow, self._outflow = self._outflow, None
@@ -304,7 +310,7 @@ class ImportedTopic:
             await subscription.close()
 
     def _offer(self) -> None:
-        """Offer the topic to the robot while nodes other than this one publish it here."""
+        """Offer the topic to the robot while nodes other than this gateway publish it here."""
         subscription = self._subscription
         if subscription is None:
             return

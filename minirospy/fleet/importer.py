@@ -1,4 +1,4 @@
-"""The control room half of a gateway: shows the fleet's robots in the local graph, each under its name."""
+"""The control room half of a gateway: shows the fleet's robots in the local graph, each in a namespace with its name."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ _AGAIN_SECONDS = 5.0  # before adding a robot again after a failure
 _CLOCK_SECONDS = 30.0
 _PINGS = 5
 _PING_SECONDS = 5.0
-_MAX_PING = 64  # bytes in an answer to a ping, which normally has 8
+_MAX_PING = 64  # bytes in a reply to a ping, which normally has 8
 _CALL_SECONDS = 3600.0
-_CHALLENGE_SECONDS = 2.0  # for a gateway to answer after another one on its machine has claimed its name
-TRIM_NAMES, TRIM_SECONDS = 500, 15.0  # names removed (some 4 MB) before a trim; delay, as links linger
-MAX_ROBOT_NAMES = 2_000  # of _MAX_IMPORTED that one robot may use
-MAX_CONCURRENT_NAMES = (
-    100  # names of a robot that are closed at a time: each is a task, and a call to the master
-)
+# for a gateway to reply after another gateway on the same machine has claimed its name
+_CHALLENGE_SECONDS = 2.0
+# names removed (some 4 MB) before memory is returned, and the delay before that, as links linger
+TRIM_NAMES, TRIM_SECONDS = 500, 15.0
+MAX_ROBOT_NAMES = 2_000  # of _MAX_IMPORTED names that one robot may use
+MAX_CONCURRENT_NAMES = 100  # names of a robot closed concurrently: each needs a task and a call to the master
 MAX_LISTED = 5  # robots named in one log line
 LINES = 5  # log lines of one kind per ten seconds
 _WARN_OFFSET = 100_000_000
-_MAX_CONCURRENT_ROBOTS = 20  # robots removed at a time
-_MAX_IMPORTED = 9_000  # names the importer registers: the master accepts at most 10,000 per node
+_MAX_CONCURRENT_ROBOTS = 20  # robots removed concurrently
+_MAX_IMPORTED = 9_000  # names that the importer registers: the master accepts at most 10,000 per node
 
 
 class ImportedRobot:
@@ -71,7 +71,7 @@ class ImportedRobot:
 
 
 class Importer:
-    """Shows the fleet's robots in the local graph. Runs on the node's loop, except for messages."""
+    """Shows the fleet's robots in the local graph. Runs on the node's loop, except for message handling."""
 
     def __init__(
         self,
@@ -86,7 +86,7 @@ class Importer:
         spawn: Callable[[Coroutine[object, object, None]], object],
         clock: Callable[[], int],
     ) -> None:
-        """``gateway``: the id of this gateway. ``own_name``: the name of the robot that it exports, "" for none."""
+        """``gateway``: the id of this gateway. ``own_name``: the name of the robot that this gateway exports, "" for none."""
         self.robots: dict[str, ImportedRobot] = {}
         self.contents = FleetContents(lambda name: name != own_name and rules.robots(name))
         self._node = node
@@ -120,7 +120,7 @@ class Importer:
         self._removed = 0  # names removed since memory was last returned to the system
         self._trimming: asyncio.TimerHandle | None = None
         self._machines: dict[str, str] = {}
-        """The machine of each robot when it was last shown."""
+        """Each robot's machine when the robot was last shown."""
         self._challenging: set[str] = set()
         self._is_closed = False
         self._reporter = ErrorReporter(_log, "showing the fleet's robots")
@@ -136,7 +136,7 @@ class Importer:
         return list(self.robots)
 
     async def start(self) -> None:
-        """Show robots until :meth:`close`. Raise MasterUnreachableError or RpcError."""
+        """Show robots until :meth:`close`. Raise MasterUnreachableError if no master answers, or RpcError if the call fails."""
         self._node.parameters.listeners.append(self._parameter_changed)
         await self._node.parameters.add(MACHINES)
         await self._read_machines()
@@ -219,7 +219,7 @@ class Importer:
             self._is_reconciling = False
         seconds = time.monotonic() - started
         if seconds > _SETTLE_SECONDS:
-            # While a thousand robots join, leave the loop time for other work.
+            # While a thousand robots join, leave the loop time for other tasks.
             self._not_before = asyncio.get_running_loop().time() + 2 * seconds
             if self._reconciling is not None:
                 self._reconciling.cancel()
@@ -238,7 +238,7 @@ class Importer:
                 left.append(name)
         self._report_names(left, "left")
         for first in range(0, len(gone), _MAX_CONCURRENT_ROBOTS):
-            # return_exceptions: a failure of one does not affect the others.
+            # With return_exceptions, one failure does not affect the other robots.
             for error in await asyncio.gather(
                 *map(self._remove, gone[first : first + _MAX_CONCURRENT_ROBOTS]), return_exceptions=True
             ):
@@ -256,7 +256,7 @@ class Importer:
         for name, robot in robots.items():
             known = self.robots.get(name)
             if known is None:
-                continue  # closed during the await
+                continue  # the robot was closed during the await
             known.robot = robot
             try:
                 await self._update(known)
@@ -265,7 +265,7 @@ class Importer:
                 self._soon(_AGAIN_SECONDS)
 
     def _report_names(self, names: list[str], what: str) -> None:
-        """Log the robots that have joined or left in one line."""
+        """Log the robots that have joined or left, in one line."""
         if len(names) == 1:
             self._comings.info("robot [%s] has %s", names[0], what)
         elif names:
@@ -292,7 +292,7 @@ class Importer:
         self._machines[claim.name] = claim.host
 
     def _report_refused(self) -> None:
-        """Log each gateway once that cannot use its name because another holds it; challenge a holder on the same machine."""
+        """Log once each gateway whose name is held by another gateway; challenge a holder on the same machine."""
         known, self._waiting = set(self._waiting), self.contents.waiting
         for refused in self._waiting:
             claim, holder = refused
@@ -421,8 +421,8 @@ class Importer:
             answering = asyncio.ensure_future(self._network.query(key, request, seconds=_CALL_SECONDS))
             leaving = asyncio.ensure_future(left.wait())
             try:
-                # Zenoh ends a query when the robot's token disappears, which may take minutes: stop waiting when the
-                # robot has left.
+                # Zenoh ends a query when the robot's token disappears, which may take minutes: stop waiting as soon
+                # as the robot has left.
                 await asyncio.wait((answering, leaving), return_when=asyncio.FIRST_COMPLETED)
                 if not answering.done():
                     raise ServiceException(f"robot [{token.robot}] has left during the call")
@@ -452,7 +452,7 @@ class Importer:
                     self._spawn(self._measure(shown))
 
     async def _snapshot(self) -> Snapshot | None:
-        """Return the local graph if it is needed: if a robot both publishes and subscribes to some topic."""
+        """Return the local graph if it is needed because some robot both publishes and subscribes to a topic."""
         if any(topic.needs_snapshot for shown in self.robots.values() for topic in shown.topics.values()):
             return await fetch(self._node.call_master)
         return None
@@ -463,7 +463,7 @@ class Importer:
                 topic.look(snapshot)
 
     async def _answering(self) -> list[str] | None:
-        """Query all gateways of the fleet; return those that answer, None if the query cannot be sent."""
+        """Query all gateways in the fleet; return those that respond, or None if the query cannot be sent."""
         start = f"{ROOT}/ping/"
         try:
             answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS, size=_MAX_PING)

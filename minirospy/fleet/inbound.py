@@ -1,4 +1,4 @@
-"""A topic that a robot subscribes to and others publish: published here while they publish it."""
+"""A topic that a robot subscribes to and other gateways offer: published here while at least one offers it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _MAX_OFFERS = 100
 
 
 async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes:
-    """Call a service of this master for a remote client and return its response. Raise QueryFailed."""
+    """Call a service of this master for a remote client and return its response. Raise QueryFailed if the call fails."""
     try:
         return await call_raw(node, token.service, token.md5sum, request)
     except ServiceException as error:
@@ -42,14 +42,17 @@ async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes
 
 
 def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
-    """Run a coroutine on a node's loop and wait for it: if the loop is slower, messages queue in the receiver."""
+    """Run a coroutine on a node's loop and wait until it is done.
+
+    If the loop is slower, messages therefore queue in the receiver.
+    """
     done = node.run_threadsafe(work)
     with contextlib.suppress(Exception):
         done.result(10.0)
 
 
 class InboundTopic:
-    """Publishes the writers' messages. Buffers them until the robot's subscribers are connected."""
+    """Publishes messages from writers; buffers them until the robot's subscribers are connected."""
 
     def __init__(
         self,
@@ -65,7 +68,7 @@ class InboundTopic:
     ) -> None:
         """``headers``: extra fields for the connection header. ``on_change``: passed to :meth:`Node.advertise`.
 
-        If a stream of velocities stops for ``stop_seconds``, a zero velocity is published; 0 disables this.
+        A zero velocity is published if a stream of velocities stops for ``stop_seconds``; 0 disables this.
         """
         self.token = token
         self.passed = 0
@@ -109,7 +112,7 @@ class InboundTopic:
             self._prepare(offer.md5sum, offer.writer)
 
     def publish(self, md5sum: str, body: bytes) -> bool:
-        """Publish a message; return False if the topic is not ready for it. May be called from any thread."""
+        """Publish a message; return False if the topic is not ready. May be called from any thread."""
         publisher = self._publisher
         if publisher is None or not self._is_ready or md5sum != self._md5sum:
             return False
@@ -132,7 +135,7 @@ class InboundTopic:
         self._is_ready = False
         self._is_closed = True
         if self._stream:
-            with contextlib.suppress(ROSException):  # the node is shut down
+            with contextlib.suppress(ROSException):  # the node has been shut down
                 self._stream.close()
         if publisher:
             if self._on_change is not None and self._on_change in publisher.on_change:
@@ -140,7 +143,7 @@ class InboundTopic:
             await publisher.close()
 
     def _prepare(self, md5sum: str, writer: str) -> None:
-        # A topic has one type: the first writer's, unless the type is already known here.
+        # A topic has one type: that of the first writer, unless the type is already known here.
         if self._md5sum or self.token.md5sum not in (UNKNOWN_MD5, md5sum):
             return
         self._md5sum = md5sum
@@ -151,7 +154,7 @@ class InboundTopic:
         if self._strips_frames:
             self._rewriter = await self._definitions.rewriter(self.token.type, md5sum)
         if self._is_closed:
-            return  # closed during the query for the definition
+            return  # the topic was closed during the query for the definition
         is_latched = any(offer.is_latched for offer in self._offers)
 
         try:
@@ -172,8 +175,8 @@ class InboundTopic:
             )
         self._publisher = publisher
         await publisher.wait_for_expected()
-        # Publish buffered messages first: until then the receiver's thread passes new ones to `keep`, which runs on
-        # this loop.
+        # Publish buffered messages first: until then the receiver's thread passes new messages to `keep`, which runs
+        # on this loop.
         for body in self._held:
             self._put(publisher, body)
         self._held.clear()

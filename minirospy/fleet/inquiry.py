@@ -1,4 +1,4 @@
-"""Queries to the fleet from a command, without a master: the robots, their status, a robot's parameters."""
+"""Query the fleet from a command, without a master: for its robots, their status, and their parameters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAX_CONCURRENT = 16
 
 
 def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitable[_T]]) -> _T:
-    """Open a session, run ``question`` and return its result. Raise BridgeError if no part of the fleet is reached."""
+    """Open a session, run ``question`` and return its result. Raise BridgeError if no gateway or router is reached."""
 
     async def asking() -> _T:
         network = await FleetNetwork.open(options, waits=False)
@@ -41,7 +41,7 @@ def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitabl
 
 
 async def fleet_status(network: FleetNetwork, seconds: float) -> tuple[list[Answer], list[Answer]]:
-    """Return the robots and control rooms that are present; each has ``seconds`` to answer."""
+    """Return the robots and control rooms that are present; each gateway has ``seconds`` to reply."""
     robots = await _claims(network, "robot", seconds)
     controls = await _claims(network, "control", seconds)
     limit = asyncio.Semaphore(_MAX_CONCURRENT)
@@ -59,7 +59,7 @@ async def fleet_status(network: FleetNetwork, seconds: float) -> tuple[list[Answ
 
 
 async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds: float) -> object:
-    """Return a robot's parameter, or the dict of a namespace. Raise BridgeError."""
+    """Return a robot's parameter, or the dict of a namespace. Raise BridgeError if the robot does not provide it."""
     claim = await _shown_claim(network, robot, seconds)
     if claim is None:
         raise BridgeError(
@@ -78,12 +78,15 @@ async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds:
 
 
 async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Claim | None:
-    """Return the claim to a name; of several, the one that the control rooms show. Raise BridgeError if they disagree."""
+    """Return the claim to a name.
+
+    If there are several, return the one that the control rooms show; raise BridgeError if they disagree.
+    """
     claims = [each for each in await _claims(network, "robot", seconds) if each.name == robot]
     if len(claims) > 1:
         _, controls = await fleet_status(network, seconds)
         shown = [claim for claim in claims if is_shown(claim, controls)]
-        # Use the newest claim of each machine: the token of its previous gateway may still exist.
+        # Use each machine's newest claim, because the token of the machine's previous gateway may still exist.
         claims = (
             [max(shown, key=lambda claim: claim.start)] if len({each.host for each in shown}) == 1 else shown
         )

@@ -16,8 +16,8 @@ Below the root, which other programs' wildcards do not match, each key names the
     param/NAME/GATEWAY                            query: name -> value of a parameter
     ping/GATEWAY, status/GATEWAY                  query: the gateway's clock; its counters
 
-Tokens are Zenoh's liveliness tokens: they end with the session that declared them. Slashes in names and types are written as
-``%``. Keys of any other form are ignored: parsers return None.
+Tokens are Zenoh's liveliness tokens: they disappear with the session that declared them. Slashes in names and types are
+written as ``%``. Keys in any other format are ignored: parsers return None for them.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ __all__ = [
 ]
 
 ROOT = "@minirospy/1"
-"""The first chunk starts with ``@``, so ``**`` does not match it. The second is the version of this key scheme."""
+"""The first chunk starts with ``@``, so that ``**`` does not match it. The second is the version of this key scheme."""
 
 UNKNOWN_MD5 = "-"
 """The md5sum of a topic without publishers whose type is not installed."""
@@ -94,7 +94,7 @@ class Claim(NamedTuple):
 
 
 class TopicToken(NamedTuple):
-    """A topic of a robot. ``has_frames``: its frame ids have the robot's prefix."""
+    """A robot's topic. ``has_frames``: its frame ids get the robot's prefix."""
 
     robot: str
     gateway: str
@@ -113,7 +113,7 @@ class TopicToken(NamedTuple):
 
 
 class ServiceToken(NamedTuple):
-    """A service of a robot."""
+    """A robot's service."""
 
     robot: str
     gateway: str
@@ -123,14 +123,14 @@ class ServiceToken(NamedTuple):
 
 
 class Want(NamedTuple):
-    """A reader that has subscribers to a topic."""
+    """A request from a reader that has subscribers to a topic."""
 
     topic: str
     reader: str
 
 
 class Offer(NamedTuple):
-    """A writer that has publishers of a topic to which the robot subscribes."""
+    """An offer from a writer that has publishers on a topic to which the robot subscribes."""
 
     topic: str
     writer: str
@@ -140,7 +140,7 @@ class Offer(NamedTuple):
 
 
 class Stamp(NamedTuple):
-    """A message's attachment: its number on its topic, and the time when it was sent, in ns of the sender's clock."""
+    """A message's attachment: its sequence number on the topic, and its send time in ns of the sender's clock."""
 
     number: int
     nanoseconds: int
@@ -167,7 +167,7 @@ def mangled(name: str) -> str:
 
 
 def unmangled(chunk: str) -> str | None:
-    """Return a chunk's global graph resource name; None if it is not legal."""
+    """Return a chunk's global graph resource name, or None if the chunk is not legal."""
     name = chunk.replace("%", "/")
     return name if is_global_name(name) else None
 
@@ -187,7 +187,7 @@ def is_global_name(name: str) -> bool:
 
 
 def claim_key(claim: Claim, kind: str = "robot") -> str:
-    """Return the key of a robot's or, with ``kind`` "control", a control room's token; a control room's name may be ``-``."""
+    """Return the key of the token of a robot or, with ``kind`` "control", of a control room, whose name may be ``-``."""
     return f"{ROOT}/{kind}/{claim.name}/{claim.gateway}/{claim.start:x}/{claim.host}"
 
 
@@ -300,22 +300,22 @@ def parse_offer(key: str) -> Offer | None:
 
 
 def out_key(robot: str, gateway: str, md5sum: str, topic: str) -> str:
-    """Return the key of a robot's outgoing messages."""
+    """Return the key for a robot's outgoing messages."""
     return f"{ROOT}/out/{robot}/{gateway}/{md5sum}/{mangled(topic)}"
 
 
 def replay_key(robot: str, gateway: str, md5sum: str, topic: str, reader: str) -> str:
-    """Return the key of a topic's latched messages for one reader."""
+    """Return the key for a topic's latched messages to one reader."""
     return f"{ROOT}/replay/{robot}/{gateway}/{md5sum}/{mangled(topic)}/{reader}"
 
 
 def in_key(robot: str, gateway: str, md5sum: str, topic: str, writer: str) -> str:
-    """Return the key of a writer's messages to a robot."""
+    """Return the key for a writer's messages to a robot."""
     return f"{ROOT}/in/{robot}/{gateway}/{md5sum}/{mangled(topic)}/{writer}"
 
 
 def parse_in(key: str) -> tuple[str, str, str] | None:
-    """Parse the key of a message to a robot; return the topic, the md5sum and the writer."""
+    """Parse the key of a message to a robot; return its topic, md5sum and writer."""
     match _chunks(key, "in"):
         case [_, _, md5sum, topic, writer]:
             name = unmangled(topic)
@@ -325,12 +325,12 @@ def parse_in(key: str) -> tuple[str, str, str] | None:
 
 
 def call_key(robot: str, gateway: str, service: str, md5sum: str) -> str:
-    """Return the key of a service's calls."""
+    """Return the key for calls to a service."""
     return f"{ROOT}/call/{robot}/{gateway}/{mangled(service)}/{md5sum}"
 
 
 def parse_call(key: str) -> tuple[str, str] | None:
-    """Parse the key of a service call; return the service and the md5sum."""
+    """Parse the key of a service call; return its service and md5sum."""
     match _chunks(key, "call"):
         case [_, _, service, md5sum]:
             name = unmangled(service)
@@ -340,12 +340,12 @@ def parse_call(key: str) -> tuple[str, str] | None:
 
 
 def definition_key(gateway: str, type_: str, md5sum: str) -> str:
-    """Return the key of a type's full definition."""
+    """Return the key for queries for a type's full definition."""
     return f"{ROOT}/definition/{gateway}/{mangled(type_)}/{md5sum}"
 
 
 def parse_definition(key: str) -> tuple[str, str] | None:
-    """Parse the key of a query for a full definition; return the type and the md5sum."""
+    """Parse the key of a query for a full definition; return its type and md5sum."""
     match _chunks(key, "definition"):
         case [_, type_, md5sum]:
             if _is_type(type_, md5sum) and md5sum != UNKNOWN_MD5:
@@ -364,7 +364,7 @@ def parse_stamp(data: bytes) -> Stamp | None:
 
 
 def _chunks(key: str, kind: str) -> list[str]:
-    """Return the chunks of a key after its kind; an empty list if the key is of another kind."""
+    """Return the chunks of a key that follow its kind; an empty list if the key has another kind."""
     start = f"{ROOT}/{kind}/"
     return key[len(start) :].split("/") if key.startswith(start) else []
 

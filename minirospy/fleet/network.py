@@ -1,7 +1,8 @@
 """The only module that calls Zenoh: a gateway's session, its tokens, messages and queries.
 
-Zenoh calls back in its own threads. This module calls its handlers on the event loop, except for messages, which go to a queue
-first. Zenoh's calls may block, so all of them run in one thread, in order, or in the thread of a priority (:mod:`sender`).
+Zenoh calls back in its own threads. This module calls its handlers on the event loop, except for messages, which are
+queued first. Calls to Zenoh may block, so all of them run in order in one thread, or in the thread for a priority
+(:mod:`sender`).
 """
 
 from __future__ import annotations
@@ -59,15 +60,15 @@ __all__ = [
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
-MAX_TEXT = 16 << 20  # bytes read of a query or a reply: a service's response or a definition
-MAX_REPLIES = 10_000  # to one query: peers choose the number; a fleet has at most 5,000 gateways
-EARLY_SHARE = 0.9  # of the timeout: a query without answers that ends before this has lost its link
+MAX_TEXT = 16 << 20  # bytes read from a query or a reply: a service's response or a definition
+MAX_REPLIES = 10_000  # accepted for one query: peers choose the number; a fleet has at most 5,000 gateways
+EARLY_SHARE = 0.9  # of the timeout: a query that ends before this without replies has lost its link
 _RETRY_SECONDS = 1.0
 _LINGER_SECONDS = 2.0
 _QUERIES = 200
-"""Service calls and parameter queries answered concurrently; further ones are refused."""
+"""Service calls and parameter queries handled concurrently; further ones are refused."""
 _CONTROL_QUERIES = 50
-"""Pings, status and definition queries answered concurrently; separate, so that blocked calls do not delay them."""
+"""Concurrently handled pings and queries for status or definitions; their separate limit prevents delays by blocked calls."""
 
 
 # --- the network
@@ -82,7 +83,7 @@ async def _remove_linger() -> None:
 
 
 class QueryFailed(MinirospyError):
-    """A query got no answer, or an error as its answer."""
+    """A query received no reply, or an error as its reply."""
 
 
 class FleetNetwork:
@@ -94,7 +95,7 @@ class FleetNetwork:
         self._session = session
         self._loop = loop
         self._zenoh = importlib.import_module("zenoh")
-        # One thread keeps the order: peers see declarations in the order in which they were made.
+        # One thread preserves the order: peers see declarations in the order in which they were made.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
         self._calls = _Share(_QUERIES)
@@ -140,13 +141,13 @@ class FleetNetwork:
 
     @property
     def peers(self) -> int:
-        """Return the number of connected routers and gateways."""
+        """Return the number of connected peers, that is, routers and gateways."""
         if self._is_closed:
             return 0
         return len(self._session.info.routers_zid()) + len(self._session.info.peers_zid())
 
     async def close(self) -> None:
-        """Close the session with all its declarations. Idempotent."""
+        """Close the session and all its declarations. Idempotent."""
         if self._is_closed:
             return
         self._is_closed = True
@@ -154,7 +155,7 @@ class FleetNetwork:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # If the link is broken, undeclaring fails; the peer notices the loss by itself.
+        # If the link is broken, undeclaring fails; the peer detects the loss itself.
         with contextlib.suppress(self._zenoh.ZError):
             await self._loop.run_in_executor(self._caller, self._session.close)
         self._caller.shutdown(wait=False)
@@ -166,7 +167,7 @@ class FleetNetwork:
         return self._declare(lambda: self._session.liveliness().declare_token(key))
 
     def watch_tokens(self, pattern: str, changed: Callable[[str, bool], object]) -> Deferred:
-        """Call ``changed(key, is_there)`` for each existing token, and whenever one appears or disappears."""
+        """Call ``changed(key, is_there)`` for each existing token, and whenever a token appears or disappears."""
         put = self._zenoh.SampleKind.PUT
 
         def arrived(sample: Sample) -> None:
@@ -179,7 +180,7 @@ class FleetNetwork:
         )
 
     async def tokens(self, pattern: str, seconds: float) -> list[str]:
-        """Return the keys of the existing tokens."""
+        """Return the keys of the existing tokens, waiting at most ``seconds`` for them."""
         found: list[str] = []
 
         def arrived(reply: Reply) -> bool:
@@ -197,7 +198,7 @@ class FleetNetwork:
     def subscribe(
         self, key: str, deliver: Callable[[str, bytes, bytes], object], *, from_others: bool = False
     ) -> Deferred:
-        """Call ``deliver(key, message, attachment)`` for each message, in a thread of Zenoh's: it must not block.
+        """Call ``deliver(key, message, attachment)`` for each message, in one of Zenoh's threads; ``deliver`` must not block.
 
         ``from_others``: ignore messages from this session.
         """
@@ -231,7 +232,7 @@ class FleetNetwork:
         return self._declare(declare)
 
     def beacon(self, key: str) -> Beacon:
-        """Return a publisher of empty messages to other sessions, with the lowest priority."""
+        """Return a lowest-priority publisher of empty messages to other sessions."""
         zenoh = self._zenoh
         return Beacon(
             self._caller,
@@ -250,11 +251,14 @@ class FleetNetwork:
         return {"allowed_destination": self._zenoh.Locality.REMOTE}
 
     def outlet_to_others(self, key: str, priority: Priority) -> Outlet:
-        """Return a publisher as :meth:`outlet` does, whose messages do not reach this session itself."""
+        """Return a publisher like :meth:`outlet`, except that this session itself does not receive its messages."""
         return self.outlet(key, priority, **self._to_others)
 
     def outlet(self, key: str, priority: Priority, **options: object) -> Outlet:
-        """Return a publisher with Zenoh's ``options``. This and its ``put`` may block: call them in a priority's thread."""
+        """Return a publisher with Zenoh's ``options``.
+
+        This method and the publisher's ``put`` may block: call both in a priority's thread.
+        """
         zenoh = self._zenoh
         priorities = {
             Priority.TELEOP: zenoh.Priority.INTERACTIVE_HIGH,
@@ -279,14 +283,14 @@ class FleetNetwork:
         is_control: bool = False,
         from_others: bool = False,
     ) -> Deferred:
-        """Answer queries: ``handler(key, request)`` returns the answer, or raises MinirospyError with the reason.
+        """Answer queries: ``handler(key, request)`` returns the reply, or raises MinirospyError with the reason for a refusal.
 
-        ``is_control``: the queries are the fleet's own, whose handler never waits for user nodes.
-        ``from_others``: ignore queries from this session.
+        ``is_control``: these are the fleet's own queries, and the handler never waits for user nodes. ``from_others``:
+        ignore queries from this session.
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
-        # A query whose key has wildcards is answered under the key of each answerer.
+        # Each peer replies to a query with wildcards under its own key.
         key = "" if "*" in pattern else pattern
 
         def arrived(query: Query) -> None:
@@ -299,9 +303,9 @@ class FleetNetwork:
     async def query(
         self, key: str, request: bytes = b"", *, seconds: float, of_others: bool = False
     ) -> bytes:
-        """Return the first answer. Raise QueryFailed if there is none, or the answer is an error.
+        """Return the first reply. Raise QueryFailed if there is none, or the reply is an error.
 
-        ``of_others``: query only other sessions, the best match if there are several.
+        ``of_others``: query only other sessions; if several match, the best match.
         """
         options = {"target": self._zenoh.QueryTarget.BEST_MATCHING, **self._to_others} if of_others else {}
         started = self._loop.time()
@@ -326,9 +330,9 @@ class FleetNetwork:
         size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return the answers by key, at most ``most`` of at most ``size`` bytes; Zenoh's ``options`` override defaults.
+        """Return the replies by key, at most ``most``, each of at most ``size`` bytes; Zenoh's ``options`` override defaults.
 
-        Return as soon as ``most`` answers have arrived; do not wait for others.
+        Return as soon as ``most`` replies have arrived, without waiting for more.
         """
         found: dict[str, bytes | QueryFailed] = {}
 
@@ -357,7 +361,7 @@ class FleetNetwork:
                 timeout=seconds,
                 **{
                     "target": zenoh.QueryTarget.ALL,
-                    # By default Zenoh withholds all answers until the last one has arrived, or the timeout.
+                    # By default Zenoh withholds all replies until the last one has arrived or the timeout has passed.
                     "consolidation": zenoh.ConsolidationMode.NONE,
                     "priority": zenoh.Priority.DATA_HIGH,
                     "congestion_control": zenoh.CongestionControl.BLOCK,
@@ -391,13 +395,13 @@ class FleetNetwork:
         return Deferred(self._caller, declare, self._zenoh.ZError)
 
     def _direct(self, function: Callable[..., object]) -> object:
-        """Return a handler that Zenoh calls in its own thread; by default Zenoh starts a thread for each handler."""
+        """Return a handler that Zenoh calls in Zenoh's own thread; by default Zenoh starts a thread for each handler."""
         return self._zenoh.handlers.Callback(function, indirect=False)
 
     def _start_answer(
         self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share, key: str = ""
     ) -> None:
-        # Check the limit here: in a burst, all tasks are created before the first of them runs.
+        # Check the limit here, because in a burst all tasks are created before the first of them runs.
         is_full = len(share.tasks) >= share.limit
         refusal = f"the gateway is answering {share.limit} other queries" if is_full else ""
         task = asyncio.ensure_future(self._answer(query, handler, key, refusal))
@@ -444,14 +448,14 @@ class FleetNetwork:
 
 @dataclass(eq=False)
 class _Share:
-    """The concurrently answered queries of one kind, and their limit."""
+    """Tracks the concurrently handled queries of one kind, and their limit."""
 
     limit: int
     tasks: set[asyncio.Task[None]] = field(default_factory=set)
 
 
 class Deferred:
-    """A Zenoh declaration that is made, and later undeclared, in the background."""
+    """A Zenoh declaration that is declared, and later undeclared, in the background."""
 
     def __init__(
         self, caller: concurrent.futures.Executor, declare: Callable[[], Declared], fault: type[Exception]

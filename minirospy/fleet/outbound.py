@@ -1,4 +1,4 @@
-"""A robot's topic that has readers in the fleet: subscribed to here, sent to the fleet."""
+"""Subscribes to a robot's topic that has readers in the fleet, and sends its messages to the fleet."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MAX_LATCHED = 100
 
 
 class OutboundTopic:
-    """Sends a topic's messages to the fleet, and its latched messages again to each later reader."""
+    """Sends a topic's messages to the fleet, and its latched messages again to each reader that arrives later."""
 
     def __init__(
         self,
@@ -38,7 +38,7 @@ class OutboundTopic:
         key: str = "",
         is_left_out: Callable[[Header], bool] = lambda _: False,
     ) -> None:
-        """``key``: the key of its messages, "" for the fleet's own; with a key the topic may have no publisher yet.
+        """``key``: the key for the messages, "" for the fleet's own key; with a key, the topic may have no publisher yet.
 
         ``is_left_out(header)`` returns whether to ignore a publisher's messages.
         """
@@ -67,7 +67,7 @@ class OutboundTopic:
         self.outflow.close()
 
     def replay(self, key: str) -> None:
-        """Send the latched messages again, under the key of a later reader."""
+        """Send the latched messages again, under the key of a reader that arrived later."""
         self._forget_disconnected()
         for body in self._latched.values():
             self.outflow.send(key, body, always=True)

@@ -1,8 +1,8 @@
-"""Find gateways that no longer answer: the Zenoh tokens of robots that are lost together may remain for minutes.
+"""Find gateways that no longer respond, because the Zenoh tokens of robots that are lost together may remain for minutes.
 
-All gateways are queried at regular intervals, and shortly after a robot has left. A gateway that has answered before, and then
-misses two queries, is lost until it answers again. One that has never answered, for example because its access rights forbid
-it, is never considered lost. Runs on the node's loop.
+All gateways are queried at regular intervals, and shortly after a robot has left. A gateway that has responded before and
+then misses two queries is lost until it responds again. A gateway that has never responded, for example because its
+access rights forbid it, is never considered lost. Runs on the node's loop.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from collections.abc import Awaitable, Callable, Collection
 __all__ = ["Presence"]
 
 _REGULAR_SECONDS, _LOST_SECONDS = 60.0, 10.0
-"""Interval between checks, and the shorter one while a gateway is lost, because it may have come back."""
+"""Interval between checks, and the shorter interval while a gateway is lost, because it may have returned."""
 _SETTLE_SECONDS = 2.0
-"""Wait after a robot has left: robots that are lost together disappear one by one."""
+"""Delay after a robot has left, because robots that are lost together disappear one by one."""
 _ROUNDS, _ROUND_SECONDS = 2, 5.0
 
 
 class Presence:
-    """Tracks the gateways that do not answer."""
+    """Tracks the gateways that do not respond."""
 
     def __init__(
         self,
@@ -28,10 +28,10 @@ class Presence:
         gateways: Callable[[], Collection[str]],
         changed: Callable[[], object],
     ) -> None:
-        """``query()`` queries all gateways and returns those that answered in time, None if it could not be sent.
+        """``query()`` queries all gateways and returns those that responded in time, or None if it could not be sent.
 
-        ``gateways()`` returns those that have tokens.
-        ``changed()`` is called when a gateway is lost or has come back.
+        ``gateways()`` returns the gateways that have tokens. ``changed()`` is called when a gateway is lost or has
+        returned.
         """
         self.lost: frozenset[str] = frozenset()
         self._query = query
@@ -41,7 +41,7 @@ class Presence:
         self._soon = asyncio.Event()
 
     def answered(self, gateway: str) -> None:
-        """Record that a gateway has answered."""
+        """Record that a gateway has responded."""
         self._answered.add(gateway)
 
     def check_soon(self) -> None:

@@ -1,4 +1,4 @@
-"""Format the output of `minirospy fleet status` from the gateways' answers. Pure; answers are untrusted and checked."""
+"""Format the output of `minirospy fleet status` from the gateways' replies. Pure; replies are untrusted and checked."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_LEVELS = 50
 
 @dataclass(frozen=True)
 class Answer:
-    """A gateway that is present: its claim, its answer ({} if none), and its clock."""
+    """A gateway that is present: its claim, its reply ({} if there is none), and its clock."""
 
     claim: Claim
     status: Json
@@ -35,14 +35,14 @@ def parse_answer(data: bytes) -> Json:
 
 
 def is_shallow(value: object, levels: int = MAX_LEVELS) -> bool:
-    """Return whether a JSON value is nested at most ``levels`` deep: the JSON encoder recurses."""
+    """Return whether a JSON value is nested at most ``levels`` deep, because the JSON encoder recurses."""
     if isinstance(value, dict):
         value = list(value.values())
     return not isinstance(value, list) or (levels > 0 and all(is_shallow(each, levels - 1) for each in value))
 
 
 def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
-    """Return the human-readable lines: robots, then control rooms with what each receives."""
+    """Return the human-readable lines: robots, then control rooms with the robots that each receives."""
     robots, controls = list(robots), list(controls)
     found = [
         f"{_count(len({each.claim.name for each in robots}), 'robot')}, {_count(len(controls), 'control room')}"
@@ -55,7 +55,7 @@ def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
 
 
 def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
-    """Return the same data as JSON."""
+    """Return the same data as JSON text."""
 
     def described(answer: Answer, shown: bool) -> dict[str, object]:
         clock = answer.clock

@@ -26,11 +26,11 @@ __all__ = ["RobotGraph"]
 _log = logging.getLogger(__name__)
 _MIN_REFRESH_INTERVAL, _MAX_REFRESH_INTERVAL = 0.25, 2.0
 _QUERY_SECONDS = 3.0
-"""Timeout, after which the graph is announced without the types that are still unknown."""
+"""Timeout after which the graph is announced without the types that are still unknown."""
 
 
 class RobotGraph:
-    """The part of its master's graph that a gateway announces. Runs on the node's loop."""
+    """The part of the master's graph that a gateway announces. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -63,7 +63,10 @@ class RobotGraph:
         await self._services.close()
 
     async def look(self) -> bool:
-        """Read the current graph; return whether it has changed. Raise MasterUnreachableError or RpcError."""
+        """Read the current graph; return whether it has changed.
+
+        Raise MasterUnreachableError or RpcError if the master's call fails.
+        """
         snapshot = await fetch(self._node.call_master)
         hidden, own = self._hidden(), {self._node.name}
         if self._gateways:
@@ -139,7 +142,7 @@ class RobotGraph:
         )
 
     async def _publisher(self, key: tuple[str, str]) -> Header:
-        """Query a publisher for its type, and whether it latches."""
+        """Query a publisher for the topic's type, and whether the publisher latches."""
         header = await self._definitions.texts.header_of(*key)
         self._definitions.learn(
             header.get("type", ""), header.get("md5sum", ""), header.get("message_definition", "")

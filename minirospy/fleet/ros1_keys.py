@@ -5,12 +5,10 @@ Written from the source of that bridge (github.com/eclipse-zenoh/zenoh-plugin-ro
     HEX/MD5/NAMESPACE/NAME                               messages of a topic; queries of a service
     ros1_discovery_info/*/KIND/HEX/MD5/NAMESPACE/NAME    a beacon: some bridge has such a resource
 
-HEX is the type name, as two hexadecimal digits per byte; NAME has no leading slash; NAMESPACE is ``*``, which matches every
-other, unless bridges are kept apart. KIND is pub, sub or srv; cl is for clients of services, which no bridge announces. A
-beacon
-is empty, and is put every second. While a bridge receives its own key from another, it may stop its own beacons: a beacon
-shows
-that some bridge has the resource, but not which one, nor how many.
+HEX is the type name, as two hexadecimal digits per byte; NAME has no leading slash; NAMESPACE is ``*``, which matches
+every other namespace, unless bridges are separated. KIND is pub, sub or srv; cl would be a service client, which no
+bridge announces. A beacon is empty, and is put every second. A bridge may stop its own beacons while it receives the same
+key from another bridge: a beacon shows that some bridge has the resource, but not which one, nor how many.
 """
 
 from __future__ import annotations
@@ -43,8 +41,9 @@ __all__ = [
 EVERY_NAMESPACE = "*"
 PERIOD = 1.0  # seconds between beacons of a resource
 LOST_SECONDS = 5.0
-"""Seconds without a beacon after which a resource is lost. When a bridge exits, another one that was silent needs up to three
-periods to resume. The bridge itself takes 3 to 6 s.
+"""Seconds without a beacon after which a resource is lost.
+
+When a bridge exits, a silent bridge needs up to three periods to resume its beacons. The bridge itself takes 3 to 6 s.
 """
 MAX_RESOURCES = 9_000
 """Remote resources to track: the master accepts at most 10,000 names per node."""
@@ -68,7 +67,10 @@ class Resource(NamedTuple):
 
 
 class SharedTopic(NamedTuple):
-    """A topic with one type. ``token``: its local use. ``is_offered``: others publish it; ``is_wanted``: others subscribe."""
+    """A topic with one type. ``token``: its local use.
+
+    ``is_offered``, ``is_wanted``: other bridges publish it, or subscribe to it.
+    """
 
     token: TopicToken
     is_offered: bool = False
@@ -82,9 +84,9 @@ class SharedTopic(NamedTuple):
 def shared_topics(
     local: Mapping[str, TopicToken], remote: Iterable[Resource]
 ) -> tuple[dict[str, SharedTopic], dict[str, str]]:
-    """Return the local and remote topics by name, and the reasons why remote ones of another type are ignored, by name.
+    """Return the local and remote topics by name, and the reasons for ignoring remote topics of another type, by name.
 
-    The local type wins; of several types that exist only remotely, the first.
+    The local type takes precedence; if there are only remote types, the first one does.
     """
     found = {name: SharedTopic(token) for name, token in local.items() if token.md5sum != UNKNOWN_MD5}
     conflicts = {}
@@ -103,7 +105,7 @@ def shared_topics(
 
 
 def parse_namespace(text: str) -> str:
-    """Return a namespace for keys. Raise BridgeError if it is not a single chunk."""
+    """Return a namespace for keys. Raise BridgeError if ``text`` is not a single chunk."""
     if text != EVERY_NAMESPACE and not _NAMESPACE.fullmatch(text):
         raise BridgeError(
             f"--ros1-keys {text}: is not a namespace of zenoh-bridge-ros1, as * or robot1: letters, digits, _ . and -"
@@ -123,12 +125,15 @@ def beacon_key(resource: Resource, namespace: str) -> str:
 
 
 def beacon_pattern(namespace: str) -> str:
-    """Return the key expression of the beacons that bridges of a namespace receive."""
+    """Return the key expression that matches the beacons for bridges in a namespace."""
     return f"{_ROOT}/*/*/*/*/{namespace}/*/**"
 
 
 def parse_beacon(key: str) -> Resource | None:
-    """Return a beacon's resource; None if it has no type, as for a subscriber to any type. Raise BridgeError if it is invalid."""
+    """Return a beacon's resource, or None if the beacon has no type, as for a subscriber to any type.
+
+    Raise BridgeError if it is invalid.
+    """
     if len(key) > _MAX_KEY:
         raise BridgeError(f"its key has {len(key)} characters")
     chunks = key.split("/", 6)
@@ -160,7 +165,7 @@ class _Beacon:
 
 
 class Beacons:
-    """Schedules the beacons of local resources: one per period, but none while others send the same beacon."""
+    """Schedules the beacons of local resources: one per period, but none while other bridges send the same beacon."""
 
     def __init__(self, random: Callable[[], float]) -> None:
         """``random()`` returns a number in [0, 1)."""
@@ -190,7 +195,7 @@ class Beacons:
             is_received, beacon.is_received = beacon.is_received, False
             beacon.due = now + PERIOD
             if is_received:
-                # Stop at random, so that about half of the bridges that put this beacon continue.
+                # Stop at random, so that about half of the bridges that send this beacon continue.
                 beacon.is_silent = beacon.is_silent or self._random() < 0.5
                 beacon.is_resuming = False
             elif beacon.is_silent and not beacon.is_resuming:
@@ -214,7 +219,7 @@ class Sightings:
         return iter(self._seen)
 
     def received(self, resource: Resource, now: float) -> bool:
-        """Record a beacon; return whether the resource is new. Raise BridgeError if there are too many."""
+        """Record a beacon; return whether its resource is new. Raise BridgeError if there are too many resources."""
         is_new = resource not in self._seen
         if is_new and len(self._seen) >= MAX_RESOURCES:
             raise BridgeError(f"there are more than {MAX_RESOURCES} topics and services")

@@ -61,7 +61,10 @@ _MAX_ERROR = 2_000
 
 
 class Ros1Side:
-    """Passes topics and services between a master and these keys. Runs on the node's loop, except for messages and beacons."""
+    """Passes topics and services between a master and these keys.
+
+    Runs on the node's loop, except for message and beacon handling.
+    """
 
     def __init__(
         self,
@@ -76,7 +79,7 @@ class Ros1Side:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """``hidden``: names of robots whose topics are imported here. ``namespace``: the namespace of the keys."""
+        """``hidden``: names of robots whose topics are imported here. ``namespace``: the keys' namespace."""
         # /rosout_agg repeats /rosout: if both were passed, each line would return to the master that logged it.
         if rules.topics == NameFilter():
             rules = replace(rules, topics=NameFilter.of(deny=[_AGGREGATE]))
@@ -109,7 +112,11 @@ class Ros1Side:
         self._tasks: list[asyncio.Task[None]] = []
 
     async def start(self) -> None:
-        """Pass topics and services until :meth:`close`. Raise BridgeError, MasterUnreachableError or RpcError."""
+        """Pass topics and services until :meth:`close`.
+
+        Raise BridgeError if another node on this master passes these keys already, or MasterUnreachableError or RpcError
+        if a call to the master fails.
+        """
         self._marker = await self._node.subscribe_raw(_MARKER, lambda *_: None, type_=_MARKER_TYPE)
         await self.graph.look()
         if self._others:
@@ -147,7 +154,10 @@ class Ros1Side:
             await marker.close()
 
     async def look(self) -> bool:
-        """Announce the current graph; return whether it has changed. Raise MasterUnreachableError or RpcError."""
+        """Announce the current graph; return whether it has changed.
+
+        Raise MasterUnreachableError or RpcError if the master's call fails.
+        """
         changed = await self.graph.look()
         # Open topics and services before announcing them: a bridge calls and sends as soon as it receives a beacon.
         await self._adjust()
@@ -155,7 +165,7 @@ class Ros1Side:
         return changed
 
     def status(self) -> dict[str, object]:
-        """Return counters and resources, for JSON."""
+        """Return counters and resources as JSON values."""
         with self._lock:
             seen, announced = len(list(self._sightings)), len(self._beacons)
         return {
@@ -183,7 +193,7 @@ class Ros1Side:
     # --- what is here
 
     def _gateways(self, snapshot: Snapshot) -> set[str]:
-        """Return this master's other gateways for these keys: what they publish and subscribe to is not announced again."""
+        """Return this master's other gateways for these keys: their publications and subscriptions are not announced again."""
         ends = (snapshot.publishers, snapshot.subscribers, snapshot.services)
         bridges = {
             node for table in ends for nodes in table.values() for node in nodes if node.startswith(_BRIDGE)
@@ -218,7 +228,7 @@ class Ros1Side:
             self._beacons.update(keys, time.monotonic())
 
     async def _beat(self) -> None:
-        """Put the beacons that are due, and update from the beacons of others."""
+        """Send the beacons that are due, and update the topics and services from received beacons."""
         expected = time.monotonic()
         while True:
             now = time.monotonic()
@@ -226,7 +236,7 @@ class Ros1Side:
             with self._lock:
                 due = self._beacons.due(now)
                 if late > PERIOD:
-                    # The process was paused: the beacons of that time have not been delivered yet.
+                    # The process was paused, and the beacons from that time have not been delivered yet.
                     self._sightings.extend(late, now)
                 has_news = self._sightings.forget_lost(now) or self._has_news
             for key in due:
@@ -238,7 +248,7 @@ class Ros1Side:
     # --- what others have
 
     def _beacon_arrived(self, key: str, _: bytes, __: bytes) -> None:
-        """Record a beacon. Runs in a thread of Zenoh's."""
+        """Record a beacon. Runs in one of Zenoh's threads."""
         try:
             resource = parse_beacon(key)
             with self._lock:
@@ -313,9 +323,9 @@ class Ros1Side:
 
 
 def _error_in(resource: Resource, answer: bytes) -> str:
-    """Return the error text of a call's answer, "" for a response. The bridge sends either, and does not mark which.
+    """Return the error message in a reply to a call, or "" for a response. The bridge sends either, without marking which.
 
-    If the type is installed here, an answer is an error if it is text and is not exactly one serialized response.
+    If the type is installed here, a reply is an error if it is text and is not exactly one serialized response.
     """
     from minirospy.core.idl.load import get_service_class
 

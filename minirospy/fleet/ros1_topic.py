@@ -1,4 +1,4 @@
-"""A topic between the local graph and bridges that speak zenoh-bridge-ros1's keys, both ways."""
+"""A topic that is passed, in both directions, between the local graph and bridges that use zenoh-bridge-ros1's keys."""
 
 from __future__ import annotations
 
@@ -23,10 +23,13 @@ if TYPE_CHECKING:
 __all__ = ["MARK", "Ros1Topic", "Shared"]
 
 MARK = "ros1_keys"
-"""A connection header field of publishers that a gateway creates for these keys; no gateway passes them back to the keys."""
+"""A connection header field of publishers that a gateway creates for these keys.
+
+No gateway passes these publishers' messages back to the keys.
+"""
 
 _REPLAY_SECONDS = 0.5
-"""Delay from a subscriber's first beacon to its latched messages: its bridge may subscribe to the key after the beacon."""
+"""Delay from a subscriber's first beacon to the latched messages: its bridge may subscribe only after the beacon."""
 _WRITER = ""
 
 
@@ -45,7 +48,7 @@ class Shared:
 
 
 class Ros1Topic:
-    """One topic with one type. Runs on the loop, except for messages."""
+    """One topic with one type. Runs on the loop, except for message handling."""
 
     def __init__(self, shared: Shared, topic: SharedTopic) -> None:
         self.token = topic.token
@@ -102,11 +105,11 @@ class Ros1Topic:
         return self._topic.is_wanted or (self.token.is_published and self._is_matched)
 
     def _adjust(self) -> None:
-        """Open what is needed now, and close what can be closed without an await."""
+        """Open the handles that are needed now, and close those that can be closed without an await."""
         if self._is_closed:
             return
         shared, token = self._shared, self.token
-        # Let Zenoh report readers: a silent bridge sends no beacons, and other programs never do.
+        # Let Zenoh report readers, because a silent bridge sends no beacons, and other programs never do.
         if token.is_published and self._matching is None:
             self._matching = shared.network.watch_matching(self._key, self._matching_changed)
         elif not token.is_published and self._matching:
@@ -160,7 +163,7 @@ class Ros1Topic:
         return self.inbound
 
     def _arrived(self, _: str, message: bytes, __: bytes) -> None:
-        """Queue a message. Runs in a thread of Zenoh's."""
+        """Queue a message. Runs in one of Zenoh's threads."""
         self._shared.receiver.add(self._flow, self._deliver, message, b"")
 
     def _deliver(self, message: bytes, _: bytes) -> None:

@@ -1,4 +1,4 @@
-"""A router of the fleet: a Zenoh session that forwards traffic until Ctrl-C or SIGTERM."""
+"""A fleet router: a Zenoh session that forwards traffic until Ctrl-C or SIGTERM."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ _TICK_SECONDS = 0.5
 
 
 def run_router(options: NetworkOptions, report: Callable[[str], object]) -> int:
-    """Run a router and return its exit status; call ``report`` with the line that names its endpoints. Raise BridgeError."""
+    """Run a router and return its exit status; call ``report`` with the line that names its endpoints.
+
+    Raise BridgeError if it cannot listen.
+    """
     loop = new_event_loop()
     try:
         return loop.run_until_complete(_run(options, report))
@@ -36,7 +39,7 @@ async def _run(options: NetworkOptions, report: Callable[[str], object]) -> int:
     try:
         network = await FleetNetwork.open(options)
         report(f"router of the fleet at {', '.join(options.listen) or options.config}")
-        # On Windows Python handles a signal only when the loop next wakes up.
+        # On Windows, Python handles a signal only when the loop next wakes up.
         while not ended.is_set():
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(ended.wait(), _TICK_SECONDS)

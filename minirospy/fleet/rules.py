@@ -1,4 +1,4 @@
-"""Which topics and services a gateway passes, at which rate and priority. Pure."""
+"""Rules for the topics and services that a gateway passes, and for their rates and priorities. Pure."""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ _LOGGER_SERVICES = ("/get_loggers", "/set_logger_level")
 
 
 class Priority(IntEnum):
-    """A sending priority. Each has its own queue and thread, so that a slow message does not delay one of a higher priority."""
+    """A sending priority.
+
+    Each has its own queue and thread, so that a slow message does not delay messages with a higher priority.
+    """
 
     TELEOP = 0
     DATA = 1
@@ -57,14 +60,15 @@ _BULK_TYPES = {
 }
 
 
-STOP_SECONDS = 0.5  # without a command before a zero is published; two commands closer than this are a stream
+# without a command before a zero velocity is published; two commands closer together than this are a stream
+STOP_SECONDS = 0.5
 
 
 @dataclass(frozen=True)
 class GatewayRules:
     """The topics and services that a gateway may pass, with rates and priorities.
 
-    ``rates`` (Hz) and ``priorities`` map patterns of names; the first pattern that matches counts.
+    ``rates`` (Hz) and ``priorities`` map patterns of names; the first pattern that matches applies.
     """
 
     topics: NameFilter = field(default_factory=NameFilter)
@@ -74,7 +78,8 @@ class GatewayRules:
     rates: Sequence[tuple[str, float]] = ()
     priorities: Sequence[tuple[str, Priority]] = ()
     has_frames: bool = False
-    stop_seconds: float = STOP_SECONDS  # without a command before a zero velocity; 0 disables this
+    # without a command before a zero velocity is published; 0 disables this
+    stop_seconds: float = STOP_SECONDS
 
     def rate(self, topic: str) -> float:
         """Return a topic's maximum rate in Hz; 0 if it is not limited."""
@@ -107,7 +112,7 @@ class Throttle:
         """Return whether a message may pass at ``now``, in monotonic seconds."""
         if now < self._next:
             return False
-        # Add the period to the due time, not to now, so that 30 Hz become 10 Hz and not 7.5; after a pause, restart
+        # Add the period to the due time, not to now, so that 30 Hz becomes 10 Hz and not 7.5; after a pause, restart
         # from now.
         self._next = max(self._next + self._period, now)
         if self._next <= now:
@@ -123,7 +128,7 @@ def priority_of_type(type_: str) -> Priority:
 
 
 def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
-    """Parse arguments such as ``/camera/*=5`` into patterns and rates. Raise BridgeError."""
+    """Parse arguments such as ``/camera/*=5`` into patterns and rates. Raise BridgeError if an argument is invalid."""
     found = []
     for word in words:
         pattern, text = _halves(word, "--rate", "/camera/*=5")
@@ -138,7 +143,7 @@ def parse_rates(words: Iterable[str]) -> list[tuple[str, float]]:
 
 
 def parse_priorities(words: Iterable[str]) -> list[tuple[str, Priority]]:
-    """Parse arguments such as ``/arm/*=teleop`` into patterns and priorities. Raise BridgeError."""
+    """Parse arguments such as ``/arm/*=teleop`` into patterns and priorities. Raise BridgeError if an argument is invalid."""
     names = {priority.name.lower(): priority for priority in Priority}
     found = []
     for word in words:

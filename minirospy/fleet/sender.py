@@ -1,4 +1,4 @@
-"""Threads with queues that pass messages to and from Zenoh, so that neither direction waits for the loop."""
+"""Threads with queues that pass messages to and from Zenoh, so that neither direction has to wait for the event loop."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ _MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
 _MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
 _MAX_OUTLETS = 64
-"""Zenoh publishers that a flow caches: its own, and those for replays of latched messages; the least recent is dropped."""
+"""Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
+
+The least recently used is dropped.
+"""
 
 
 class _Worker:
@@ -54,7 +57,10 @@ class _Worker:
 
 
 class Outflow:
-    """The queue of a topic's messages to the fleet; created by :meth:`Sender.flow`. ``send`` may be called from any thread."""
+    """A queue of messages from one topic to the fleet; created by :meth:`Sender.flow`.
+
+    ``send`` may be called from any thread.
+    """
 
     def __init__(self, worker: _PriorityWorker, priority: Priority, hertz: float, is_bare: bool) -> None:
         self.priority = priority
@@ -73,12 +79,12 @@ class Outflow:
 
     @property
     def sent_bytes(self) -> int:
-        """Return the size of these messages in bytes."""
+        """Return the total size of the messages passed to Zenoh, in bytes."""
         return self._flow.passed_bytes
 
     @property
     def dropped(self) -> int:
-        """Return how many messages were dropped for newer ones because the network was slower."""
+        """Return how many messages were dropped in favour of newer ones because the network was slower."""
         return self._flow.dropped
 
     def send(self, key: str, message: bytes, *, always: bool = False) -> None:
@@ -89,7 +95,7 @@ class Outflow:
         self._worker.add(self, key, message)
 
     def close(self) -> None:
-        """Drop queued messages, and undeclare the publishers."""
+        """Drop queued messages and undeclare the publishers."""
         self._worker.end(self)
 
 
@@ -154,14 +160,17 @@ class _PriorityWorker(_Worker):
 
 
 class Sender:
-    """Sends messages, each priority in its own thread, so that a large message that takes a second does not delay a command."""
+    """Sends messages, using one thread per priority, so that a large message that takes a second does not delay a command."""
 
     def __init__(self, network: FleetNetwork, clock: Callable[[], int] = time.time_ns) -> None:
         """``clock`` returns the time in ns that is attached to each message."""
         self._priorities = {priority: _PriorityWorker(priority, network, clock) for priority in Priority}
 
     def flow(self, priority: Priority, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
-        """Return a flow for a topic, limited to ``hertz`` (0: unlimited). ``is_bare``: without stamps, for other programs."""
+        """Return a flow for a topic, limited to ``hertz`` (0: unlimited).
+
+        ``is_bare``: send messages without stamps, for other programs.
+        """
         return Outflow(self._priorities[priority], priority, hertz, is_bare)
 
     def close(self) -> None:
@@ -183,7 +192,7 @@ class Flows:
         self._flows: dict[object, Flow[_Arrival]] = {}
 
     def of(self, key: object) -> Flow[_Arrival] | None:
-        """Return a key's flow; None if the limit is reached and every flow has queued messages."""
+        """Return a key's flow, or None if the limit is reached and every flow has queued messages."""
         with self._lock:
             flow = self._flows.pop(key, None)
             if flow is None:
@@ -198,9 +207,9 @@ class Flows:
 
 
 class Receiver(_Worker):
-    """Queues arrived messages until they are published, round-robin between robots' topics.
+    """Queues received messages until they are published, round-robin between robots' topics.
 
-    Publishing may wait some milliseconds for a subscriber; in Zenoh's own thread that would delay all robots.
+    Publishing may block for some milliseconds for a slow subscriber, which would delay all robots in Zenoh's own thread.
     """
 
     def __init__(self) -> None:

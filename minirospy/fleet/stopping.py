@@ -1,7 +1,7 @@
-"""Stop robots whose velocity commands stop arriving over the fleet: publish a zero velocity, as the dashboard does.
+"""Stop robots whose velocity commands stop arriving over the fleet by publishing a zero velocity, as the dashboard does.
 
-Only streams of commands are guarded: a single velocity stays in effect, as within one graph. Works without the event loop: the
-guard's thread publishes the zero.
+Only streams of commands are guarded: a single velocity stays in effect, as within one graph. The guard's thread publishes
+the zero velocity, so that this works even if the event loop is blocked.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ __all__ = ["CommandStream", "at_rest"]
 _log = logging.getLogger(__name__)
 _TWIST = struct.Struct("<6d")
 _HEADER = 16
-"""Bytes in a header without its frame id: seq, stamp and the length of the frame id."""
+"""Bytes in a header with an empty frame id: seq, stamp and the length of the frame id."""
 
 
 def at_rest(type_: str, body: bytes) -> bytes | None:
-    """Return the zero message for a command; None if the command is zero already, is not a command, or is invalid."""
+    """Return the zero message for a command, or None if the body is zero already, is not a command, or is invalid."""
     find = _FIELDS.get(type_)
     if find is None:
         return None
@@ -48,7 +48,7 @@ def at_rest(type_: str, body: bytes) -> bytes | None:
     return bytes(rest) if moves else None
 
 
-_Part = tuple[int, int, str]  # start and end offset of numbers in a message, and their struct format
+_Part = tuple[int, int, str]  # start and end offset of the numbers in a message, and their struct format
 
 
 def _twist(_: bytes) -> list[_Part]:
@@ -84,7 +84,7 @@ _FIELDS: dict[str, Callable[[bytes], list[_Part]]] = {
 
 
 class CommandStream:
-    """The commands of one topic, published in order, with a zero after a stream of them stops. Thread-safe."""
+    """Publishes the commands for one topic in order, and a zero velocity after a stream of commands stops. Thread-safe."""
 
     def __init__(
         self,
@@ -120,31 +120,31 @@ class CommandStream:
             self._last, self._rest = now, rest
             self._deadline = now + self._seconds if rest is not None and is_stream else math.inf
             if self._deadline < math.inf:
-                # Arm the guard before publishing: never send a command that could not be stopped.
+                # Arm the guard before publishing, so that no command is sent that could not be stopped.
                 self._guard.arm(self._silent, self._deadline)
             else:
                 self._guard.disarm(self._silent)
             self._publish(body)
 
     def close(self) -> None:
-        """Publish the zero if a stream is active. Idempotent."""
+        """Publish a zero velocity if a stream is active. Idempotent."""
         self._guard.disarm(self._silent)
         with self._lock:
             self._stop()
 
     def _silent(self) -> None:
-        """Publish the zero if the stream has stopped. Runs in the guard's thread."""
+        """Publish a zero velocity if the stream has stopped. Runs in the guard's thread."""
         with self._lock:
             if self._clock() < self._deadline:
-                return  # a command has arrived just now
-            with contextlib.suppress(ROSException):  # the node is shut down
+                return  # another command has just arrived
+            with contextlib.suppress(ROSException):  # the node has been shut down
                 self._stop()
         self._logger.warning(
             "%s is stopped: no command came for %g s (fleet gateway --stop-after)", self._topic, self._seconds
         )
 
     def _stop(self) -> None:
-        """Publish a zero if a stream has ended with a nonzero command. The caller holds the lock."""
+        """Publish a zero velocity if a stream has ended with a nonzero command. The caller must hold the lock."""
         rest, is_stream = self._rest, self._deadline < math.inf
         self._rest, self._deadline = None, math.inf
         if rest is not None and is_stream:

@@ -17,7 +17,10 @@ __all__ = ["check", "convert"]
 
 
 def check(source: str, target: str, *, compression: str, force: bool) -> None:
-    """Check the arguments of :func:`convert` before it writes. Raise UsageError, BagError or OSError."""
+    """Check the arguments of :func:`convert` before it writes.
+
+    Raise UsageError if they are invalid, BagError or OSError if ``source`` cannot be read.
+    """
     if not target.endswith((".bag", ".mcap")):
         raise UsageError(f"{target} must end with .bag or .mcap")
     if os.path.exists(target) and not force:
@@ -33,11 +36,11 @@ def check(source: str, target: str, *, compression: str, force: bool) -> None:
 
 
 def convert(source: str, target: str, *, compression: str, force: bool, step: Callable[[int], object]) -> int:
-    """Write a bag's or MCAP file's messages to ``target``, an MCAP file if its name ends in .mcap; return their number.
+    """Write a bag's or MCAP file's messages to ``target``, an MCAP file if its name ends in .mcap.
 
-    ``step`` is called with the bytes of messages processed so far. ``force``: overwrite an existing file. An incomplete
-    file is
-    removed. Raise UsageError if ``target`` exists, BagError, or OSError.
+    Return the number of messages. ``step`` is called with the bytes of messages processed so far. ``force``: overwrite an
+    existing file. An incomplete file is removed. Raise UsageError if ``target`` exists, BagError if the source is
+    invalid, or OSError if a file cannot be read or written.
     """
     check(source, target, compression=compression, force=force)
 

@@ -56,31 +56,31 @@ _WHOLE_NAMESPACE = {"eval", "exec", "locals", "vars", "globals", "dir"}
 
 @contextlib.contextmanager
 def open_reader(path: str) -> Iterator[BagReader]:
-    """Yield a reader of a bag or an MCAP file. Raise BagError or OSError."""
+    """Yield a reader of a bag or an MCAP file. Raise BagError if the file is invalid, OSError if it cannot be read."""
     with open(path, "rb") as stream, contextlib.closing(open_bag_or_mcap(stream)) as reader:
         yield reader
 
 
 def version_of(path: str) -> int:
-    """Return a bag's version, 200 for 2.0, even if it has no index. Raise BagFormatError or OSError."""
+    """Return a bag's version, 200 for 2.0, even if it has no index. Raise BagFormatError if the file is not a bag."""
     with open(path, "rb") as stream:
         return read_version(stream)
 
 
 def is_mcap(path: str) -> bool:
-    """Return whether a file starts as an MCAP file does. Raise OSError."""
+    """Return whether a file starts with MCAP's magic bytes. Raise OSError if it cannot be read."""
     with open(path, "rb") as stream:
         return stream.read(len(MAGIC)) == MAGIC
 
 
 def data_size(reader: BagReader) -> int:
-    """Return the decompressed size of all chunks in bytes; for a bag without chunks, the size of the file."""
+    """Return the total decompressed size of all chunks in bytes, or the file's size if the bag has no chunks."""
     headers = reader.chunk_headers().values()
     return sum(each.chunk.size for each in headers) or reader.size()
 
 
 def chunks_end(path: str) -> int:
-    """Return the offset of the index in a bag of version 2.0; 0 if it has none. Raise OSError."""
+    """Return the offset of the index in a version 2.0 bag; 0 if it has none. Raise OSError if the file cannot be read."""
     try:
         with open_reader(path) as reader:
             return reader.index_position if isinstance(reader, ChunkedReader) else 0
@@ -89,12 +89,12 @@ def chunks_end(path: str) -> int:
 
 
 def backup_path(path: str) -> str:
-    """Return the path of the backup of a bag: ``a.orig.bag``."""
+    """Return the path of a bag's backup: ``a.orig.bag``."""
     return "{}.orig{}".format(*os.path.splitext(path))
 
 
 def class_of(type_: str, md5sum: str, definition: str, warn: Callable[[str], object]) -> type[Message]:
-    """Return the message class of a connection, generated from the definition in the bag.
+    """Return the message class for a connection, generated from the definition in the bag.
 
     If the definition is invalid or does not match the md5sum, call ``warn`` with ROS's message and return a class without
     fields. Raise DefinitionError if the type's name is not legal.
@@ -117,7 +117,7 @@ def class_of(type_: str, md5sum: str, definition: str, warn: Callable[[str], obj
 
 
 def compress(source: str, target: str, compression: str, progress: Progress) -> None:
-    """Copy a bag with another compression of its chunks. Raise BagError or OSError.
+    """Copy a bag, compressing its chunks differently. Raise BagError if the bag is invalid, OSError if a file fails.
 
     All connections are kept. If the source is damaged, the target contains the messages before the damage.
     """
@@ -131,7 +131,10 @@ def copy_bag(
     compression: str = compressions.NONE,
     progress: Progress = lambda done: None,
 ) -> None:
-    """Copy a bag in time order, with each connection replaced by ``change(connection)``. Raise BagError or OSError."""
+    """Copy a bag in time order, with each connection replaced by ``change(connection)``.
+
+    Raise BagError if the bag is invalid, OSError if a file fails.
+    """
     with open_reader(source) as reader, new_bag(target, compression) as writer:
         numbers: dict[int, int] = {}
         connections = list(reader.connections.values())
@@ -163,7 +166,7 @@ class Expression:
         """True if the expression uses the message; if False, messages are not deserialized."""
 
     def __call__(self, topic: str, message: Message | None, time: Time) -> object:
-        """Return the value of the expression. Raise ValueTextError if evaluating it fails."""
+        """Evaluate the expression and return its value. Raise ValueTextError if the evaluation fails."""
         try:
             return self._call(topic, message, time)
         except Exception as error:
@@ -191,7 +194,8 @@ def filter_bag(
 ) -> FilterResult:
     """Write the messages for which ``keep`` is true to a new bag; call ``on_shown`` with each value of ``show``.
 
-    Raise BagError, OSError, ValueTextError or MessageException.
+    Raise BagError if the bag is invalid, OSError if a file fails, ValueTextError if the expression fails, or
+    MessageException if a message cannot be deserialized.
     """
     needs_message = keep.needs_message or (show is not None and show.needs_message)
     kept = read = done = 0
@@ -229,9 +233,9 @@ def filter_bag(
 
 
 def reindex(path: str, progress: Progress) -> list[str]:
-    """Rebuild the index of a bag of version 2.0 or an MCAP file in place; return descriptions of unrecoverable parts.
+    """Rebuild the index of a version 2.0 bag or an MCAP file in place; return descriptions of unrecoverable parts.
 
-    Raise BagError or OSError.
+    Raise BagError if the file is not a bag, OSError if it cannot be read or written.
     """
     is_other = is_mcap(path)
     with open(path, "r+b") as stream:
@@ -250,7 +254,10 @@ def reindex(path: str, progress: Progress) -> list[str]:
 
 
 def convert12(source: str, target: str, progress: Progress) -> None:
-    """Convert a bag of version 1.2, with or without an index, to version 2.0. Raise BagError or OSError."""
+    """Convert a version 1.2 bag, with or without an index, to version 2.0.
+
+    Raise BagError if it is invalid, OSError if a file fails.
+    """
     with open(source, "rb") as stream, new_bag(target, compressions.NONE) as writer:
         reader = unindexed_old_bag(stream)
         for position in reader.scan():
@@ -264,7 +271,7 @@ def convert12(source: str, target: str, progress: Progress) -> None:
 
 
 def check_bag_name(path: str) -> None:
-    """Raise UsageError if the name of an output bag is that of an MCAP file."""
+    """Raise UsageError if the name of an output bag ends like an MCAP file's."""
     if path.endswith(".mcap"):
         raise UsageError(
             f"{path} would be a bag: end its name with .bag; `rosbag convert` makes an MCAP file of that"
@@ -275,7 +282,7 @@ def check_bag_name(path: str) -> None:
 def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
     """Yield a writer of a new bag; chunks are compressed in parallel. After an error or Ctrl-C the file is a valid bag.
 
-    Raise UsageError before writing if the name is that of an MCAP file.
+    Raise UsageError before writing if the name ends like an MCAP file's.
     """
     check_bag_name(path)
     with contextlib.ExitStack() as stack:
@@ -313,7 +320,10 @@ def _add(writer: BagWriter, connection: Connection) -> int:
 
 
 def class_of_connection(connection: Connection, warn: Callable[[str], object]) -> type[Message]:
-    """Return the message class of a connection, see :func:`class_of`. Raise BagFormatError."""
+    """Return the message class for a connection, as :func:`class_of` does.
+
+    Raise BagFormatError if its definition is invalid.
+    """
     try:
         return class_of(connection.type, connection.md5sum, connection.definition, warn)
     except DefinitionError as error:

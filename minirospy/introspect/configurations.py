@@ -1,4 +1,4 @@
-"""Parameter files of dynparam and rqt_reconfigure: YAML, which ROS writes with the tag of a Python object."""
+"""Parameter files of dynparam and rqt_reconfigure: YAML, in which ROS tags the values as a Python object."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def configuration_documents(text: str) -> list[object]:
 
 
 def parameter_values(text: str) -> dict[str, bool | int | float | str]:
-    """Return a file's values by name, without the states of groups. Raise MinirospyError."""
+    """Return a file's values by name, without group states. Raise MinirospyError if the file is invalid."""
     values: dict[str, bool | int | float | str] = {}
     for document in configuration_documents(text):
         if not isinstance(document, dict):

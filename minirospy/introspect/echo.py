@@ -1,4 +1,4 @@
-"""Format messages as `rostopic echo` does, and fill the message of `rostopic pub`. Pure."""
+"""Format messages as `rostopic echo` does, and fill messages for `rostopic pub`. Pure."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Filter:
 
 
 class Echo:
-    """Formats the messages of a topic, or a field of them, as output lines, each ending with a line feed.
+    """Formats a topic's messages, or one of their fields, as output lines, each ending with a line feed.
 
     ``plot``: comma-separated values, with a header line first. ``strings`` and ``arrays``: whether to show such fields.
     ``width``: the width of numbers. ``offset``: show times as differences from ``now()``, which returns nanoseconds.
@@ -81,7 +81,10 @@ class Echo:
         self._header_written = False
 
     def message(self, received: Received) -> Message:
-        """Deserialize a message and return it or its field. Raise NotFoundError if it has no such field."""
+        """Deserialize a message and return the message or its selected field.
+
+        Raise NotFoundError if the message has no such field.
+        """
         from minirospy.core.idl.load import get_message_class
 
         message = self._classes.read(received)
@@ -92,7 +95,7 @@ class Echo:
         return message
 
     def text(self, message: Message, received: Received) -> str:
-        """Return the output for a message. Raise IndexError if the field's array is too short."""
+        """Return the output for a message. Raise IndexError if the path's index exceeds the array."""
         value = field_value(message, self._steps)
         return self._row(value, received) if self._plot else self._block(value)
 
@@ -110,7 +113,10 @@ class Echo:
         return header + row + "\n"
 
     def _is_shown_whole(self, value: object) -> bool:
-        """Return whether to print a value unchanged: a bag's field that is not a message, whose type ROS does not look up."""
+        """Return whether to print a value unchanged.
+
+        This applies to a bag's field that is not a message, because ROS does not look up its type.
+        """
         return not self._is_type_known and not is_message(value)
 
     def _block(self, value: object) -> str:
@@ -129,9 +135,10 @@ class Echo:
 
 
 def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int | None = None) -> Message:
-    """Return a message filled from YAML values; ``now`` stands for ``nanoseconds`` (or the time), ``auto`` for a stamped header.
+    """Return a message filled from YAML values.
 
-    Raise MessageException, with the names of the fields, if the values do not fit.
+    ``now`` represents ``nanoseconds`` (or the current time), ``auto`` a stamped header. Raise MessageException, with the
+    names of the fields, if the values do not fit.
     """
     message = fill(cls(), values, words_of(time.time_ns() if nanoseconds is None else nanoseconds))
     serialize(message)
@@ -141,7 +148,8 @@ def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int 
 def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
     """Return ``value`` with placeholders for strings or arrays; ``type_`` is its ROS type, "" if unknown.
 
-    As in ROS, arrays of messages are not elided, and the placeholder of a fixed-length array contains its ``[3``.
+    As in ROS, arrays of messages are not elided, and the placeholder of a fixed-length array contains the length, as in
+    ``[3``.
     """
     if type_.endswith("]") or isinstance(value, list | tuple):
         values = cast("Sequence[object]", value)
@@ -158,8 +166,7 @@ def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
         name: elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
     }
-    # A placeholder is a string whatever the field's type, and the printed form of a field depends on its declared
-    # type.
+    # A placeholder is a string whatever the field's type, and a field's printed form depends on its declared type.
     types = tuple(
         "string" if isinstance(fields[name], str) else slot_type
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)

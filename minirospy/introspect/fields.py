@@ -1,7 +1,7 @@
 """Parse and follow paths to fields of messages: ``pose/position/x``, ``points[0]/x``, ``ranges[1:3]``, ``points[:]/x``.
 
-Pure: parses a path into steps; applies steps to a message to get a value.
-Source: http://wiki.ros.org/rostopic#rostopic_echo.
+Pure: :func:`parse_path` returns steps, which are then applied to a message to get a value. Source:
+http://wiki.ros.org/rostopic#rostopic_echo.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _TIMES = {
     "time": {"secs": "uint32", "nsecs": "uint32"},
     "duration": {"secs": "int32", "nsecs": "int32"},
 }
-"""The primitive types that have fields nevertheless."""
+"""The primitive types that nevertheless have fields."""
 
 
 class Step(NamedTuple):
@@ -34,7 +34,7 @@ class Step(NamedTuple):
 
 
 def parse_path(path: str) -> tuple[Step, ...]:
-    """Parse a path; the empty path refers to the message itself. Raise UsageError."""
+    """Parse a path; the empty path refers to the message itself. Raise UsageError if its syntax is invalid."""
     return tuple(_parse_step(part, path) for part in path.split("/")) if path else ()
 
 

@@ -27,20 +27,20 @@ __all__ = [
     "why_illegal",
 ]
 
-_MAX_NAME_LENGTH = 4096  # characters, the master's limit
+_MAX_NAME_LENGTH = 4096  # characters; the master refuses longer names
 
 
 class NodeAddress(NamedTuple):
-    """A node's name and the URI of its Slave API; None if the master does not know it."""
+    """A node's name and the URI of its Slave API; the URI is None if the master does not know the node."""
 
     name: str
     uri: str | None
 
 
 class Graph:
-    """A connection to a master as ``tool``; names are resolved in ``namespace``, then remapped. A context manager.
+    """A connection to a master, with ``tool`` as caller_id; names are resolved in ``namespace``, then remapped.
 
-    Every call raises MasterUnreachableError if no master answers.
+    A context manager. Every call raises MasterUnreachableError if no master answers.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class Graph:
         self.master.close()
 
     def resolve(self, name: str) -> str:
-        """Return the global name of ``name``."""
+        """Return the global name that ``name`` resolves to."""
         return names.resolve(name, self._node_name, self._remappings)
 
     def state(self) -> SystemState:
@@ -94,7 +94,7 @@ class Graph:
         return self.master.get_system_state()
 
     def node_uri(self, node: str) -> str | None:
-        """Return the URI of a node's Slave API, with one call per node; None if the master does not know the node."""
+        """Return the URI of a node's Slave API (one call to the master), or None if the master does not know the node."""
         if node not in self._uris:
             uri: str | None = None
             with contextlib.suppress(RpcRefused):
@@ -103,14 +103,14 @@ class Graph:
         return self._uris[node]
 
     def addresses(self, nodes: Iterable[str]) -> list[NodeAddress]:
-        """Return each node with its URI."""
+        """Return each node with its URI, which is None if the master does not know the node."""
         return [NodeAddress(node, self.node_uri(node)) for node in nodes]
 
 
 def why_illegal(name: str) -> str:
     """Return the reason why a topic's or service's global name is not legal; "" if it is legal.
 
-    rospy accepts such names nevertheless, roscpp does not. A field's path may follow a topic's name: /points[0]/x.
+    rospy accepts such names, roscpp does not. A field path may follow a topic name: /points[0]/x.
     """
     if len(name) > _MAX_NAME_LENGTH:
         return f"a name has {_MAX_NAME_LENGTH} characters at most"

@@ -1,7 +1,7 @@
 """Message and service types as packages define them: names, definitions and md5sums.
 
-Read from the definition files, so that a type is found before its package is built.
-Source: http://wiki.ros.org/rosmsg.
+Definitions are read from their files, so that a type is found before its package is built. Source:
+http://wiki.ros.org/rosmsg.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Interfaces:
         return [package for package in sorted(self._catalogue.packages) if self._names(package)]
 
     def in_package(self, package: str) -> list[str]:
-        """Return the sorted types (``pkg/Name``) that a package defines. Raise NotFoundError."""
+        """Return the sorted types (``pkg/Name``) that a package defines. Raise NotFoundError if the package does not exist."""
         self._packages.find(package)
         return [f"{package}/{name}" for name in self._names(package)]
 
@@ -58,7 +58,7 @@ class Interfaces:
         ]
 
     def find(self, name: str) -> list[str]:
-        """Return the types that match ``name``: itself if it has a package, else all types of that name.
+        """Return the types that match ``name``: ``name`` itself if it includes a package, else all types with that name.
 
         Raise NotFoundError with similar names if there is none.
         """
@@ -74,15 +74,15 @@ class Interfaces:
         return found
 
     def text(self, type_: str) -> str:
-        """Return the definition of a type as in its file. Raise NotFoundError."""
+        """Return a type's definition as it is in its file. Raise NotFoundError if the type does not exist."""
         return self._spec(type_).text
 
     def description(self, type_: str) -> str:
-        """Return the constants and fields of a type, with inner types expanded. Raise NotFoundError."""
+        """Return a type's constants and fields, with inner types expanded. Raise NotFoundError if a type does not exist."""
         return describe(self._spec(type_), self._catalogue.message)
 
     def md5sum(self, type_: str) -> str:
-        """Return the md5sum of a type. Raise NotFoundError."""
+        """Return a type's md5sum. Raise NotFoundError if a type does not exist."""
         spec = self._spec(type_)
         if isinstance(spec, ServiceSpec):
             return service_md5(spec, self._catalogue.message)
@@ -99,7 +99,7 @@ class Interfaces:
         raise NotFoundError("service type", type_, self.all())
 
     def _names(self, package: str) -> list[str]:
-        """Return the sorted type names of a package, from its files; an action defines seven messages."""
+        """Return the sorted type names of a package, from its files. One action file defines seven messages."""
         folder = self._catalogue.packages[package]
         ending = self._kind.value
         names = {path.stem for path in (folder / ending).glob(f"*.{ending}")}

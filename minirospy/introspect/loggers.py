@@ -31,7 +31,7 @@ def logger_levels(graph: Graph, node: str) -> dict[str, str]:
 
 
 def logger_level(graph: Graph, node: str, logger: str) -> str:
-    """Return the level of one logger. Raise as :func:`logger_levels` does, and NotFoundError if the logger does not exist."""
+    """Return the level of one logger. Raise NotFoundError if the logger does not exist, or as :func:`logger_levels` does."""
     levels = logger_levels(graph, node)
     if logger not in levels:
         raise NotFoundError(f"logger of node {node}", logger, levels)
@@ -39,14 +39,14 @@ def logger_level(graph: Graph, node: str, logger: str) -> str:
 
 
 def set_logger_level(graph: Graph, node: str, logger: str, level: str) -> None:
-    """Set the level of a logger. Raise as :func:`logger_level` does."""
+    """Set a logger's level. Raise the same errors as :func:`logger_level`."""
     # A node accepts any logger name, so check first that the logger exists.
     logger_level(graph, node, logger)
     _ask(graph, node, "set_logger_level", "roscpp/SetLoggerLevel", [logger, level])
 
 
 def _ask(graph: Graph, node: str, service: str, type_: str, arguments: Sequence[str]) -> Message:
-    """Call a node's own service and return the response."""
+    """Call one of a node's own services and return the response."""
     name = find_node(graph, node).name
     try:
         return call_service(graph, f"{name}/{service}", type_, fill_request(type_, arguments))

@@ -1,4 +1,4 @@
-"""Message classes for the types of a graph, by name or connection header; fill from YAML, serialize, deserialize.
+"""Find message classes by name or connection header; fill messages from YAML, serialize and deserialize them.
 
 Classes of types that are not installed are generated from the definition in the publisher's connection header.
 """
@@ -24,7 +24,7 @@ _M = TypeVar("_M", bound="Message")
 
 
 _HINTS = {
-    # YAML parses such values as another type than they appear to have.
+    # YAML parses such values as a different type than they appear to have.
     "an ascii string": ", a text that could be a number, a date or a list needs its own quotes: \"'5'\"",
     "must be float type": ", numbers like 1.0e-3, .inf and .nan with their dot",
 }
@@ -45,13 +45,16 @@ class MessageClasses:
         key = (header.get("type", "*"), header.get("md5sum", "*"))
         if key not in self._classes:
             if len(self._classes) >= _MAX_CLASSES:
-                # So many types are not normal use: a publisher makes them up.
+                # Normal use never needs this many types: a publisher invents them.
                 self._classes.clear()
             self._classes[key] = self._find(*key, header.get("message_definition", ""))
         return self._classes[key]
 
     def read(self, received: Received) -> Message:
-        """Deserialize a received message. Raise DeserializationError, or as :meth:`for_header` does."""
+        """Deserialize a received message.
+
+        Raise DeserializationError if its bytes are invalid, or as :meth:`for_header` does.
+        """
         message = self.for_header(received.header)()
         message.deserialize(received.body)
         message._connection_header = received.header
@@ -72,9 +75,10 @@ class MessageClasses:
 
 
 def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | None = None) -> _M:
-    """Fill the fields of ``message`` from YAML values, either one dictionary or a value per field in order; return it.
+    """Fill the fields of ``message`` from YAML values, either one dictionary or a value per field in order.
 
-    ``keys`` maps words to the values that they represent, such as ``now`` to a time. Raise MessageException.
+    Return the message. ``keys`` maps words to the values that they represent, such as ``now`` to a time. Raise
+    MessageException if the values do not fit.
     """
     from minirospy.core.idl.message import fill_message_args
 

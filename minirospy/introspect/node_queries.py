@@ -1,4 +1,4 @@
-"""Query nodes for what the master does not know, such as the types of their services."""
+"""Query nodes for information that the master does not have, such as the types of their services."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from minirospy.base.errors import MinirospyError, ServiceException
 __all__ = ["MAX_CONCURRENT", "NodeQueries"]
 
 MAX_CONCURRENT = 64
-"""Concurrent first queries: a node that hangs costs only a connection."""
+"""Concurrent first queries: a node that hangs occupies only one connection."""
 
 _MAX_CONCURRENT_RETRIES = 32
-"""Concurrent retries; a separate limit, so that they do not delay first queries."""
+"""Concurrent retries; limited separately, so that retries do not delay first queries."""
 _QUERY_SECONDS = 5.0
-_AGAIN_SECONDS = 10.0  # before a node that did not answer is queried again
+_AGAIN_SECONDS = 10.0  # before a node that did not respond is queried again
 _REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
-"""Pause after a refused query, base and increment per failed query. A refusal is cheap, and a server that was killed may be
-restarted soon, so it is retried sooner; 500 dead nodes are queried every 10 s.
+"""Pause after a refused query, base and increment per failed query.
+
+A refused query is cheap, and a killed server may be restarted soon, so refused queries are retried sooner; 500 dead nodes
+are queried every 10 s.
 """
 
 _Key = TypeVar("_Key")
@@ -29,7 +31,7 @@ _Found = TypeVar("_Found")
 
 
 class NodeQueries(Generic[_Key, _Found]):
-    """Queries nodes once per key, for example a service's name with its nodes. Runs on the loop.
+    """Queries nodes once per key, for example, a service's name together with its nodes. Runs on the loop.
 
     Queries that fail are retried later, and do not delay others.
     """
@@ -41,7 +43,7 @@ class NodeQueries(Generic[_Key, _Found]):
         *,
         arrived_late: Callable[[], object] = lambda: None,
     ) -> None:
-        """``arrived_late`` is called when an answer has arrived after :meth:`look` returned."""
+        """``arrived_late`` is called when a response arrives after :meth:`look` has returned."""
         self.found: dict[_Key, _Found] = {}
         self._query = query
         self._reporter = reporter
@@ -53,7 +55,7 @@ class NodeQueries(Generic[_Key, _Found]):
         self._again = asyncio.Semaphore(_MAX_CONCURRENT_RETRIES)
 
     async def look(self, present: Collection[_Key], seconds: float) -> None:
-        """Query new keys and forget absent ones; return when the new ones are answered, or after ``seconds``."""
+        """Query new keys and forget absent ones; return when all new keys have results, or after ``seconds``."""
         kept = self._present = set(present)
         self.found = {key: found for key, found in self.found.items() if key in kept}
         self._not_before = {key: until for key, until in self._not_before.items() if key in kept}
@@ -91,7 +93,7 @@ class NodeQueries(Generic[_Key, _Found]):
         self._tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:
-        """Query once; return True if there is an answer and its key is still present."""
+        """Query once; return True if there is a result and its key is still present."""
         started = asyncio.get_running_loop().time()
         try:
             found = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
@@ -102,7 +104,7 @@ class NodeQueries(Generic[_Key, _Found]):
             self._reporter.report(error)
             self._failed(key)
         else:
-            # If the key is absent by now, it must be queried again when it returns.
+            # A key that is absent now must be queried again if it returns.
             if key in self._present:
                 self.found[key] = found
                 return True

@@ -52,7 +52,7 @@ __all__ = [
 
 
 _SHUTDOWN_SECONDS = 10.0
-"""A node may run its shutdown hooks before it answers."""
+"""Long enough for a node to run its shutdown hooks before it responds."""
 
 
 class TypedName(NamedTuple):
@@ -80,7 +80,7 @@ class Connections(NamedTuple):
 
 
 class Neighbours(NamedTuple):
-    """The nodes that send to a node, and those that receive from it, according to the master."""
+    """The nodes from which a node receives messages, and those to which it sends, according to the master."""
 
     senders: list[str]
     receivers: list[str]
@@ -112,7 +112,7 @@ def nodes_on(graph: Graph, machine: str) -> list[str]:
 
 
 def neighbours(state: SystemState) -> dict[str, Neighbours]:
-    """Return the neighbours of each node that publishes or subscribes, sorted by node."""
+    """Return the neighbours of each node that publishes or subscribes, sorted by node name."""
     senders: dict[str, set[str]] = {}
     receivers: dict[str, set[str]] = {}
     for topic in {*state.publishers, *state.subscribers}:
@@ -136,9 +136,9 @@ def find_node(graph: Graph, name: str) -> NodeAddress:
 
 
 def node_detail(graph: Graph, name: str) -> NodeDetail:
-    """Return the master's information about a node (global name). Raise NotFoundError."""
+    """Return the master's information about a node (global name). Raise NotFoundError if it is not registered."""
     state = graph.state()
-    # The types that publishers registered: for a topic without publishers rosnode prints "unknown type".
+    # Use the types that publishers registered: rosnode prints "unknown type" for a topic without publishers.
     types = dict(graph.master.get_published_topics())
 
     def topics(table: Mapping[str, list[str]]) -> list[TypedName]:
@@ -154,13 +154,13 @@ def node_detail(graph: Graph, name: str) -> NodeDetail:
 
 
 def node_connections(graph: Graph, node: NodeAddress) -> Connections:
-    """Query a node for its process id and its connections. Raise NodeUnreachableError."""
+    """Query a node for its process id and its connections. Raise NodeUnreachableError if it does not respond."""
     with _named(node), contextlib.closing(_slave(graph, node, timeout=5.0)) as slave:
         return Connections(slave.get_pid(), slave.get_bus_info())
 
 
 def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
-    """Return the duration of a call to a node in seconds. Raise NodeUnreachableError."""
+    """Return how long a call to a node takes, in seconds. Raise NodeUnreachableError if the call fails."""
     with _named(node), contextlib.closing(_slave(graph, node, timeout)) as slave:
         start = time.perf_counter()
         slave.get_pid()
@@ -170,7 +170,7 @@ def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
 def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> None:
     """Request a node to shut down; do nothing if it has already exited.
 
-    Raise NodeUnreachableError if it does not answer in time.
+    Raise NodeUnreachableError if the node does not respond in time.
     """
     with contextlib.closing(_slave(graph, node, _SHUTDOWN_SECONDS)) as slave:
         try:
@@ -179,23 +179,23 @@ def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> 
             if isinstance(error.__cause__, TimeoutError):
                 raise NodeUnreachableError(node.name, error.uri, error.why) from error
         except RpcError:
-            pass  # a node that exits immediately may not complete its answer
+            pass  # a node that exits immediately may not complete its response
 
 
 def is_unknown_host(error: NodeUnreachableError) -> bool:
-    """Return whether a node did not answer because its host name does not resolve."""
+    """Return whether the node was unreachable because its host name does not resolve."""
     return isinstance(getattr(error.__cause__, "__cause__", None), socket.gaierror)
 
 
 def is_timeout(error: NodeUnreachableError) -> bool:
-    """Return whether a node did not answer in time."""
+    """Return whether the node was unreachable because it did not respond in time."""
     return isinstance(getattr(error.__cause__, "__cause__", None), TimeoutError)
 
 
 def unreachable_nodes(
     graph: Graph, timeout: float = 3.0, on_error: Callable[[NodeUnreachableError], object] | None = None
 ) -> list[NodeAddress]:
-    """Return the registered nodes that do not answer; call ``on_error`` with the error of each."""
+    """Return the registered nodes that do not respond; call ``on_error`` with each node's error."""
     found = []
     for node in graph.addresses(list_nodes(graph)):
         if node.uri is None:
@@ -212,7 +212,7 @@ def unreachable_nodes(
 def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = None) -> None:
     """Unregister everything that a node registered with the master; a newer node of the same name is not affected.
 
-    ``state``: the master's state, if the caller already has it. Raise MasterUnreachableError.
+    ``state``: the master's state, if the caller already has it. Raise MasterUnreachableError if no master answers.
     """
     from minirospy.runtime.rpc.master_proxy import MasterProxy
 
@@ -221,8 +221,8 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
     # Use the node's name as the caller_id: the master removes only the caller's own registrations.
     master = MasterProxy(graph.master.uri, node.name)
     try:
-        # Topics are unregistered together with the node's URI, services with their own. If the name still has this
-        # URI after the services were looked up, none of them can belong to a newer node.
+        # Topics are unregistered by the node's URI, services by their own URI. If the node's name still has this URI
+        # after the services were looked up, none of them can belong to a newer node.
         services = {service: _service_uri(master, service) for service in _held_by(state.services, node.name)}
         with contextlib.suppress(RpcRefused):
             if master.lookup_node(node.name) == uri:
@@ -237,15 +237,16 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
 
 
 def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
-    """Return whether no process, or another process, listens at a node's address.
+    """Return whether a node's address has no listening process, or one that is not the node.
 
-    Return False for a node that does not answer in time: it may be alive.
+    Return False for a node that does not respond in time: it may be alive.
     """
     with contextlib.closing(_slave(graph, node, timeout)) as slave:
         try:
             return bool(slave.call("getName") != node.name)
         except RpcUnreachable as error:
-            # EOFError: the server that uses the port now, such as a TCPROS server, closed the connection.
+            # EOFError means that another server, which now uses the port, such as a TCPROS server, closed the
+            # connection.
             return isinstance(error.__cause__, ConnectionError | EOFError)
         except RpcProtocolError:
             return True
@@ -282,7 +283,7 @@ def _slave(graph: Graph, node: NodeAddress, timeout: float) -> SlaveProxy:
 
 @contextlib.contextmanager
 def _named(node: NodeAddress) -> Iterator[None]:
-    """Raise NodeUnreachableError with the node's name for errors of a call to it."""
+    """Raise NodeUnreachableError, with the node's name, if a call to the node fails."""
     try:
         yield
     except RpcTimeout as error:

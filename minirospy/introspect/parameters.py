@@ -30,7 +30,7 @@ _NAMESPACE_KEY = "_ns"
 
 
 class RootValueError(ValueTextError):
-    """The root of the parameters was set to a value that is not a dictionary."""
+    """The root namespace was set to a value that is not a dictionary."""
 
 
 class ParameterFile(NamedTuple):
@@ -51,7 +51,7 @@ def list_parameters(graph: Graph, namespace: str = "/") -> list[str]:
 
 
 def get_parameter(graph: Graph, name: str) -> object:
-    """Return the value of a parameter (global name), a dictionary for a namespace. Raise NotFoundError."""
+    """Return the value of a parameter (global name), a dictionary for a namespace. Raise NotFoundError if it is not set."""
     try:
         return graph.master.get_param(name)
     except RpcRefused:
@@ -59,7 +59,7 @@ def get_parameter(graph: Graph, name: str) -> object:
 
 
 def set_parameter(graph: Graph, name: str, value: object) -> list[tuple[str, object]]:
-    """Set a parameter; a dictionary sets each of its entries and keeps existing ones, as rosparam does.
+    """Set a parameter; a dictionary sets each of its entries and leaves other entries unchanged, as rosparam does.
 
     Return the individual parameters that were set. Raise ValueTextError if a value cannot be stored as a parameter.
     """
@@ -73,9 +73,9 @@ def set_parameter(graph: Graph, name: str, value: object) -> list[tuple[str, obj
 
 
 def delete_parameter(graph: Graph, name: str) -> None:
-    """Delete a parameter or namespace; deleting the root empties it. Raise NotFoundError."""
+    """Delete a parameter or namespace; deleting the root empties it. Raise NotFoundError if it is not set."""
     if name == "/":
-        # The master's deleteParam refuses the root.
+        # The master's deleteParam refuses to delete the root.
         graph.master.set_param(name, {})
         return
     try:
@@ -105,7 +105,7 @@ def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFil
 
 
 def dump_parameters(values: object) -> str:
-    """Return values as the text of a parameter file."""
+    """Return the YAML of a parameter file with these values."""
     text = format_value(values)
     return text if text.endswith("\n") else text + "\n"
 

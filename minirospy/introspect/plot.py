@@ -1,7 +1,7 @@
 """Format messages as rows of comma-separated values, as `rostopic echo -p` does for plotting tools.
 
-Pure. Arrays become columns with the index at the end; bytes are left out, because they cannot be plotted.
-Source: http://wiki.ros.org/rostopic#rostopic_echo (-p).
+Pure. Arrays become columns with the index at the end; byte arrays are left out, because they cannot be plotted. Source:
+http://wiki.ros.org/rostopic#rostopic_echo (-p).
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ def plot_header(value: object, *, strings: bool = True, arrays: bool = True) -> 
 def plot_row(
     value: object, nanoseconds: int, *, strings: bool = True, arrays: bool = True, origin: int = 0
 ) -> str:
-    """Return the line of values, starting with the message's time; ``origin`` (nanoseconds) is subtracted from times in it."""
+    """Return the line of values, starting with the message's time.
+
+    ``origin`` (nanoseconds) is subtracted from the line's times.
+    """
     return f"{nanoseconds}," + ",".join(cell.text for cell in _cells("field", value, strings, arrays, origin))
 
 
@@ -39,7 +42,7 @@ def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -
         if strings:
             yield _Cell(name, value)
     elif hasattr(value, "to_nsec"):
-        # Subtract the origin from points in time, not from durations.
+        # Subtract the origin only from points in time, not from durations.
         yield _Cell(name, str(value.to_nsec() - (origin if hasattr(value, "to_time") else 0)))
     elif isinstance(value, list | tuple):
         if arrays:

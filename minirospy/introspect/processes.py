@@ -1,4 +1,4 @@
-"""CPU and memory use of local processes, as rqt_top shows it for nodes."""
+"""CPU and memory use of local processes, as rqt_top shows them for nodes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["ProcessLoad", "ProcessLoads"]
 
 
 class ProcessLoad(NamedTuple):
-    """CPU use in percent of one core since the previous call, None at the first; resident memory in bytes."""
+    """CPU use in percent of one core since the previous call (None at the first call), and resident memory in bytes."""
 
     cpu: float | None
     memory: int
@@ -20,19 +20,19 @@ class ProcessLoad(NamedTuple):
 
 
 class ProcessLoads:
-    """Measures processes repeatedly."""
+    """Measures the CPU and memory use of processes between calls."""
 
     def __init__(self) -> None:
         self._known: dict[int, psutil.Process] = {}
 
     def look(self, pids: Iterable[int]) -> dict[int, ProcessLoad]:
-        """Return the loads by process id, without processes that do not run or that this user may not inspect."""
+        """Return the loads by process id, without processes that have exited or that this user may not inspect."""
         before, self._known = self._known, {}
         found = {}
         for pid in set(pids):
             with contextlib.suppress(psutil.Error, ValueError):
                 process = before.get(pid)
-                # The id of a process that has exited may have been reused.
+                # The id of an exited process may have been reused.
                 is_new = process is None or not process.is_running()
                 if process is None or is_new:
                     process = psutil.Process(pid)

@@ -13,7 +13,7 @@ __all__ = ["prototype"]
 
 _WIDE = 5
 _COLUMNS = 80
-_NO_BYTES = '!!binary ""'  # an empty uint8[], which is bytes and not a list of numbers
+_NO_BYTES = '!!binary ""'  # an empty uint8[], which is a byte string, not a list of numbers
 
 
 def prototype(
@@ -21,7 +21,7 @@ def prototype(
 ) -> str:
     """Return a message of default values as YAML, as `rosmsg-proto` writes it, for the user to edit and publish.
 
-    An array of variable length has one element, as an example, or none with ``empty_arrays``. ``without``: names of fields to
+    A variable-length array has one element, as an example, or none with ``empty_arrays``. ``without``: names of fields to
     leave out, also in inner messages.
     """
     lines = _Yaml().lines(_Defaults(catalogue, without, empty_arrays).of(spec))
@@ -34,7 +34,7 @@ class _Defaults(NamedTuple):
     empty_arrays: bool
 
     def of(self, spec: MessageSpec) -> dict[str, object]:
-        """Return the default values of a message's fields."""
+        """Return the default values of a message type's fields."""
         fields = (field for field in spec.fields if field.name not in self.without)
         return {field.name: self._value(field.type) for field in fields}
 
@@ -56,7 +56,10 @@ class _Defaults(NamedTuple):
 
 
 class _Yaml:
-    """A YAML writer. From the first wide value on, innermost lists and dictionaries are on one line, as in `rosmsg-proto`."""
+    """A YAML writer.
+
+    From the first wide value on, it writes innermost lists and dictionaries on one line, as `rosmsg-proto` does.
+    """
 
     def __init__(self) -> None:
         self._tight = False

@@ -1,4 +1,4 @@
-"""The messages of `rostopic pub`: convert YAML values from arguments, a file or a stream, and publish them at a rate.
+"""Convert YAML values from arguments, a file or a stream to messages and publish them at a rate, as `rostopic pub` does.
 
 Source: http://wiki.ros.org/rostopic#rostopic_pub.
 """
@@ -25,9 +25,9 @@ def values_to_publish(
 ) -> Iterator[list[object]]:
     """Yield the YAML values of each message with ``fields``, at least one message.
 
-    ``arguments`` are the values of one message; without them, read a file, or standard input as it arrives. Raise
-    UsageError without
-    values, NotFoundError if the file does not exist, or ValueTextError if the input is not YAML.
+    ``arguments`` are the values of one message; without them, read a file, or read standard input as data arrives. Raise
+    UsageError if there are no values, NotFoundError if the file does not exist, or ValueTextError if the input is not
+    YAML.
     """
     if arguments or (file is None and not fields):
         yield parse_arguments(arguments)
@@ -68,7 +68,7 @@ def publish_all(
         on_message(message)
         publisher.publish(message)
         sent += 1
-        # Measure from the start, not from the last message, so that errors of the pauses do not add up.
+        # Measure from the start, not from the last message, so that errors in the pauses do not accumulate.
         pause = round(start + sent * 1e9 / rate) - node.clock.now()
 
         try:

@@ -23,14 +23,14 @@ __all__ = [
 ]
 
 UNBOUNDED = 50000
-"""Maximum number of messages in a window without a limit, which bounds the memory of a long measurement."""
+"""Maximum messages in a window without a limit, to bound the memory use of a long measurement."""
 
 
 _NOTHING = "no new messages"
 
 
 class Spread(NamedTuple):
-    """Mean, extremes and standard deviation of times in seconds, and the number of messages."""
+    """Mean, extremes and standard deviation of a series of times in seconds, and the number of messages."""
 
     mean: float
     min: float
@@ -40,7 +40,7 @@ class Spread(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Return the rate in Hz, if the times are the periods between messages."""
+        """Return the rate in Hz, assuming that the times are the periods between messages."""
         return 1.0 / self.mean if self.mean > 0 else 0.0
 
 
@@ -55,7 +55,7 @@ class Bandwidth(NamedTuple):
 
 
 class RateWindow:
-    """The periods between the latest messages (at most ``size``; 0 for no limit)."""
+    """Measures the periods between the latest messages (at most ``size``; 0 for no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._pauses: deque[float] = deque(maxlen=max(1, (size or UNBOUNDED) - 1))
@@ -69,7 +69,7 @@ class RateWindow:
         if self._last is not None and time >= self._last:
             self._pauses.append(time - self._last)
         elif self._last is not None:
-            # Time was set back: earlier measurements cannot be compared with later ones.
+            # The clock was set back: earlier measurements cannot be compared with later ones.
             self._pauses.clear()
         self._last = time
 
@@ -82,7 +82,7 @@ class RateWindow:
 
 
 class BandwidthWindow:
-    """The sizes of the latest messages (at most ``size``)."""
+    """Measures the sizes of the latest messages (at most ``size``)."""
 
     def __init__(self, size: int = 0) -> None:
         self._messages: deque[tuple[float, int]] = deque(maxlen=size or 100)
@@ -103,7 +103,7 @@ class BandwidthWindow:
 
 
 class DelayWindow:
-    """The delays between the latest messages' stamps and arrivals (at most ``size``; 0 for no limit)."""
+    """Measures the delays between the latest messages' stamps and arrivals (at most ``size``; 0 for no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._delays: deque[float] = deque(maxlen=size or UNBOUNDED)
@@ -111,7 +111,7 @@ class DelayWindow:
         self._reported = 0
 
     def add(self, time: float, stamp: float) -> None:
-        """Record a message with the time ``stamp``."""
+        """Record a message whose stamp is ``stamp``."""
         self._arrived += 1
         self._delays.append(time - stamp)
 
@@ -142,7 +142,7 @@ def delay_text(report: Spread | None) -> str:
 
 
 def bandwidth_text(reports: Mapping[str, Bandwidth | None]) -> str:
-    """Return what `rostopic bw` prints once a second: two lines for one topic, a table for several; "" for none."""
+    """Return what `rostopic bw` prints once a second: two lines for one topic, a table for several; "" if there are none."""
     rows = [
         (
             name,
@@ -183,7 +183,7 @@ def _four_digits(number: float) -> str:
 
 
 def _bytes(number: float, rate: float) -> str:
-    """Format a number of bytes in the unit that fits the rate."""
+    """Format a number of bytes, in the unit that fits the rate."""
     unit, size = ("B", 1.0) if rate < 1e3 else ("KB", 1e3) if rate < 1e6 else ("MB", 1e6)
     return f"{number / size:.2f}{unit}"
 

@@ -1,4 +1,4 @@
-"""Services: list them, their types and providers; call them.
+"""Services: list and call them, and find their types and providers.
 
 Source: http://wiki.ros.org/rosservice, http://wiki.ros.org/ROS/TCPROS ("Services").
 """
@@ -47,7 +47,7 @@ _ANY = "*"
 
 
 class ServiceNode(NamedTuple):
-    """A service and the nodes that provide it (the last one registered answers)."""
+    """A service and the nodes that provide it; the last one registered receives the calls."""
 
     name: str
     nodes: tuple[str, ...]
@@ -71,7 +71,7 @@ def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
 
 
 def service_uri(graph: Graph, service: str) -> str:
-    """Return the URI of a service (``rosrpc://host:port``). Raise NotFoundError."""
+    """Return the URI of a service (``rosrpc://host:port``). Raise NotFoundError if the service does not exist."""
     try:
         return graph.master.lookup_service(service)
     except RpcRefused:
@@ -81,13 +81,13 @@ def service_uri(graph: Graph, service: str) -> str:
 def service_type(graph: Graph, service: str) -> str:
     """Return the type of a service, as reported by the node that provides it.
 
-    Raise NotFoundError or NodeUnreachableError.
+    Raise NotFoundError if the service does not exist, or NodeUnreachableError if its node does not respond.
     """
     return _probe(graph, service, service_uri(graph, service))
 
 
 def service_offer(graph: Graph, service: str) -> ServiceOffer:
-    """Return the node that provides a service, and its URI. Raise NotFoundError."""
+    """Return the node that provides a service, and its URI. Raise NotFoundError if the service does not exist."""
     nodes = graph.state().services.get(service)
     if not nodes:
         raise unknown_service(graph, service)
@@ -95,19 +95,19 @@ def service_offer(graph: Graph, service: str) -> ServiceOffer:
 
 
 def service_arguments(type_: str) -> list[str]:
-    """Return the names of the fields of a service type's request. Raise NotFoundError if it is not installed."""
+    """Return the field names of a service type's request. Raise NotFoundError if the type is not installed."""
     from minirospy.core.idl.load import service_class
 
     return list(service_class(type_)._request_class.__slots__)
 
 
 def find_services_of_type(graph: Graph, type_: str) -> list[str]:
-    """Return the sorted names of the services of a type; services that do not answer are left out."""
+    """Return the sorted names of the services of a type, without services that do not respond."""
     return [service.name for service in list_services(graph) if _probed_type(graph, service.name) == type_]
 
 
 def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object]) -> None:
-    """Wait until a service is registered and answers; call ``on_waiting`` once if it is not available yet."""
+    """Wait until a service is registered and responds; call ``on_waiting`` once if it is not available yet."""
     if _probed_type(graph, service):
         return
     on_waiting()
@@ -118,7 +118,7 @@ def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object
 def fill_request(type_: str, arguments: Sequence[object]) -> Message:
     """Return a request of a service type, filled from YAML values (one dictionary, or all fields in order).
 
-    ``now`` stands for the time, ``auto`` for a stamped header, whose ``seq`` is 1, as in the first call of a proxy.
+    ``now`` represents the current time, ``auto`` a stamped header, whose ``seq`` is 1, as in the first call of a proxy.
     Raise NotFoundError if the type is not installed, MessageException if the values do not fit.
     """
     from minirospy.core.idl.load import service_class
@@ -131,7 +131,10 @@ def fill_request(type_: str, arguments: Sequence[object]) -> Message:
 
 
 def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
-    """Call a service and return the response. Raise NotFoundError, or ServiceException with the handler's text."""
+    """Call a service and return the response.
+
+    Raise NotFoundError if the service does not exist, or ServiceException with the handler's message.
+    """
     from minirospy.core.idl.load import service_class
     from minirospy.introspect.messages import check, serialize
 
@@ -160,7 +163,7 @@ def call_service(graph: Graph, service: str, type_: str, request: Message) -> Me
 
 
 def _probed_type(graph: Graph, service: str) -> str | None:
-    """Return a service's type; None if it does not exist or does not answer."""
+    """Return a service's type; None if it does not exist or does not respond."""
     try:
         return _probe(graph, service, graph.master.lookup_service(service))
     except (RpcRefused, NodeUnreachableError):
@@ -168,7 +171,7 @@ def _probed_type(graph: Graph, service: str) -> str | None:
 
 
 def service_header(graph: Graph, service: str, uri: str) -> Header:
-    """Return the connection header of the service at ``uri``. Raise NodeUnreachableError."""
+    """Return the connection header of the service at ``uri``. Raise NodeUnreachableError if the node does not respond."""
     try:
         client = _connect(graph, service, uri, _ANY, probe=True)
     except (OSError, WireError) as error:
@@ -192,7 +195,7 @@ def _why(error: Exception) -> str:
 
 
 def _connect(graph: Graph, service: str, uri: str, md5sum: str, *, probe: bool = False) -> ServiceClient:
-    # Imported late: listing services does not need it.
+    # Imported here because listing services does not need the module.
     from minirospy.runtime.node.service_client import ServiceClient
 
     return ServiceClient(uri, service, md5sum, "/" + graph.tool, probe=probe, timeout=_PROBE_SECONDS)

@@ -18,7 +18,7 @@ _ANY = "*"
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Topics and services with their nodes, in the master's order, and the known types of topics."""
+    """Topics and services with their nodes, in the master's order, and the topics' known types."""
 
     publishers: Table = field(default_factory=dict)
     subscribers: Table = field(default_factory=dict)
@@ -31,7 +31,7 @@ class Snapshot:
         return {*self.publishers, *self.subscribers}
 
     def filtered(self, topic: Callable[[str], bool], service: Callable[[str], bool]) -> Snapshot:
-        """Return the part whose topics and services pass the filters."""
+        """Return the part of the snapshot whose topics and services pass the filters."""
         return Snapshot(
             {name: nodes for name, nodes in self.publishers.items() if topic(name)},
             {name: nodes for name, nodes in self.subscribers.items() if topic(name)},
@@ -42,9 +42,9 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Changes:
-    """The difference between two snapshots: new or changed entries, each complete, and removed names.
+    """The difference between two snapshots: new or changed entries, each in full, and removed names.
 
-    A topic that lost its last publisher but has subscribers is in ``publishers`` with no nodes.
+    A topic that has lost its last publisher but has subscribers is in ``publishers`` with no nodes.
     """
 
     publishers: Table
@@ -65,7 +65,7 @@ class Changes:
 
 
 def compare(before: Snapshot, after: Snapshot) -> Changes:
-    """Return the difference; ignore changes of types."""
+    """Return the difference; changed types do not count."""
     left = before.topics - after.topics
     return Changes(
         _changed(before.publishers, after.publishers, left),
@@ -77,7 +77,7 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
 
 
 async def fetch(call: Callable[..., Awaitable[Any]]) -> Snapshot:
-    """Return the current graph; ``call(method, *arguments)`` calls the master. Raise as ``call`` does."""
+    """Return the current graph; ``call(method, *arguments)`` calls the master, and its errors are raised."""
     state = await call("getSystemState")
     types = await call("getTopicTypes")
     publishers, subscribers, services = (

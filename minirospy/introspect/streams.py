@@ -1,7 +1,7 @@
-"""Listen and publish with a separate node for a tool; a process may have several.
+"""Nodes that tools use to listen and publish; a process may have several.
 
-Bytes arrive in a worker per connection; :class:`Inbox` passes them to the reading thread, and blocks the workers while that
-thread is busy, so that a slow terminal does not make memory grow.
+Messages arrive in one worker per connection; :class:`Inbox` passes them to the reading thread, and blocks the workers
+while that thread is busy, so that a slow terminal does not make memory grow.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["Inbox", "Received", "ToolNode", "TopicPublisher", "wait_for_topic"]
 
 _POLL_SECONDS = 0.1
-_WAITING = 64  # messages queued for the reader
+_WAITING = 64  # messages queued for the reading thread
 
 _SLICE = 0.05 if sys.platform == "win32" else 3600.0
 """On Windows Ctrl-C does not interrupt a wait of the main thread, so waits are split into short slices."""
@@ -57,10 +57,11 @@ class Received(NamedTuple):
 
 
 class ToolNode:
-    """A node ``name``, else ``<tool>_<pid>_<milliseconds>``; a context manager. ``ended`` is set when it has to stop.
+    """A node named ``name``, or ``<tool>_<pid>_<milliseconds>`` by default; a context manager.
 
-    ``clock`` is the machine's time or, with ``ros_time`` and if the parameter /use_sim_time is set, the time from /clock;
-    ``simulated`` is True then. Raise MasterUnreachableError if no master answers.
+    ``ended`` is set when the node has to stop. ``clock`` is the machine's time or, with ``ros_time`` and if the parameter
+    /use_sim_time is set, the time from /clock; ``simulated`` is True in the latter case. Raise MasterUnreachableError if
+    no master answers.
     """
 
     def __init__(
@@ -83,7 +84,7 @@ class ToolNode:
             if ros_time:
                 self._follow_clock(environment.master_uri)
         except BaseException:
-            # Ctrl-C may interrupt the start after the node's servers are open: close them.
+            # Ctrl-C may interrupt the start after the node's servers were opened: close them.
             self.close()
             raise
 
@@ -96,13 +97,16 @@ class ToolNode:
         self.close()
 
     def close(self) -> None:
-        """Leave the graph. Idempotent."""
+        """Unregister the node and close its connections. Idempotent."""
         self._end()
         self._loop.run(self._node.close())
         self._loop.close()
 
     def wait(self, seconds: float) -> bool:
-        """Sleep for ``seconds`` or until the node has to stop, and return True then. Raise an error from :meth:`measure`."""
+        """Sleep for ``seconds``, or until the node has to stop, and then return True.
+
+        Raise an error that :meth:`measure` met.
+        """
         end = time.monotonic() + seconds
         while not self.ended.is_set():
             rest = end - time.monotonic()
@@ -114,7 +118,7 @@ class ToolNode:
         return True
 
     def wait_for_time(self, seconds: float) -> None:
-        """Wait until a time has arrived on /clock, for ``seconds`` at most."""
+        """Wait until a time has been received on /clock, for at most ``seconds``."""
         end = time.monotonic() + seconds
         while not self.clock.now() and time.monotonic() < end and not self.wait(0.01):
             pass
@@ -122,11 +126,11 @@ class ToolNode:
     def listen(
         self, topic: str, deliver: Callable[[Frame, Header], None], *, tcp_nodelay: bool = False
     ) -> None:
-        """Call ``deliver(bytes, header)`` in a worker for each message of a topic of any type.
+        """Call ``deliver(bytes, header)`` in a worker for each message on a topic of any type.
 
-        The bytes are valid only during the call. A node subscribes to a topic once: a later listener, for example to the
-        /clock that the node itself uses, is called by the same worker. Before that it is called in this thread with the
-        last message that has arrived from each latched publisher.
+        The bytes are valid only during the call. A node subscribes to a topic only once, so the same worker also calls
+        later listeners, for example on the /clock that the node itself uses. A later listener is first called in this
+        thread, with the last message received from each latched publisher.
         """
         if topic in self._listeners:
             self._listeners[topic].add(deliver)
@@ -139,7 +143,7 @@ class ToolNode:
         self._loop.run(self._node.subscribe(subscription))
 
     def measure(self, topic: str, add: Callable[[Received], object], *, tcp_nodelay: bool = False) -> None:
-        """Call ``add`` in a worker for each message of a topic; :meth:`wait` raises its exception."""
+        """Call ``add`` in a worker for each message on a topic; if ``add`` raises, :meth:`wait` raises the exception."""
 
         def deliver(body: Frame, header: Header) -> None:
             try:
@@ -151,7 +155,7 @@ class ToolNode:
         self.listen(topic, deliver, tcp_nodelay=tcp_nodelay)
 
     def stop(self) -> None:
-        """End :meth:`wait` and the reading of inboxes."""
+        """Make :meth:`wait` return and stop the reading of inboxes."""
         self._end()
 
     def inbox(self, topic: str) -> Inbox:
@@ -164,7 +168,7 @@ class ToolNode:
     def publisher(
         self, topic: str, message_class: type[Message], *, latch: bool, queue_size: int = 100
     ) -> TopicPublisher:
-        """Advertise a topic of an installed message class."""
+        """Advertise a topic whose message class is installed."""
         type_ = InterfaceType.of(message_class)
         publication = Publication(topic, type_, queue_size=queue_size, latch=latch)
         self._loop.run(self._node.advertise(publication))
@@ -197,7 +201,7 @@ class ToolNode:
 
 
 class _Listeners:
-    """The functions to call for each message of one topic, once per message."""
+    """The functions to call once for each message on one topic."""
 
     def __init__(self, first: Callable[[Frame, Header], None]) -> None:
         self._functions: tuple[Callable[[Frame, Header], None], ...] = (first,)
@@ -214,8 +218,8 @@ class _Listeners:
             function(body, header)
 
     def deliver(self, body: Frame, header: Header) -> None:
-        """Call all functions with a new message (in a worker)."""
-        # A function that is added now gets this message either from here or from add(), not from both.
+        """Call all functions with a new message; runs in a worker."""
+        # A function that is being added gets this message either from here or from add(), but not from both.
         with self._lock:
             functions = self._functions
             if header.get("latching") == "1":
@@ -233,7 +237,7 @@ class Inbox:
         self._closed = threading.Event()
 
     def put(self, body: Frame, header: Header) -> None:
-        """Queue a message; wait while too many are unread."""
+        """Queue a message; block while too many messages are unread."""
         received = Received(bytes(body), header, self._clock.now())
         while not self._closed.is_set():
             try:
@@ -243,13 +247,13 @@ class Inbox:
             return
 
     def close(self) -> None:
-        """End the reading after the queued messages."""
+        """Stop the reading after the queued messages."""
         if not self._closed.is_set():
             self._closed.set()
             try:
                 self._messages.put_nowait(None)
             except queue.Full:
-                pass  # the queue is full: the reader checks the flag when it has read all messages
+                pass  # the queue is full: the reader checks the flag after it has read all messages
 
     def __iter__(self) -> Iterator[Received]:
         while True:
@@ -283,7 +287,7 @@ class TopicPublisher:
             pass
 
     def publish(self, message: Message) -> None:
-        """Send a message and number its header. Raise MessageException if a value does not fit."""
+        """Send a message, with the next sequence number in its header. Raise MessageException if a value does not fit."""
         if is_stamped(message):
             self._sequence += 1
             message.header.seq = self._sequence
@@ -291,7 +295,10 @@ class TopicPublisher:
 
 
 def wait_for_topic(graph: Graph, name: str, on_waiting: Callable[[], object]) -> TopicField:
-    """Wait until ``name``, a topic or a field of one, is published; return it. Call ``on_waiting`` once if it has to wait."""
+    """Wait until ``name``, a topic or a path to a topic's field, is published; return the topic and the field.
+
+    Call ``on_waiting`` once if it has to wait.
+    """
     field = find_topic(graph, name)
     if field is None:
         on_waiting()

@@ -1,6 +1,6 @@
 """The whole graph as its nodes report it: processes, types, connections, and the traffic between two surveys.
 
-For local processes also their CPU and memory use.
+Surveys also include the CPU and memory use of local processes.
 
 Traffic comes from the nodes' own counters (getBusStats), so that measuring a topic needs no subscription.
 Source: http://wiki.ros.org/ROS/Slave_API (getBusStats, getBusInfo).
@@ -24,7 +24,7 @@ __all__ = ["Edge", "Survey", "describe", "survey", "traffic"]
 
 
 class Edge(NamedTuple):
-    """A connection of a topic: the sending node and the receiving node."""
+    """A topic's connection from the sending node to the receiving node."""
 
     sender: str
     topic: str
@@ -32,7 +32,7 @@ class Edge(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """Messages and bytes sent over a connection since it was opened."""
+    """Messages and bytes sent over a connection since the connection was opened."""
 
     messages: int
     bytes: int
@@ -51,7 +51,10 @@ class Survey:
 
 
 def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
-    """Query the master and all nodes in parallel; with ``processes``, also measure loads. Raise MasterUnreachableError."""
+    """Query the master and all nodes in parallel; with ``processes``, also measure loads.
+
+    Raise MasterUnreachableError if no master answers.
+    """
     state = graph.state()
     answers = ask_nodes(graph, state, with_stats=True)
     host, port = host_port(graph.master.uri)
@@ -68,14 +71,14 @@ def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
 
 
 def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, float]]:
-    """Return messages and bytes per second of each edge that exists in both surveys."""
+    """Return the messages and bytes per second for each edge that exists in both surveys."""
     if before is None or after.seconds <= before.seconds:
         return {}
     span = after.seconds - before.seconds
     found: dict[Edge, tuple[float, float]] = {}
     for key, now in after.counts.items():
         then = before.counts.get(key)
-        # roscpp's counters have 32 bits: skip those that have wrapped around.
+        # roscpp's counters are 32-bit: skip those that have wrapped around.
         if then is None or now.messages < then.messages or now.bytes < then.bytes:
             continue
         hz, size = found.get(key[2], (0.0, 0.0))
@@ -84,7 +87,7 @@ def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, flo
 
 
 def describe(now: Survey, before: Survey | None = None) -> dict[str, object]:
-    """Return a survey for JSON: ``nodes``, ``traffic`` as [sender, topic, receiver, Hz, bytes/s], ``mismatches``."""
+    """Return a survey as values for JSON: ``nodes``, ``traffic`` as [sender, topic, receiver, Hz, bytes/s], ``mismatches``."""
     held: dict[str, list[str]] = {}
     for service, nodes in now.state.services.items():
         for node in nodes:
@@ -144,7 +147,7 @@ def _topics(
 
 
 def _counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
-    """Return a node's counters for each outbound connection; {} if its rows are not as documented."""
+    """Return a node's counters for each outbound connection, or {} if the rows are not in the documented format."""
     receivers = {
         (link.topic, str(link.id)): link.destination for link in answer.links if "o" in link.direction
     }
@@ -154,7 +157,7 @@ def _counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
         try:
             topic, *_, connections = row
             for number, size, *more in connections:
-                # rospy: messages, connected; roscpp: bytes of messages, messages, connected.
+                # rospy's rows have messages, connected; roscpp's rows have bytes of messages, messages, connected.
                 messages = more[1] if len(more) > 2 else more[0]
                 receiver = receivers.get((topic, str(number)))
                 if receiver is not None:

@@ -1,4 +1,4 @@
-"""The output of `rosnode info` and `rostopic info`. Pure except for addresses that are looked up in the graph."""
+"""Format the output of `rosnode info` and `rostopic info`. Pure, except that addresses are looked up in the graph."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ def node_text(detail: NodeDetail) -> str:
 
 
 def connections_text(graph: Graph, connections: Connections) -> str:
-    """Format what a node reports about itself: process id and connections."""
+    """Format the information that a node reports about itself: process id and connections."""
     lines = [f"Pid: {connections.pid}"]
     if connections.links:
         names = {graph.node_uri(node): node for node in list_nodes(graph)}
         lines.append("Connections:")
         for link in connections.links:
             to = link.destination
-            # For an inbound connection the publisher is given by its URI.
+            # An inbound connection has the publisher's URI instead of its name.
             shown = f"{names[to]} ({to})" if to in names else to
             lines += (
                 f" * topic: {link.topic}",
@@ -55,7 +55,7 @@ def connections_text(graph: Graph, connections: Connections) -> str:
 
 
 def topic_text(detail: TopicDetail) -> str:
-    """Return the type, publishers and subscribers of a topic."""
+    """Format a topic's type, publishers and subscribers."""
 
     def side(title: str, nodes: list[NodeAddress]) -> str:
         if not nodes:
@@ -68,7 +68,7 @@ def topic_text(detail: TopicDetail) -> str:
 
 
 def _direction(direction: str, info: str) -> str:
-    """Return ``outbound (port - host:port) [socket]``; the numbers are parsed from the text that nodes send."""
+    """Return ``outbound (port - host:port) [socket]``; the numbers are parsed from the string that nodes send."""
     import re
 
     match = re.match(r"\w+ connection on port (\S+) to \[(\S+) on socket (\d+)\]", info)

@@ -1,4 +1,4 @@
-"""Topics: list them, their types, publishers and subscribers.
+"""Topics: list them, and find their types, publishers and subscribers.
 
 Source: http://wiki.ros.org/ROS/Master_API (getSystemState, getTopicTypes).
 """
@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 UNKNOWN_TYPE = "unknown type"
-"""Printed for a topic whose type no node has declared: it has only subscribers to any type."""
+"""Printed for a topic whose type no node has declared, because it has only subscribers to any type."""
 
 _ANY = "*"
 
@@ -60,7 +60,7 @@ class TopicDetail(NamedTuple):
 
 
 class TopicField(NamedTuple):
-    """A name split into the topic, its type, and the path of a field in its messages."""
+    """A name split into a topic, the topic's type, and the path of a field in the topic's messages."""
 
     topic: str
     type: str
@@ -96,7 +96,7 @@ def list_topics(graph: Graph, namespace: str = "/") -> TopicList:
 
 
 def by_host(graph: Graph, found: TopicList) -> dict[str, TopicList]:
-    """Return the topics by host, for hosts with nodes that use them, hosts sorted."""
+    """Return the topics by host, sorted, for hosts whose nodes use the topics."""
     hosts = {
         node: node_host(graph.node_uri(node)) for side in found for topic in side for node in topic.nodes
     }
@@ -110,7 +110,7 @@ def by_host(graph: Graph, found: TopicList) -> dict[str, TopicList]:
 
 
 def topic_detail(graph: Graph, topic: str) -> TopicDetail:
-    """Return the type, publishers and subscribers of a topic. Raise NotFoundError."""
+    """Return the type, publishers and subscribers of a topic. Raise NotFoundError if the topic does not exist."""
     state = graph.state()
     publishers, subscribers = state.publishers.get(topic, []), state.subscribers.get(topic, [])
     if not publishers and not subscribers:
@@ -124,7 +124,7 @@ def topic_detail(graph: Graph, topic: str) -> TopicDetail:
 
 
 def find_topic(graph: Graph, name: str) -> TopicField | None:
-    """Return the topic for ``name`` (global), which names a topic or a field of one: ``/pose/header/stamp``.
+    """Return the topic for ``name`` (global), which names a topic or a field in its messages: ``/pose/header/stamp``.
 
     Return None if the topic does not exist, or its type is not known yet. A topic with the whole name takes precedence over
     a field of a topic with a shorter name.
@@ -146,9 +146,9 @@ def find_topics_of_type(graph: Graph, type_: str) -> list[str]:
 
 
 def topic_field_type(field: TopicField) -> str:
-    """Return the type of a field of a topic's messages.
+    """Return the type of a field in a topic's messages.
 
-    Raise NotFoundError if the message has no such field, or its type is not installed.
+    Raise NotFoundError if the message has no such field, or a type is not installed.
     """
     from minirospy.core.idl.load import message_class
     from minirospy.introspect.fields import field_type
@@ -157,7 +157,10 @@ def topic_field_type(field: TopicField) -> str:
 
 
 def require_topic(graph: Graph, name: str) -> TopicField:
-    """Return the topic as :func:`find_topic` does. Raise NotFoundError if there is none or its type is not known."""
+    """Return the topic as :func:`find_topic` does.
+
+    Raise NotFoundError if the topic does not exist or its type is not known.
+    """
     field = find_topic(graph, name)
     if field:
         return field

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 __all__ = ["ServiceInfo", "TypeTexts", "described", "installed_type", "type_of_text"]
 
 _MAX_NAMES = 2_000
-"""Cached types, including the names of types that are not installed: a peer may send any number."""
+"""Cached types, including names of types that are not installed: limited, because a peer may send any number of names."""
 _MAX_CONCURRENT = 32  # publishers queried concurrently
 
 
 def installed_type(name: str) -> InterfaceType | None:
-    """Return an installed message type; None if it is not installed or cannot be read."""
+    """Return an installed message type; None if the type is not installed or cannot be read."""
     from minirospy.core.idl.load import get_message_class
 
     try:
@@ -36,7 +36,10 @@ def installed_type(name: str) -> InterfaceType | None:
 
 
 def type_of_text(name: str, text: str) -> InterfaceType | None:
-    """Return the type for a full definition; None if it does not parse. Generates no class, which would take a second."""
+    """Return the type for a full definition; None if it does not parse.
+
+    Generates no class, because that would take a second.
+    """
     from minirospy.core.idl.load import checked_text
 
     try:
@@ -46,7 +49,7 @@ def type_of_text(name: str, text: str) -> InterfaceType | None:
 
 
 class TypeTexts:
-    """Message types by topic. Importing a type's module takes milliseconds, so it is done once, in a worker."""
+    """Message types by topic. Importing a type's module takes milliseconds, so each is imported once, in a worker."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -56,7 +59,7 @@ class TypeTexts:
     async def of_publishers(
         self, topics: Mapping[str, tuple[str, ...]], seconds: float
     ) -> dict[str, InterfaceType]:
-        """Query the publishers of these topics; return the types that arrive within ``seconds``: a publisher may stall."""
+        """Query these topics' publishers; return the types that arrive within ``seconds``, because a publisher may stall."""
         if not topics:
             return {}
         limit = asyncio.Semaphore(_MAX_CONCURRENT)
@@ -76,14 +79,14 @@ class TypeTexts:
         return {topic: found for topic, found in done.items() if found}
 
     async def installed(self, name: str) -> InterfaceType | None:
-        """Return an installed type, None if it is not installed."""
+        """Return the type, or None if it is not installed."""
         if name in self._installed:
             return self._installed[name]
 
         loop = asyncio.get_running_loop()
         found = await loop.run_in_executor(None, installed_type, name)
         while len(self._installed) >= _MAX_NAMES:
-            # Remove the oldest entry: dictionaries keep their order.
+            # Remove the oldest entry: dictionaries preserve insertion order.
             del self._installed[next(iter(self._installed))]
         self._installed[name] = found
         return found
@@ -93,7 +96,8 @@ class TypeTexts:
             with contextlib.suppress(MinirospyError, OSError, asyncio.TimeoutError, ValueError):
                 header = await self.header_of(topic, publisher)
                 text = header.get("message_definition", "")
-                if text or header["md5sum"] == "d41d8cd98f00b204e9800998ecf8427e":  # a message without fields
+                # an empty definition is valid for a message without fields
+                if text or header["md5sum"] == "d41d8cd98f00b204e9800998ecf8427e":
                     return InterfaceType(header["type"], header["md5sum"], text)
         return None
 
@@ -115,14 +119,14 @@ class TypeTexts:
         return header
 
     async def close(self) -> None:
-        """Close the connections."""
+        """Close the connections to the nodes."""
         with contextlib.suppress(RpcError):
             await self._rpc.close()
 
 
 @dataclass(frozen=True)
 class ServiceInfo:
-    """A service's type: full definitions of request and response."""
+    """A service's type: the full definitions of its request and response."""
 
     name: str
     type: str
@@ -132,7 +136,7 @@ class ServiceInfo:
 
 
 def described(name: str, header: Mapping[str, str]) -> ServiceInfo:
-    """Return the type named in a service's connection header. Raise NotFoundError if it is not installed."""
+    """Return the type named in a service's connection header. Raise NotFoundError if the type is not installed."""
     from minirospy.core.idl.load import get_service_class
 
     type_ = header.get("type", "")

@@ -1,4 +1,4 @@
-"""Parse and format values as users write and read them: YAML text to parameter values, and back.
+"""Convert the YAML that users write and read to parameter values, and back.
 
 Pure. Simple values, which most parameters are, are parsed and formatted without importing a YAML library, because the import
 takes longer than everything else that `rosparam get` does. ``deg(90)`` and ``rad(pi/2)`` are angles in radians.
@@ -43,7 +43,7 @@ _MAX_SHOWN_DIGITS = 40  # digits of an integer in an error message
 
 
 def parse_value(text: str) -> object:
-    """Parse a YAML string. Raise ValueTextError."""
+    """Parse a YAML string. Raise ValueTextError if it is invalid."""
     word = text.strip()
     whole, dot, fraction = word.removeprefix("-").partition(".")
     if _is_digits(whole) and dot and _is_digits(fraction):
@@ -66,7 +66,7 @@ def parse_value(text: str) -> object:
 
 
 def parse_documents(text: str, where: str) -> Iterator[object]:
-    """Yield the values of a YAML string's documents, which are separated by ``---``. Raise ValueTextError."""
+    """Yield the values of a YAML string's documents, which are separated by ``---``. Raise ValueTextError if it is invalid."""
     import yaml
 
     try:
@@ -76,7 +76,10 @@ def parse_documents(text: str, where: str) -> Iterator[object]:
 
 
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
-    """Yield values as :func:`parse_documents`, each as soon as it is complete: `rostopic echo /a | rostopic pub /b TYPE`."""
+    """Yield values as :func:`parse_documents` does, but each as soon as it is complete.
+
+    `rostopic echo /a | rostopic pub /b TYPE` needs this.
+    """
     text: list[str] = []
     for line in lines:
         if line.rstrip() != "---":
@@ -88,12 +91,12 @@ def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
 
 
 def parse_arguments(words: Sequence[str]) -> list[object]:
-    """Parse a message's values from the command line. An empty argument is an empty string; in YAML it would be null."""
+    """Parse a message's values from the command line. An empty argument becomes an empty string, not null as in YAML."""
     return [parse_value(word) if word else "" for word in words]
 
 
 def message_values(documents: Iterable[object]) -> Iterator[list[object]]:
-    """Yield each document's values for a message: a list has one value per field."""
+    """Yield each document's values for a message: a list with one value per field."""
     for document in documents:
         if document is not None:
             yield document if isinstance(document, list) else [document]
@@ -146,7 +149,10 @@ def check_parameter(value: object, name: str) -> None:
 
 
 def _is_digits(text: str) -> bool:
-    """Return whether a string is at most nine ASCII digits. Not a regular expression: compiling one slows the start."""
+    """Return whether a string is at most nine ASCII digits.
+
+    Uses no regular expression, because compiling one slows the start.
+    """
     return text.isascii() and text.isdecimal() and len(text) <= 9
 
 
@@ -176,7 +182,7 @@ def _pretty_lines(table: dict[str, object], indent: str) -> Iterator[str]:
 
 @lru_cache(maxsize=1)
 def _loader() -> type[yaml.SafeLoader]:
-    """Return a safe YAML loader that knows angles."""
+    """Return a safe YAML loader that accepts angle expressions such as ``deg(90)``."""
 
     class AngleLoader(yaml_text.fast_loader()):  # type: ignore[misc]
         pass
@@ -210,12 +216,15 @@ def add_angles(loader_class: type[_Loader]) -> None:
 
 
 def _arithmetic(text: str) -> float:
-    """Evaluate an arithmetic expression over numbers and ``pi``. Raise ValueError, SyntaxError or ArithmeticError."""
+    """Evaluate an arithmetic expression over numbers and ``pi``.
+
+    Raise ValueError, SyntaxError or ArithmeticError if it is invalid.
+    """
     import ast
     import operator
 
     if len(text) > _MAX_ANGLE_LENGTH:
-        # Longer strings may exceed limits of Python's parser, which raises other errors then.
+        # Longer strings may exceed limits of Python's parser, which then raises other errors.
         raise ValueError(f"more than {_MAX_ANGLE_LENGTH} characters")
     binary = {
         ast.Add: operator.add,

@@ -16,7 +16,7 @@ _GOAL_TYPE = "ActionGoal"
 
 @dataclass(frozen=True)
 class ActionLink:
-    """An action that is offered on one side and used from the other. ``direction``: the direction of goals."""
+    """An action that one side offers and the other side uses. ``direction``: the direction in which goals are sent."""
 
     action: str
     direction: Direction
@@ -30,14 +30,14 @@ class ActionLink:
 
 
 def send_goal_service(action: str) -> str:
-    """Return the name of the service by which a ROS 2 action receives goals."""
+    """Return the name of the service through which a ROS 2 action receives goals."""
     return action + _SEND_GOAL
 
 
 def action_links(
     ros1: Snapshot, ros2_services: Mapping[str, str], partner: Callable[[str, Direction], str]
 ) -> list[ActionLink]:
-    """Return the actions to bridge: those that only one side offers, apart from bridges.
+    """Return the actions to bridge: those that only one side offers, ignoring bridges.
 
     ``ros2_services``: services and their types. ``partner(type, direction)`` returns the type on the goals' sending side.
     """

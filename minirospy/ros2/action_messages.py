@@ -1,4 +1,4 @@
-"""Serialize and parse the ROS 1 messages of an action around goals, feedback and results, which stay bytes. Pure.
+"""Serialize and parse an action's ROS 1 messages; the goals, feedback and results in them stay serialized. Pure.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription, and the definitions of actionlib_msgs.
 """
@@ -38,12 +38,12 @@ class GoalId(NamedTuple):
 
     @property
     def nanoseconds(self) -> int:
-        """Return the time in nanoseconds, 0 if there is none."""
+        """Return the time in nanoseconds, or 0 if there is none."""
         return self.secs * 1_000_000_000 + self.nsecs
 
 
 class Status(NamedTuple):
-    """A goal's status: a number of GoalState, and a text for users."""
+    """A goal's status: the number of a GoalState, and a message for users."""
 
     goal: GoalId
     state: int
@@ -56,7 +56,7 @@ def goal_message(goal: GoalId, body: bytes) -> bytes:
 
 
 def parse_goal(data: bytes | memoryview) -> tuple[GoalId, bytes]:
-    """Return the goal's id and body from an ActionGoal. Raise DeserializationError."""
+    """Return the goal's id and body from an ActionGoal. Raise DeserializationError if it is invalid."""
     data = bytes(data)
     goal, end = _parse_goal_id(data, _parse_header(data))
     return goal, data[end:]
@@ -68,7 +68,7 @@ def cancel_message(goal: GoalId) -> bytes:
 
 
 def parse_cancel(data: bytes | memoryview) -> GoalId:
-    """Parse a GoalID. Raise DeserializationError."""
+    """Parse a GoalID. Raise DeserializationError if it is invalid."""
     return _parse_goal_id(bytes(data), 0)[0]
 
 
@@ -78,7 +78,7 @@ def status_and_body(secs: int, nsecs: int, status: Status, body: bytes) -> bytes
 
 
 def parse_status_and_body(data: bytes | memoryview) -> tuple[Status, bytes]:
-    """Return the status and body from an ActionFeedback or ActionResult. Raise DeserializationError."""
+    """Return the status and body from an ActionFeedback or ActionResult. Raise DeserializationError if it is invalid."""
     data = bytes(data)
     status, end = _parse_status(data, _parse_header(data))
     return status, data[end:]
@@ -91,7 +91,7 @@ def statuses_message(secs: int, nsecs: int, statuses: Iterable[Status]) -> bytes
 
 
 def parse_statuses(data: bytes | memoryview) -> list[Status]:
-    """Parse a GoalStatusArray. Raise DeserializationError."""
+    """Parse a GoalStatusArray. Raise DeserializationError if it is invalid."""
     data = bytes(data)
     end = _parse_header(data)
     (count,) = _unpacked(_LENGTH, data, end)
@@ -150,5 +150,5 @@ def _parse_text(data: bytes, start: int) -> tuple[str, int]:
 def _unpacked(struct_: struct.Struct, data: bytes, start: int) -> tuple[int, ...]:
     try:
         return struct_.unpack_from(data, start)
-    except (struct.error, OverflowError) as error:  # OverflowError: an offset that does not fit 32 bits
+    except (struct.error, OverflowError) as error:  # OverflowError: an offset that exceeds 32 bits
         raise DeserializationError("the message ends too early") from error

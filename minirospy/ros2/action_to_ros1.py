@@ -1,4 +1,4 @@
-"""A ROS 1 action that the bridge offers in ROS 2: goals go to ROS 1, feedback and results come back."""
+"""A ROS 1 action that the bridge offers in ROS 2: goals are sent to ROS 1, feedback and results are sent back."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["MAX_GOALS", "GoalsToRos1"]
 
 _SERVER_SECONDS = 5.0
-"""Timeout for a ROS 1 server to connect, and to list a new goal in its statuses."""
+"""Timeout for a ROS 1 server to connect, and to include a new goal in its statuses."""
 MAX_GOALS = 1_000
 """Goals that are passed on concurrently; further ones are refused."""
 _PENDING_SECONDS = 0.5
@@ -75,7 +75,7 @@ class _Goal:
 
 
 class GoalsToRos1:
-    """The client of the ROS 1 server. Runs on the node's loop."""
+    """The client of a ROS 1 action server. Runs on the node's loop."""
 
     def __init__(self, node: Node, side: Ros2Side, link: ActionLink, codec: ActionCodec) -> None:
         self._node = node
@@ -104,14 +104,14 @@ class GoalsToRos1:
         ]
 
     async def open(self) -> None:
-        """Connect to the server, then offer the action. Raise TypesDiffer."""
+        """Connect to the server, then offer the action. Raise TypesDiffer if its types cannot be converted."""
         for end in (self._goal, self._cancel, *self._subscriptions):
             await end
         self._server = self._side.action_server(self._link.action, self._link.ros2_type, self._accept)
 
     async def close(self) -> None:
-        """Close the action: running goals are aborted, those whose result has arrived receive it."""
-        # A result that has arrived is processed in the loop's next iteration.
+        """Close the action: abort running goals; goals whose result has arrived receive that result."""
+        # A result that has arrived is processed in the next loop iteration.
         await asyncio.sleep(0)
         self._is_closed = True
         for goal in list(self._goals.values()):
@@ -137,14 +137,14 @@ class GoalsToRos1:
         if self._is_closed:
             accepted.set_exception(BridgeError("it is not bridged any more"))
             return
-        # Count goals that are being accepted, and running ones.
+        # Count both goals that are being accepted and running goals.
         if len(self._tasks) + len(self._goals) >= MAX_GOALS:
             accepted.set_exception(BridgeError(f"the bridge passes on {MAX_GOALS} goals already"))
             return
         task = asyncio.ensure_future(self._send(data, feedback, accepted))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # Also if the task is cancelled, even before its first step.
+        # Also needed if the task is cancelled, even before its first step.
         task.add_done_callback(lambda _: accepted.cancel())
 
     async def _send(
@@ -177,7 +177,7 @@ class GoalsToRos1:
         return goal if is_accepted else None
 
     async def _connected(self) -> None:
-        """Wait until the server is connected in both directions: a goal sent before that would be lost."""
+        """Wait until the server is connected in both directions, because a goal sent before that would be lost."""
         await self._heard.wait()
         for publisher in (self._goal, self._cancel):
             await publisher.wait_for_subscribers()
@@ -231,7 +231,7 @@ class GoalsToRos1:
         goal = self._goals.get(status.goal.id)
         if not goal:
             return
-        # Feedback has a separate connection: process what has already arrived first.
+        # Feedback has a separate connection: first process feedback that has already arrived.
         self._loop.call_soon(self._take_end, goal, status.state, body)
 
     def _take_end(self, goal: _Goal, state: int, body: bytes) -> None:

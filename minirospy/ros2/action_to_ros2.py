@@ -1,4 +1,4 @@
-"""A ROS 2 action that the bridge offers in ROS 1: goals go to ROS 2, feedback and results come back."""
+"""A ROS 2 action that the bridge offers in ROS 1: goals are sent to ROS 2, feedback and results are sent back."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ _KEPT_SECONDS = 5.0
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _REACH_SECONDS = 2.0
-"""Maximum time for which opening this link delays others while it waits for the server."""
+"""Maximum time that opening this link delays other links while it waits for the server."""
 _ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
-"""Delay before a response: Python's actionlib drops responses that arrive before its send_goal has returned."""
+"""Delay before a response, because Python's actionlib drops responses that arrive before its send_goal has returned."""
 _QUEUE = 50
 _MAX_SENT = 4
-"""Goals that wait for acceptance concurrently: a server's queue has 10 places, and further ones would be lost."""
+"""Goals that are sent and not yet accepted: a server's queue has 10 places, and further goals would be lost."""
 MAX_GOALS = 1_000
-"""Stored goals, including those that ended recently; further ones are refused."""
+"""Stored goals, including recently ended ones; further goals are refused."""
 _EVENTS = {SUCCEEDED: GoalEvent.SUCCEED, CANCELED: GoalEvent.CANCEL}
 
 
@@ -63,18 +63,18 @@ class _Goal:
         self.ended_at = 0.0
 
     def step(self, event: GoalEvent, text: str = "") -> None:
-        """Go to the next state, if the event leads to one."""
+        """Move to the next state, if the event leads to one."""
         state = SERVER_STEPS[event].get(self.status.state)
         if state is not None:
             self.status = Status(self.status.goal, int(state), text)
 
     def fail(self, text: str) -> None:
-        """End the goal with a reason: reject it before it was accepted, abort it after that."""
+        """End the goal with a reason: reject it if it has not been accepted yet, otherwise abort it."""
         self.step(GoalEvent.REJECT if self.there is None else GoalEvent.ABORT, text)
 
 
 class GoalsToRos2:
-    """The server in ROS 1. Runs on the node's loop."""
+    """The action server in ROS 1. Runs on the node's loop."""
 
     def __init__(self, node: Node, side: Ros2Side, link: ActionLink, codec: ActionCodec) -> None:
         self._node = node
@@ -107,14 +107,14 @@ class GoalsToRos2:
         self._reach = Reach(self._client)
 
     async def open(self) -> None:
-        """Wait for the ROS 2 server, then until the topics are registered at the master."""
+        """Wait for the ROS 2 server, then register the topics at the master."""
         self._reach.start()
         await self._reach.wait(_REACH_SECONDS)
         for end in (self._status, self._result, self._feedback, *self._subscriptions):
             await end
 
     async def close(self) -> None:
-        """Close the action: running goals are aborted."""
+        """Close the action and abort its running goals."""
         self._ended.set()
         await self._reach.close()
         if self._tasks:
@@ -172,7 +172,7 @@ class GoalsToRos2:
         self._changed.set()
 
     async def _run(self, goal: _Goal, request: bytes) -> None:
-        """Send a goal to ROS 2, and its result back."""
+        """Send a goal to ROS 2, and send its result back."""
         body = self._codec.empty_result
         self._changed.set()
         try:
@@ -206,13 +206,13 @@ class GoalsToRos2:
             self._result.publish_raw(status_and_body(*self._now(), goal.status, body))
 
     async def _become_ready(self) -> None:
-        """Wait for the server: if the action has just been discovered, it may not be connected yet."""
+        """Wait for the server, which may not be connected yet if the action has just been discovered."""
         end = self._loop.time() + _ABSENT_LOOKS * _LOOK_SECONDS
         while not self._client.is_ready and self._loop.time() < end and not self._ended.is_set():
             await asyncio.sleep(0.02)
 
     async def _watched(self, future: Future[_T]) -> _T:
-        """Return a future's result. Raise BridgeError if the server disappears before that."""
+        """Return a future's result. Raise BridgeError if the server disappears first."""
         answered = asyncio.wrap_future(future)
         ended: asyncio.Future[bool] = asyncio.ensure_future(self._ended.wait())
         awaited: list[asyncio.Future[_T] | asyncio.Future[bool]] = [answered, ended]
@@ -237,10 +237,10 @@ class GoalsToRos2:
         except DeserializationError as error:
             self._misfits.error("feedback of action %s: %s", self._link.action, error)
         except ROSException:
-            return  # closed meanwhile
+            return  # the action was closed in the meantime
 
     async def _publish_statuses(self) -> None:
-        """Publish the statuses of all goals after each change, and at regular intervals."""
+        """Publish the statuses of all goals after each change and at regular intervals."""
         await self._status
         # Check the flag, because wait_for in Python 3.11 may swallow a cancellation.
         while not self._ended.is_set():

@@ -1,4 +1,4 @@
-"""Actions between the two sides: open and close them, and convert their messages."""
+"""Open and close actions between the two sides, and convert their messages."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _WIDTHS = {"time": 8, "duration": 8, "string": 4}
 
 @dataclass(frozen=True)
 class ActionCodec:
-    """Converts an action's messages; ``classes``: the types of its ROS 1 topics, by the topics' last name."""
+    """Converts an action's messages; ``classes``: the types of its ROS 1 topics, by the last part of each topic's name."""
 
     goal: Transcoder
     result: Transcoder
@@ -45,7 +45,7 @@ class ActionCodec:
 
 
 class _Types:
-    """The codecs of actions, by their types on both sides."""
+    """The codecs for actions, by their types on both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -54,7 +54,7 @@ class _Types:
         self._codecs: dict[tuple[str, str], ActionCodec] = {}
 
     def partner(self, type_: str, direction: Direction) -> str:
-        """Return the type on the side that sends goals, for the type on the offering side."""
+        """Return the type on the side that sends goals, given the type on the offering side."""
         names: tuple[str, ...]
         if direction is Direction.TO_ROS1:
             names = self._rules.ros2_actions(type_)
@@ -63,7 +63,7 @@ class _Types:
         return next((name for name in names if self._is_in_ros1(name)), names[0])
 
     def codec(self, ros1_type: str, ros2_type: str) -> ActionCodec:
-        """Return the codec of an action. Raise TypesDiffer."""
+        """Return an action's codec. Raise TypesDiffer if its types cannot be converted."""
         key = (ros1_type, ros2_type)
         if key not in self._codecs:
             self._codecs[key] = self._made(ros1_type, ros2_type)
@@ -114,7 +114,7 @@ class _Types:
 
 
 def empty_message(spec: MessageSpec, lookup: Lookup) -> bytes:
-    """Return the bytes of a ROS 1 message whose fields are all zero or empty."""
+    """Return a serialized ROS 1 message whose fields are all zero or empty."""
 
     def of_type(type_: FieldType) -> bytes:
         if type_.is_array and type_.length is None:

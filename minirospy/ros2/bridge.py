@@ -49,23 +49,23 @@ if TYPE_CHECKING:
 __all__ = ["Ros2Bridge", "Ros2Options"]
 
 _ORIGIN = "ros2_domain"
-"""Connection header field of publishers for ROS 2 data, so that no bridge to the same domain sends the data back."""
+"""Connection header field that marks publishers of ROS 2 data, so that no bridge to the same domain sends the data back."""
 _MIN_REFRESH_INTERVAL = 0.25
 _QUERY_SECONDS = 3.0
-"""Timeout, after which topics are bridged without unanswered publishers' information."""
+"""Timeout, after which topics are bridged even if publishers have not responded."""
 _JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
 _DEPTH = 1000
 _DEPTH_OF_LARGE = 20
 _ROS1_QUEUE = 1000
-"""Queued messages: enough for a pause of a busy machine, except for images."""
+"""Queued messages: enough to bridge a pause on a busy machine, except for images."""
 
 
 @dataclass(frozen=True)
 class Ros2Options:
-    """``topics``, ``services``, ``actions``: filters of what to bridge. ``call_seconds``: timeout of service calls.
+    """``topics``, ``services``, ``actions``: filters that select what to bridge. ``call_seconds``: timeout of service calls.
 
-    ``max_refresh_interval``: seconds between polls of graphs that do not change.
+    ``max_refresh_interval``: seconds between polls while the graphs do not change.
     """
 
     topics: NameFilter = field(default_factory=NameFilter)
@@ -90,7 +90,7 @@ class _Types:
         return InterfaceType(spec.full_name, message_md5(spec, lookup), full_text(spec, lookup))
 
     def installed(self, name: str) -> tuple[MessageSpec, Lookup]:
-        """Return an installed message type. Raise TypesDiffer."""
+        """Return an installed message type. Raise TypesDiffer if it is not installed."""
         try:
             return self._catalogue.message(name), self._catalogue.message
         except (NotFoundError, DefinitionError) as error:
@@ -99,7 +99,7 @@ class _Types:
             ) from error
 
     def of_text(self, name: str, text: str) -> tuple[MessageSpec, Lookup]:
-        """Return the type for a publisher's full definition. Raise TypesDiffer."""
+        """Return the type for a publisher's full definition. Raise TypesDiffer if the definition is invalid."""
         try:
             specs = specs_of_text(name, text)
         except DefinitionError as error:
@@ -113,7 +113,7 @@ class _Types:
         return specs[name], lookup
 
     def transcoder(self, spec: MessageSpec, lookup: Lookup, ros2_type: str) -> Transcoder:
-        """Return the conversion functions. Raise TypesDiffer."""
+        """Return the conversion functions. Raise TypesDiffer if the types cannot be converted."""
         allowed = self._rules.ros2_messages(spec.full_name)
         if ros2_type not in allowed:
             raise TypesDiffer(f"no rule makes [{spec.full_name}] a [{ros2_type}]: write one for --rules")
@@ -149,7 +149,7 @@ class Ros2Bridge:
         self._is_closed = False
 
     async def start(self) -> None:
-        """Bridge until :meth:`close`. Raise MasterUnreachableError or RpcError."""
+        """Bridge until :meth:`close`. Raise MasterUnreachableError or RpcError if a call to the master fails."""
         await self._parameters.start()
         await self.look()
         reporter = ErrorReporter(self.node.log, "the watch of both graphs")
@@ -171,7 +171,10 @@ class Ros2Bridge:
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
     async def pairs(self) -> list[Pair]:
-        """Return the links to bridge, and the reasons for those that are not; open nothing. Raise as :meth:`look` does."""
+        """Return the links to bridge, and the reasons for those that are not; open none of them.
+
+        Raise the errors of :meth:`look`.
+        """
         snapshot = await self._snapshot()
         topics = pairs(await self._wanted(snapshot), self._converter)
         return [*topics, *await self.services.pairs(snapshot.services), *self.actions.pairs(snapshot)]
@@ -182,7 +185,10 @@ class Ros2Bridge:
             await self._changed.wait()
 
     async def look(self) -> bool:
-        """Open and close links to match the graphs; return whether any changed. Raise MasterUnreachableError or RpcError."""
+        """Open and close links to match the graphs; return whether any changed.
+
+        Raise MasterUnreachableError or RpcError if a call to the master fails.
+        """
         snapshot = await self._snapshot()
         has_changed = await self.topics.update(await self._wanted(snapshot))
         has_changed |= await self.services.look(snapshot.services)
@@ -194,7 +200,7 @@ class Ros2Bridge:
     async def _watch(self) -> None:
         pause = _MIN_REFRESH_INTERVAL
         is_reported = False
-        # Check the flag, because wait_for in Python 3.11, which calls use, may swallow a cancellation.
+        # Check the flag, because wait_for in Python 3.11, which the called methods use, may swallow a cancellation.
         while not self._is_closed:
             await asyncio.sleep(pause)
             changed = False
@@ -227,7 +233,7 @@ class Ros2Bridge:
         return links(snapshot, ros2, self._is_latched, self.options.rules.ros1_message)
 
     async def _look_at_publishers(self, snapshot: Snapshot, ros2: Mapping[str, Ros2Topic]) -> None:
-        """Query new ROS 1 publishers, on topics with ROS 2 subscribers, for their definition and whether they latch."""
+        """Query new ROS 1 publishers, on topics with ROS 2 subscribers, for their definitions and whether they latch."""
         present = [
             (topic, node)
             for topic, ends in ros2.items()
@@ -244,7 +250,7 @@ class Ros2Bridge:
         return self._headers.found.get((topic, node), {}).get("latching") == "1"
 
     def _converter(self, link: Link) -> tuple[Transcoder, MessageSpec, Lookup]:
-        """Return the conversion functions for a link's types. Raise TypesDiffer."""
+        """Return the conversion functions for a link's types. Raise TypesDiffer if the types cannot be converted."""
         texts = [
             header.get("message_definition", "")
             for (topic, _), header in self._headers.found.items()
@@ -266,7 +272,7 @@ class Ros2Bridge:
 
 
 class _Passing:
-    """An open link; ``passed`` counts its messages."""
+    """An open link; ``passed`` is the number of messages passed."""
 
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder) -> None:
         self.link = link
@@ -278,7 +284,7 @@ class _Passing:
         self._statics = StaticTransforms() if is_static else None
 
     def _with_statics(self, message: Frame) -> Frame:
-        """Return a message; on a static transform topic, merged with all known static transforms."""
+        """Return a message; on a static transform topic, merge it with all known static transforms."""
         if self._statics is None:
             return message
         left_out = self._statics.left_out
@@ -315,7 +321,7 @@ class _ToRos2(_Passing):
         self._publisher.close()
 
     async def _wait_for_subscribers(self) -> None:
-        """Wait for the existing subscribers to connect: they would not receive messages published before that."""
+        """Wait until the existing subscribers are connected, because they would miss messages published before that."""
         loop = asyncio.get_running_loop()
         end = loop.time() + _JOIN_SECONDS
         while not self._publisher.subscribers and loop.time() < end:
@@ -368,12 +374,12 @@ class _ToRos1(_Passing):
     def _deliver(self, data: bytes) -> None:
         """Pass a message to ROS 1. Runs in the executor's thread, which writes to the ROS 1 sockets itself."""
         if data[2:4] == self._bridge.header[2:4]:
-            return  # sent by a bridge from the same ROS 1 graph
+            return  # a bridge to the same ROS 1 graph sent this message
         try:
             self._publisher.publish_raw(bytes(self._with_statics(self._made.to_ros1(data))))
         except DeserializationError as error:
             self._report(error)
         except ROSException:
-            return  # closed meanwhile
+            return  # the link was closed in the meantime
         else:
             self.passed += 1

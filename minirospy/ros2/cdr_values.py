@@ -1,7 +1,7 @@
-"""Encode and decode ROS 2 messages in CDR by the fields of their type, for messages that the bridge itself uses. Pure.
+"""Encode and decode, by their types' fields, the ROS 2 messages that the bridge itself uses, in CDR. Pure.
 
-Messages that are only passed on are converted by ``core/idl/cdr.py``, which is faster. Numbers are int, float or bool, byte
-arrays bytes, other arrays lists, messages dicts.
+Messages that are only passed on are converted by ``core/idl/cdr.py``, which is faster. Numbers become int, float or bool,
+byte arrays bytes, other arrays lists, and messages dicts.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _HEADER = len(CDR_HEADER)
 def decode(name: str, fields: Callable[[str], Fields], data: bytes) -> dict[str, object]:
     """Decode a message of type ``name``; ``fields(type)`` returns a type's fields.
 
-    Raise DeserializationError.
+    Raise DeserializationError if the data is invalid.
     """
     if len(data) < _HEADER or data[:2] not in (b"\0\0", b"\0\1"):
         raise DeserializationError("this is not plain CDR of version 1")
@@ -66,7 +66,7 @@ class _Reader:
         if count is None:
             count = self._length()
         if count > len(self._data) - self._at:
-            # An element has at least one byte.
+            # Each element has at least one byte.
             raise DeserializationError("the message ends too early")
         if base not in _LETTERS:
             return [self._one(base) for _ in range(count)]

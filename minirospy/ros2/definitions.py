@@ -1,7 +1,7 @@
-"""Derive ROS 2's type definitions from those of ROS 1 and the rules, for use without an installed ROS 2. Pure.
+"""Derive ROS 2 type definitions from ROS 1 definitions and the rules, for use without an installed ROS 2. Pure.
 
-The results, fields and their types, replace those of rclpy's classes and determine the layout in CDR. That they match the
-other side's definitions is verified by the type hash, which is part of each key of rmw_zenoh.
+The results (fields and their types) replace the information from rclpy's classes and determine the CDR layout. Whether
+they match the other side's definitions is verified by the type hash, which is part of each key of rmw_zenoh.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from minirospy.ros2.rules import Rules, snake_case
 
 __all__ = ["NO_HASH", "Definitions"]
 
-NO_HASH = "TypeHashNotSupported"  # in the keys of ROS 2 Humble, which has no hashes
+NO_HASH = "TypeHashNotSupported"  # in ROS 2 Humble's keys, which have no hashes
 
 _TIME = {"sec": "int32", "nanosec": "uint32"}
 _STAMP = "builtin_interfaces/Time"
@@ -119,7 +119,10 @@ _BASES = {"char": "uint8", "time": _STAMP, "duration": "builtin_interfaces/Durat
 
 
 class Definitions:
-    """ROS 2's types, ``pkg/Name``, with fields from ROS 1's definitions and the rules. All methods raise TypesDiffer."""
+    """ROS 2's types, ``pkg/Name``, with fields from ROS 1's definitions and the rules.
+
+    All methods raise TypesDiffer if a type cannot be derived.
+    """
 
     def __init__(self, rules: Rules, catalogue: Catalogue) -> None:
         self._rules = rules
@@ -128,7 +131,7 @@ class Definitions:
         self._hashes: dict[str, str] = {}
 
     def message(self, name: str, *, is_humble: bool = False) -> Fields:
-        """Return the fields of a message; ``is_humble``: of ROS 2 Humble's version."""
+        """Return the fields of a message; ``is_humble``: as in ROS 2 Humble."""
         key = (name, is_humble)
         if key not in self._found:
             self._found[key] = _ONLY_IN_ROS2.get(name) or self._of_ros1(name, is_humble)

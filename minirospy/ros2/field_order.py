@@ -1,4 +1,4 @@
-"""Reorder the bytes of ROS 1 messages whose fields have another order than in ROS 2. Pure.
+"""Reorder the bytes of ROS 1 messages whose fields are in a different order than in ROS 2. Pure.
 
 ROS 1 messages have no padding, so a field's bytes do not depend on its position. The generated functions of
 :mod:`minirospy.core.idl.cdr` then convert a message whose fields are in ROS 2's order.
@@ -61,14 +61,14 @@ def inverse(node: Node) -> Node:
 
 
 def reorder(node: Node, data: bytes | memoryview) -> bytes:
-    """Return a message with its fields in the other order. Raise DeserializationError if it is too short."""
+    """Return a message with its fields in the other order. Raise DeserializationError if the message is too short."""
     view = memoryview(data)
     parts: list[bytes | memoryview] = []
     try:
         end = _write(node, view, 0, parts)
     except struct.error as error:
         raise DeserializationError("the message ends too early") from error
-    parts.append(view[end:])  # the conversion rejects data after the message
+    parts.append(view[end:])  # the conversion rejects trailing data
     return b"".join(parts)
 
 
@@ -110,7 +110,7 @@ def _write_fields(node: Reordered, data: memoryview, start: int, parts: list[byt
 
 
 def _count(node: Array, data: memoryview, start: int) -> tuple[int, int]:
-    """Return an array's number of elements, and the offset of the first."""
+    """Return an array's number of elements, and the offset of the first element."""
     if node.length is not None:
         return node.length, start
     (count,) = _COUNT.unpack_from(data, start)

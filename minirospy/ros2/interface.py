@@ -48,14 +48,14 @@ class Ros2Handle(Protocol):
 
 
 class Ros2Probe(Protocol):
-    """Sends requests without effect to a client's servers. Methods may be called from any thread."""
+    """Sends requests that have no effect to a client's servers. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
         """Return whether the servers are connected."""
 
     def reach(self) -> Future[None]:
-        """Send a request; return the future of its response. After that response, none to the client is lost."""
+        """Send a request and return the future of its response. After that response, no response to the client is lost."""
 
     def close(self) -> None: ...
 
@@ -64,7 +64,7 @@ class Ros2Client(Reachable, Protocol):
     """A client of a service. Methods may be called from any thread."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return the future of the response, both as CDR. It fails with BridgeError."""
+        """Send a request and return the future of the response, both as CDR. The future fails with BridgeError."""
 
     def close(self) -> None: ...
 
@@ -73,18 +73,24 @@ class Ros2ActionClient(Reachable, Protocol):
     """A client of an action. Methods may be called from any thread."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the future of the accepted goal, None if it is refused. It fails with BridgeError."""
+        """Send a goal; return the future of the accepted goal, which is None if the goal is refused.
+
+        The future fails with BridgeError.
+        """
 
     def close(self) -> None: ...
 
 
 class Ros2Parameters(Protocol):
-    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread. All raise BridgeError."""
+    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread.
+
+    All raise BridgeError if the call fails.
+    """
 
     def names(self, node: str) -> list[str]: ...
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter; its type is 0 if it is not set."""
+        """Return a parameter, with type 0 if it is not set."""
 
     def set(self, node: str, name: str, value: Value) -> None: ...
 
@@ -128,7 +134,10 @@ class Ros2Side(Protocol):
     def client(self, service: str, type_: str) -> Ros2Client: ...
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service: call ``answer`` with a request's CDR, in a thread; a MinirospyError of its future fails the call."""
+        """Offer a service: call ``answer`` with a request's CDR, in a thread.
+
+        A MinirospyError from its future fails the call.
+        """
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
         """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if it is not installed."""
@@ -136,7 +145,7 @@ class Ros2Side(Protocol):
     def action_client(self, action: str, type_: str) -> Ros2ActionClient: ...
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Offer an action: call ``accept`` with a goal and the function that sends its feedback, in a thread."""
+        """Offer an action: call ``accept``, in a thread, with a goal and the function that sends the goal's feedback."""
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
         """Offer the ROS 1 parameters as this node's parameters."""

@@ -1,6 +1,6 @@
-"""Compute the common layout of a message from its ROS 1 and ROS 2 specs and the rules, or why there is none. Pure.
+"""Compute the common layout of a message from its ROS 1 and ROS 2 specs and the rules, or the reason why none exists. Pure.
 
-A ROS 2 spec has the form of a ROS 1 spec: its numeric types have ROS 1's names, its times are ``builtin_interfaces/Time``.
+A ROS 2 spec is written as a ROS 1 spec: numeric types have their ROS 1 names, and times are ``builtin_interfaces/Time``.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ __all__ = ["TypesDiffer", "layout_of", "ros2_field_type", "ros2_spec", "transcod
 
 
 class TypesDiffer(BridgeError):
-    """A ROS 1 type cannot be converted to the ROS 2 type, with the reason."""
+    """Raised, with the reason, if a ROS 1 type cannot be converted to a ROS 2 type."""
 
 
 _WIDTHS = {
@@ -58,7 +58,10 @@ def ros2_spec(full_name: str, fields: dict[str, str]) -> MessageSpec:
 
 
 def ros2_field_type(text: str) -> FieldType:
-    """Parse a field's type: ``sequence<double, 3>``, ``uint8[16]``, ``std_msgs/Header``. Raise TypesDiffer."""
+    """Parse a ROS 2 field's type, such as ``sequence<double, 3>``, ``uint8[16]``, ``std_msgs/Header``.
+
+    Raise TypesDiffer if ROS 1 has no such type.
+    """
     if text.startswith("sequence<") and text.endswith(">"):
         inner = text[len("sequence<") : -1]
         head, comma, bound = inner.rpartition(",")
@@ -81,7 +84,7 @@ def _base(text: str, whole: str) -> str:
 def transcoder(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Transcoder:
-    """Return the conversion functions for messages of a type. Raise TypesDiffer."""
+    """Return the conversion functions for a message type. Raise TypesDiffer if it has no common layout."""
     layout = layout_of(ros1, ros1_lookup, ros2, ros2_lookup, rules)
     try:
         made = make_transcoder(ros1.full_name, layout)
@@ -96,7 +99,7 @@ def transcoder(
 def layout_of(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Layout:
-    """Return the common layout of a message, with ROS 1's fields in ROS 2's order. Raise TypesDiffer."""
+    """Return the common layout of a message, with ROS 1's fields in ROS 2's order. Raise TypesDiffer if there is none."""
     try:
         check_types(ros1, ros1_lookup)
     except DefinitionError as error:
@@ -159,7 +162,7 @@ class _Pairing:
         return self.message(self._ros1(ros1.base), self._ros2(ros2.base), around)
 
     def _alone(self, type_: FieldType, side: Side, around: tuple[str, ...]) -> list[Item]:
-        """Return the layout items of a field that only one side has."""
+        """Return the layout items for a field that only one side has."""
         self._enter(around)
         base = _SAME.get(type_.base, type_.base)
         one: Layout
@@ -184,7 +187,7 @@ class _Pairing:
 
 
 class _Ordering:
-    """Traverses two specs that :class:`_Pairing` has accepted in parallel, for the order of their fields."""
+    """Traverses in parallel two specs that :class:`_Pairing` has accepted, to find the order of their fields."""
 
     def __init__(self, ros1_lookup: Lookup, ros2_lookup: Lookup, rules: Rules) -> None:
         self._ros1 = ros1_lookup
@@ -193,7 +196,7 @@ class _Ordering:
         self._is_changed = False
 
     def message(self, ros1: MessageSpec, ros2: MessageSpec) -> Reordered | None:
-        """Return the reordering from ROS 1's to ROS 2's order; None if they are equal."""
+        """Return the reordering from ROS 1's to ROS 2's order; None if the orders are equal."""
         found = self._message(ros1, ros2)
         return found if self._is_changed else None
 
@@ -253,7 +256,7 @@ def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, 
 
 
 def _order(fields: tuple[Field, ...], pairs: dict[str, Field], ros2: MessageSpec) -> tuple[int, ...]:
-    """Return the indices of ROS 1's fields in ROS 2's order; a field that ROS 2 lacks stays after its predecessor."""
+    """Return the indices of ROS 1's fields in ROS 2's order; a field that ROS 2 lacks stays after the field before it."""
     places = {each.name: number for number, each in enumerate(ros2.fields)}
     keys = []
     place = -1
@@ -273,7 +276,7 @@ def _repeated(one: Layout, type_: FieldType, side: Side) -> list[Item]:
 
 
 def _paired(ros1_name: str, fields: tuple[Field, ...], ros2: MessageSpec, rule: TypeRule) -> dict[str, Field]:
-    """Return the ROS 1 fields that ROS 2 has -> the ROS 2 fields. Raise TypesDiffer if one has no partner."""
+    """Map the ROS 1 fields that ROS 2 has to the ROS 2 fields. Raise TypesDiffer if a field has no counterpart."""
     names = {each.name: each for each in ros2.fields}
     if rule.fields is not None:
         known = {each.name for each in fields}
@@ -309,13 +312,13 @@ def _spellings(name: str) -> Iterator[str]:
 
 # --- rosgraph_msgs/Log
 
-_LEVEL = 12  # offset of a log message's level in CDR, after the CDR header and the time
+_LEVEL = 12  # offset of the level in a log message's CDR, after the CDR header and the time
 _LEVELS_OF_ROS2 = {1: 10, 2: 20, 4: 30, 8: 40, 16: 50}
 _LEVELS_OF_ROS1 = {level: ros1 for ros1, level in _LEVELS_OF_ROS2.items()}
 
 
 def _with_levels(made: Transcoder) -> Transcoder:
-    """Return conversion functions that also map the log level: ROS 1's levels are bits."""
+    """Return conversion functions that also map the log level, because ROS 1's levels are bits."""
 
     def to_cdr(data: bytes | memoryview, header: bytes = CDR_HEADER) -> bytes:
         found = bytearray(made.to_cdr(data, header))

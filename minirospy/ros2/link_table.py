@@ -22,7 +22,7 @@ _O = TypeVar("_O", bound="OpenLink")
 
 
 class OpenLink(Protocol):
-    """A link that passes messages, calls or goals from :meth:`open` to :meth:`close`, which is always called."""
+    """A link that passes messages, calls or goals from :meth:`open` to :meth:`close`; ``close`` is always called."""
 
     async def open(self) -> None: ...
 
@@ -31,7 +31,7 @@ class OpenLink(Protocol):
 
 @dataclass(frozen=True)
 class Pair:
-    """A link, and the reason why it is not open, "" if it is."""
+    """A link, and the reason why it is not open, or "" if it is open."""
 
     link: Link | ServiceLink | ActionLink
     reason: str = ""
@@ -51,7 +51,10 @@ def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
 
 
 class LinkTable(Generic[_L, _O]):
-    """The open links, and the reasons why others are not open. ``make(link)`` may raise TypesDiffer. On the node's loop."""
+    """The open links, and the reasons why others are not open. ``make(link)`` may raise TypesDiffer.
+
+    Runs on the node's loop.
+    """
 
     def __init__(self, log: logging.Logger, make: Callable[[_L], _O]) -> None:
         self.links: dict[_L, _O] = {}
@@ -61,7 +64,7 @@ class LinkTable(Generic[_L, _O]):
         self._make: Callable[[_L], _O] = make
 
     async def update(self, wanted: Collection[_L]) -> bool:
-        """Close links that are no longer wanted and open new ones; return whether there were any."""
+        """Close links that are no longer wanted and open new ones; return whether any link changed."""
         gone = [link for link in self.links if link not in wanted]
         for link in gone:
             await self._close(link)
@@ -74,7 +77,7 @@ class LinkTable(Generic[_L, _O]):
             except (TypesDiffer, ROSException, ValueError) as error:
                 self._refuse(link, str(error))
             except MinirospyError:
-                raise  # an error of the master: the caller retries
+                raise  # the master reported an error: the caller retries
             except Exception as error:  # noqa: BLE001 - whatever rclpy raises: the other links are opened
                 self._refuse(link, f"{type(error).__name__}: {' '.join(str(error).split())}")
         return bool(gone or new)

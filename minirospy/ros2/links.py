@@ -1,4 +1,4 @@
-"""Select the topics to bridge, and how, from snapshots of both graphs. Pure."""
+"""Select the topics to bridge, and their settings, from snapshots of both graphs. Pure."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ __all__ = [
 ]  # fmt: skip
 
 BRIDGE_PREFIX = "minirospy_ros2_bridge"
-"""Prefix of all bridges' node names on both sides: their endpoints are ignored."""
+"""Prefix of all bridges' node names on both sides: bridges' endpoints are ignored."""
 
 
 def parse_domain(text: str) -> str:
-    """Return the ROS 2 domain from ``ROS_DOMAIN_ID``: 0 if it is empty. Raise BridgeError."""
+    """Return the ROS 2 domain from ``ROS_DOMAIN_ID``: 0 if it is empty. Raise BridgeError if it is invalid."""
     if not re.fullmatch(r"[0-9]{0,9}", text):
         raise BridgeError(f"ROS_DOMAIN_ID is [{escaped(text)}]: it must be a number, such as 0")
     return str(int(text or "0"))
 
 
 class Direction(Enum):
-    """The direction of messages."""
+    """The direction in which messages are sent."""
 
     TO_ROS2 = "1 -> 2"
     TO_ROS1 = "2 -> 1"
@@ -82,7 +82,7 @@ def links(
     is_latched: Callable[[str, str], bool],
     ros1_type: Callable[[str], str],
 ) -> list[Link]:
-    """Return the topics to bridge: those with endpoints on both sides, other than those of bridges.
+    """Return the topics to bridge: those with endpoints on both sides, not counting bridges' endpoints.
 
     ``is_latched(topic, node)`` returns whether a ROS 1 publisher latches. ``ros1_type(ros2_type)`` returns the ROS 1 type for
     a ROS 1 subscriber to any type, such as `rostopic echo`.
@@ -96,7 +96,8 @@ def links(
         readers = [end for end in ros2[topic].subscribers if not is_bridge(end.node)]
 
         if publishers and readers and type_ is not None:
-            # A subscriber with transient local durability receives messages only from a publisher that has it.
+            # A subscriber with transient local durability receives messages only from a publisher with the same
+            # durability.
             keeps = any(end.is_transient_local for end in readers)
             latched = keeps or any(is_latched(topic, node) for node in publishers)
             found.append(Link(topic, Direction.TO_ROS2, type_, _type_of(readers, type_), latched))
@@ -108,7 +109,7 @@ def links(
                     type_ or ros1_type(_type_of(writers, "")),
                     _type_of(writers, type_ or ""),
                     all(end.is_transient_local for end in writers),
-                    # A reliable subscription receives nothing from a best-effort publisher.
+                    # A reliable subscription receives no messages from a best-effort publisher.
                     all(end.is_reliable for end in writers),
                 )
             )
@@ -116,7 +117,7 @@ def links(
 
 
 def _type_of(ends: list[Ros2End], ros1_type: str) -> str:
-    """Return a type for endpoints that may differ: ROS 1's type name if one has it, else the first by name."""
+    """Return one type for endpoints whose types may differ: ROS 1's type name if an endpoint has it, else the first by name."""
     types = sorted({end.type for end in ends})
     return ros1_type if ros1_type in types else types[0]
 
@@ -124,8 +125,8 @@ def _type_of(ends: list[Ros2End], ros1_type: str) -> str:
 def marker(graph: str) -> bytes:
     """Return the CDR header for messages from a ROS 1 graph; ``graph`` is its run_id.
 
-    Readers ignore the options in its last two bytes; by them the bridge recognizes messages that it must not send back. The
-    two lowest bits, which XCDR version 2 uses, stay zero, and the options as a whole are never those of other publishers.
+    Readers ignore the options in its last two bytes; the bridge uses them to recognize messages that it must not send
+    back. The two lowest bits, which XCDR version 2 uses, stay zero, and no other publisher uses the same options.
     """
     import zlib
 

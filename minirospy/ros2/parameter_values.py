@@ -37,7 +37,7 @@ FIELDS = (
     "double_array_value",
     "string_array_value",
 )
-"""The field of a ParameterValue that has the value, by ROS 2's parameter type."""
+"""The ParameterValue field that contains the value, by ROS 2's parameter type."""
 
 _BYTES, _STRINGS = 5, 9
 _SINGLE: dict[type, int] = {bool: 1, int: 2, float: 3, str: 4}
@@ -61,7 +61,7 @@ class ParameterService(Enum):
 
 
 class Value(NamedTuple):
-    """A ROS 2 value: its type, an index of FIELDS, and the field's value. Type 0: it is not set."""
+    """A ROS 2 value: its type, an index of FIELDS, and the field's value. Type 0 means that the parameter is not set."""
 
     type: int
     value: object = None
@@ -87,7 +87,7 @@ def leaves(value: object, name: str = "") -> Iterator[str]:
 
 
 def ros2_value(value: object) -> Value:
-    """Convert a ROS 1 value to ROS 2; if ROS 2 has no such type, to a string with JSON."""
+    """Convert a ROS 1 value to ROS 2, or to a string with JSON if ROS 2 has no such type."""
     if isinstance(value, Binary):
         value = value.data
     if isinstance(value, bytes | bytearray):
@@ -125,7 +125,7 @@ def _checked(value: object) -> object:
 
 
 def listed(names: Sequence[str], prefixes: Sequence[str], depth: int) -> tuple[list[str], list[str]]:
-    """Return the names and prefixes that a list request asks for. ``depth``: levels below a prefix, 0 for all."""
+    """Return the names and prefixes that a list request selects. ``depth``: levels below a prefix, 0 for all."""
     found = []
     for name in names:
         rests = [name] if not prefixes else []

@@ -1,4 +1,4 @@
-"""Bridge parameters: those of ROS 1 as parameters of the bridge's ROS 2 node, those of ROS 2 nodes by ROS 1 services."""
+"""Bridge parameters: ROS 1's as parameters of the bridge's ROS 2 node, and ROS 2 nodes' through ROS 1 services."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ _LENGTH = struct.Struct("<I")
 
 
 class Ros1Parameters:
-    """The master's parameters, with names and values as in ROS 2. Runs on the node's loop; all methods raise MinirospyError."""
+    """The master's parameters, with names and values as in ROS 2.
+
+    Runs on the node's loop; all methods raise MinirospyError if a call to the master fails.
+    """
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -47,7 +50,10 @@ class Ros1Parameters:
         return found
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return an error for each, or "". ``atomically``: change none if one is refused."""
+        """Set or delete parameters; return an error for each, "" for success.
+
+        ``atomically``: change none if any is refused.
+        """
         reasons = [_refusal(name, value) for name, value in values]
         if atomically and any(reasons):
             return reasons
@@ -74,7 +80,10 @@ def _refusal(name: str, value: Value) -> str:
 
 
 class ParameterBridge:
-    """Offers each side's parameters on the other side: ``~get_param``, ``~set_param``, ``~get_param_names`` in ROS 1."""
+    """Offers each side's parameters on the other side.
+
+    In ROS 1 the services are ``~get_param``, ``~set_param`` and ``~get_param_names``.
+    """
 
     def __init__(self, node: Node, side: Ros2Side, catalogue: Catalogue) -> None:
         self._node = node
@@ -145,7 +154,7 @@ class ParameterBridge:
         found: list[str] = []
         for name, namespace in self._side.nodes():
             node = f"{namespace.rstrip('/')}/{name}"
-            # The node has no parameters, or has just exited.
+            # The node has no parameter services, or has just exited.
             with contextlib.suppress(BridgeError):
                 names = await self._waited(functools.partial(self._side.node_parameters().names, node))
                 found += [f"{node}:{each}" for each in names]
@@ -169,14 +178,14 @@ def _text(text: str) -> bytes:
 
 
 def _two(texts: list[str]) -> list[str]:
-    """Return the two strings of a request. Raise ValueError if it has fewer."""
+    """Return a request's two strings. Raise ValueError if it has fewer."""
     if len(texts) < 2:
         raise ValueError("the request ends too early")
     return texts
 
 
 def _texts(data: bytes) -> list[str]:
-    """Parse a request that consists of strings. Raise ValueError."""
+    """Parse a request that consists of strings. Raise ValueError if it is invalid."""
     found, end = [], 0
     while end < len(data):
         if end + 4 > len(data):

@@ -1,6 +1,6 @@
 """Clients and servers of ROS 2 actions with rclpy's own classes; goals, results and feedback are CDR.
 
-Everything runs in the executor's thread, except for methods that say otherwise.
+Everything runs in the executor's thread, except for methods whose docstrings say otherwise.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class _Impl(Protocol):
 
 
 class ActionClass(Protocol):
-    """The class of an action."""
+    """A ROS 2 action's class."""
 
     Impl: _Impl
 
@@ -88,7 +88,7 @@ class Ros2Goal(Protocol):
     def cancel(self) -> None: ...
 
     def result(self) -> Future[tuple[int, bytes]]:
-        """Return the future of the status, of action_msgs/GoalStatus, and the result."""
+        """Return the future of the status (see action_msgs/GoalStatus) and the result."""
 
 
 class _Closable(Protocol):
@@ -145,8 +145,8 @@ class ActionClient:
         self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
         self._class = class_
         self._feedback_class = class_.Impl.FeedbackMessage
-        # Create it before the client: a server that has discovered the client's last endpoint has then discovered
-        # this one, too.
+        # Create the feedback subscription before the client: a server that has discovered the client's last endpoint
+        # has then discovered this one, too.
         self._feedback = calls.node.create_subscription(
             self._feedback_class, f"{name}/_action/feedback", self._take_feedback, _FEEDBACK_DEPTH, raw=True
         )
@@ -171,7 +171,7 @@ class ActionClient:
         return self._calls.servers(send_goal_service(self._name))
 
     def probe(self) -> Ros2Probe:
-        """Return a probe that cancels a nonexistent goal: the cancel client is the action client's last endpoint."""
+        """Return a probe that cancels a nonexistent goal, because the cancel client is the action client's last endpoint."""
         return _CancelProbe(self)
 
     def reach(self) -> Future[None]:
@@ -195,7 +195,7 @@ class ActionClient:
         return reached
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the accepted goal, None if it is refused. May be called from any thread."""
+        """Send a goal; return the accepted goal, or None if it is refused. May be called from any thread."""
         accepted: Future[Ros2Goal | None] = Future()
         self._calls.executor.create_task(self._send, goal, feedback, accepted)
         return accepted
@@ -222,7 +222,7 @@ class ActionClient:
             try:
                 accepted.set_result(GoalOfRos2(self._calls, handle, ended) if handle.accepted else None)
             except InvalidStateError:
-                # The caller no longer waits, and the goal counts as refused in ROS 1, so it must not run.
+                # The caller no longer waits, and the goal counts as refused in ROS 1, so the goal must not run.
                 self._callbacks.pop(id, None)
                 if handle.accepted:
                     handle.cancel_goal_async()
@@ -235,21 +235,21 @@ class ActionClient:
             _fail(accepted, error)
 
     def _read_feedback(self) -> None:
-        """Deliver queued feedback, which was sent before the result that has arrived."""
+        """Deliver queued feedback that was sent before the result that has arrived."""
         handle = self._feedback.handle
         with handle:
             while taken := handle.take_message(self._feedback_class, True):
                 self._take_feedback(taken[0])
 
     def _take_feedback(self, data: bytes) -> None:
-        # The goal's id has 16 bytes, so removing it does not change the alignment of the rest.
+        # The goal's id has 16 bytes, so that removing it does not change the alignment of the remaining data.
         callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
         if callback:
             callback(data[:_HEADER] + data[_HEADER + _ID :])
 
 
 class _CancelProbe:
-    """A probe of an action's servers with its client, which stays open."""
+    """A probe of an action's servers that uses the action's client, which stays open."""
 
     def __init__(self, client: ActionClient) -> None:
         self._client = client
@@ -272,7 +272,8 @@ def _uuid_message(id: bytes) -> object:
 def _client_class() -> Callable[..., _RclpyActionClient]:
     """Return rclpy's action client class with a lock as a class attribute.
 
-    Its constructor adds the client to the executor before it creates the lock, without which the executor's thread would fail.
+    rclpy's constructor adds the client to the executor before it creates the lock, and the executor's thread would fail
+    without the lock.
     """
     return type(
         "ActionClient", (importlib.import_module("rclpy.action").ActionClient,), {"_lock": threading.Lock()}
@@ -287,14 +288,14 @@ class GoalOfRos1(Protocol):
 
     @property
     def ended(self) -> Future[tuple[int, bytes | None]]:
-        """Return the future of the final status (see above) and the result, None for an empty one."""
+        """Return the future of the final status (see above) and the result, which is None if it is empty."""
 
     def cancel(self) -> None:
         """Request the server to cancel the goal. May be called from any thread."""
 
 
 class Feedback:
-    """A goal's feedback: buffered until its handle exists, then published. May be called from any thread."""
+    """A goal's feedback: buffered until the goal's handle exists, then published. May be called from any thread."""
 
     def __init__(self, calls: Calls, class_: MessageClass) -> None:
         self._calls = calls
@@ -320,7 +321,7 @@ class Feedback:
 
 
 Accept = Callable[[bytes, Callable[[bytes], None]], "Future[GoalOfRos1 | None]"]
-"""Takes a goal and the function for its feedback; returns the accepted goal, None if it is refused."""
+"""Accepts a goal, given the function for its feedback; returns the accepted goal, or None if the goal is refused."""
 
 
 class ActionServer:
@@ -335,7 +336,7 @@ class ActionServer:
         self._requests = 0
         self._is_closed = False
         self._module = importlib.import_module("rclpy.action")
-        # rclpy's constructor adds the server to the executor, which may have a goal for it, before it creates the
+        # rclpy's constructor adds the server to the executor, which may call it with a goal, before it creates the
         # logger.
         named = {"_logger": calls.node.get_logger()}
         self._server: _Closable = type("ActionServer", (self._module.ActionServer,), named)(
@@ -361,13 +362,13 @@ class ActionServer:
         self._calls.end(self._server.destroy)
 
     def _wait_until_sent(self, sent: threading.Event) -> None:
-        """Set the event in the executor's first iteration in which no answer is pending."""
+        """Set the event in the executor's first iteration in which no response is pending."""
         if self._is_closed:
             return
         if self._requests or any(goal.ended.done() for _, goal, _ in self._goals.values()):
             self._calls.end(functools.partial(self._wait_until_sent, sent))
         else:
-            # rclpy may complete the answer in a task that runs after the bridge's part.
+            # rclpy may complete the response in a task that runs after the bridge's part.
             self._calls.end(sent.set)
 
     async def _requested(self, goal: Message) -> object:
@@ -386,7 +387,7 @@ class ActionServer:
             accepted = None
         if accepted is None:
             return self._module.GoalResponse.REJECT
-        # The goal's handle will refer to this object.
+        # Later, the goal's handle will refer to this object.
         self._goals[id(goal)] = (goal, accepted, feedback)
         return self._module.GoalResponse.ACCEPT
 
@@ -411,7 +412,7 @@ class ActionServer:
         elif status == CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:
-            # ROS 1 has preempted the goal for another one, which ROS 2 has no status for.
+            # ROS 1 has preempted the goal for another one, and ROS 2 has no status for that.
             handle.abort()
         return self._class.Result() if data is None else self._calls.deserialize(data, self._class.Result)
 

@@ -1,7 +1,7 @@
 """Clients and servers of ROS 2 services with rclpy, which has no API for serialized requests.
 
-A request or response is an object of the class that ROS 2 has generated for its type; rclpy's serialization converts it from
-and to CDR. Everything runs in the executor's thread, except for methods that say otherwise.
+A request or response is an object of the class that ROS 2 has generated for its type; rclpy's serialization converts it
+from and to CDR. Everything runs in the executor's thread, except for methods whose docstrings say otherwise.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 _REASONS = ("message", "status_message", "error_message", "error_string", "error", "reason")
-"""Fields in which the response of a failed call may contain the reason."""
+"""Fields in which a failed call's response may contain the reason."""
 
 _DEPTH = 1000  # requests or responses queued for the bridge
 
@@ -52,7 +52,7 @@ class Message(Protocol):
 
 
 class MessageClass(Protocol):
-    """The class of a message, request or response."""
+    """A message's, request's or response's class."""
 
     def __call__(self) -> Message: ...
 
@@ -61,14 +61,14 @@ class MessageClass(Protocol):
 
 
 class ServiceClass(Protocol):
-    """The class of a service."""
+    """A service's class."""
 
     Request: MessageClass
     Response: MessageClass
 
 
 class RclpyFuture(Protocol):
-    """A future of rclpy."""
+    """An rclpy future."""
 
     def result(self) -> object: ...
 
@@ -80,7 +80,7 @@ class RclpyFuture(Protocol):
 
 
 class RclpyHandle(Protocol):
-    """The handle of a subscription, a context manager for its use."""
+    """A subscription's handle, a context manager for its use."""
 
     def __enter__(self) -> object: ...
 
@@ -92,13 +92,13 @@ class RclpyHandle(Protocol):
 
 
 class RclpySubscription(Protocol):
-    """A subscription of rclpy."""
+    """An rclpy subscription."""
 
     handle: RclpyHandle
 
 
 class Executor(Protocol):
-    """An executor of rclpy."""
+    """An rclpy executor."""
 
     def create_task(self, callback: Callable[..., object], *args: object) -> object: ...
 
@@ -124,7 +124,7 @@ class _Logger(Protocol):
 
 
 class ServiceNode(Protocol):
-    """A node of rclpy."""
+    """An rclpy node."""
 
     def create_client(
         self, class_: ServiceClass, name: str, *, qos_profile: object, callback_group: object
@@ -172,13 +172,13 @@ class Calls:
         self.serialize: Callable[[object], bytes] = serialization.serialize_message
         self.deserialize: Callable[[bytes, MessageClass], Message] = serialization.deserialize_message
         self._future: Callable[..., RclpyFuture] = importlib.import_module("rclpy.task").Future
-        # In rmw_zenoh a response returns on the path of its request, so it is not lost.
+        # In rmw_zenoh a response returns on the path of its request, so that no response is lost.
         rmw = str(importlib.import_module("rclpy.utilities").get_rmw_implementation_identifier())
         self._loses_responses = not rmw.startswith("rmw_zenoh")
-        # Reentrant: a request that waits for its answer does not block others.
+        # Reentrant, so that a request that waits for its response does not block other requests.
         self.options: dict[str, object] = {
             "callback_group": importlib.import_module("rclpy.callback_groups").ReentrantCallbackGroup(),
-            # The default QoS of services with a longer queue.
+            # The default QoS for services, with a longer queue.
             "qos_profile": importlib.import_module("rclpy.qos").QoSProfile(depth=_DEPTH),
         }
 
@@ -191,17 +191,20 @@ class Calls:
         return Server(self, name, class_, answer)
 
     def servers(self, service: str) -> frozenset[bytes] | None:
-        """Return the ids of a service's servers; None if no response can be lost. May be called from any thread."""
+        """Return the ids of a service's servers; or None if no response can be lost. May be called from any thread."""
         if not self._loses_responses:
             return None
         return frozenset(bytes(info.endpoint_gid) for info in self._writers(service))
 
     def parameter_probe(self, service: str) -> ParameterProbe | None:
-        """Return a probe of a service's nodes; None if one has no parameters, or is not known yet. For any thread."""
+        """Return a probe for a service's nodes, or None if one has no parameters or is not known yet.
+
+        May be called from any thread.
+        """
         names = set()
         for server in self._writers(service):
             name = f"{server.node_namespace.rstrip('/')}/{server.node_name}/{ParameterService.GET.service}"
-            # If another process has a node of the same name, its answer would not show that this one has been
+            # If another process has a node with the same name, its response would not show that this node has been
             # reached.
             if {_process(each) for each in self._writers(name)} != {_process(server)}:
                 return None
@@ -212,20 +215,20 @@ class Calls:
         return ParameterProbe([self.client(name, class_) for name in sorted(names)])
 
     def _writers(self, service: str) -> Sequence[_EndpointInfo]:
-        """Return the publishers of a service's responses, from the topic that DDS uses for them."""
+        """Return the publishers on the DDS topic that carries a service's responses."""
         return self.node.get_publishers_info_by_topic(f"rr{service}Reply", no_mangle=True)
 
     def end(self, destroy: Callable[[], object]) -> None:
-        """Destroy an object in the executor's thread, which may be about to wait for it. May be called from any thread.
+        """Destroy an object in the executor's thread, because that thread may be about to wait for the object.
 
-        rclpy's executor fails if an object is destroyed while it builds its wait set.
+        May be called from any thread. rclpy's executor fails if an object is destroyed while it builds its wait set.
         """
         self.executor.create_task(destroy)
 
     async def result(self, future: Future[_T], *, after_tasks: bool = False) -> _T:
         """Return the result of another thread's future, in a coroutine of the executor.
 
-        ``after_tasks``: after the tasks that the other thread has submitted to the executor before.
+        ``after_tasks``: only after the tasks that the other thread has already submitted to the executor.
         """
         waiting = self._future(executor=self.executor)
 
@@ -261,11 +264,11 @@ class Client:
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the servers; None if no response can be lost. May be called from any thread."""
+        """Return the ids of the servers; or None if no response can be lost. May be called from any thread."""
         return self._calls.servers(self._name)
 
     def probe(self) -> ParameterProbe | None:
-        """Return a probe that requests no parameters from the servers' nodes."""
+        """Return a probe that requests no parameters (an empty list) from the servers' nodes."""
         return self._calls.parameter_probe(self._name)
 
     def call(self, request: bytes) -> Future[bytes]:
@@ -310,7 +313,7 @@ class Client:
 
 
 class ParameterProbe:
-    """A probe of nodes by their parameter services: a request for no parameters has no effect."""
+    """A probe of nodes through their parameter services: a request for no parameters has no effect."""
 
     def __init__(self, clients: Sequence[Client]) -> None:
         self._clients = clients
@@ -350,10 +353,10 @@ class ParameterProbe:
 
 
 class Server:
-    """A service that the bridge offers in ROS 2; ``answer`` takes a request's CDR and returns the future of the response's.
+    """A service that the bridge offers in ROS 2.
 
-    If the future raises MinirospyError, the call fails: the reason is sent in the response, if it has a field for it, and
-    logged.
+    ``answer`` takes a request's CDR and returns the future of the response's CDR. If the future raises MinirospyError,
+    the call fails: the reason is sent in the response, if the response has a field for the reason, and logged.
     """
 
     def __init__(
@@ -384,14 +387,14 @@ class Server:
         fields = response.get_fields_and_field_types()
         text = next((name for name in _REASONS if fields.get(name) == "string"), "")
         if fields.get("success") != "boolean" or not text:
-            # Send nothing: a response of zeros would look like a valid answer.
+            # Send nothing, because a response of zeros would look like a valid response.
             raise NotAnsweredError
         setattr(response, text, reason)
         return response
 
 
 def _process(info: _EndpointInfo) -> bytes:
-    """Return the part of an endpoint's id that all endpoints of a process share. Source: RTPS 2.5, 9.3.1."""
+    """Return the part of an endpoint's id that all endpoints in a process share. Source: RTPS 2.5, 9.3.1."""
     return bytes(info.endpoint_gid)[:_GUID_PREFIX]
 
 

@@ -1,4 +1,4 @@
-"""Parameters in ROS 2 with rclpy: services for those of ROS 1 on the bridge's node, and access to those of other nodes."""
+"""Parameters in ROS 2 with rclpy: services on the bridge's node for ROS 1's parameters, and access to other nodes' parameters."""
 
 from __future__ import annotations
 
@@ -24,12 +24,15 @@ _Handler = Callable[[Message, Message], Coroutine[object, None, None]]
 
 
 class ParameterStore(Protocol):
-    """The ROS 1 parameters; names and values as in ROS 2. Runs on the node's loop; all methods raise MinirospyError."""
+    """The ROS 1 parameters; with names and values as in ROS 2.
+
+    Runs on the node's loop; all methods raise MinirospyError if a call to the master fails.
+    """
 
     async def names(self) -> list[str]: ...
 
     async def get(self, names: Sequence[str]) -> list[Value]:
-        """Return the values; the type is 0 if a parameter is not set."""
+        """Return the values, with type 0 if a parameter is not set."""
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
         """Set or delete parameters; return an error for each, "" for success."""
@@ -123,7 +126,10 @@ class ParameterServer:
 
 
 class NodeParameters:
-    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread. All raise BridgeError."""
+    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread.
+
+    All raise BridgeError if the call fails.
+    """
 
     def __init__(self, calls: Calls) -> None:
         self._calls = calls
@@ -134,7 +140,7 @@ class NodeParameters:
         return _texts(_field(response, "result"), "names")
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter; its type is 0 if it is not set."""
+        """Return a parameter, with type 0 if it is not set."""
         response = self._call(node, ParameterService.GET, {"names": [name]})
         found = cast("list[object]", _field(response, "values"))
         return _read(found[0]) if found else Value(0)
@@ -178,7 +184,7 @@ class NodeParameters:
 
 
 def _first(call: Callable[[], Future[bytes]], end: float) -> bytes:
-    """Repeat a call until it gets a response, and return it. Raise TimeoutError."""
+    """Repeat a call until it gets a response, and return the response. Raise TimeoutError at ``end``."""
     pause = _AGAIN_SECONDS
     while True:
         try:

@@ -1,9 +1,10 @@
 """Wait until ROS 2 servers have discovered the bridge's client: earlier responses may be lost. Runs on the node's loop.
 
-A server discovers a client's endpoints later than the client discovers the server. Until then rmw_fastrtps and rmw_cyclonedds
-keep a response for 100 ms, and then drop it. A client is not notified of the server's discovery, but a response proves it: a
-request without effect is repeated until it is answered. A process announces its endpoints in the order of their creation, so
-the answer to a client that was created later shows that earlier ones have been discovered, too.
+A server discovers a client's endpoints later than the client discovers the server. Until then, rmw_fastrtps and
+rmw_cyclonedds buffer a response for 100 ms and then drop it. A client is not notified of the server's discovery, but a
+response proves it: a request without effect is repeated until a response arrives. A process announces its endpoints in
+the order of their creation, so the response to a client that was created later shows that earlier endpoints have been
+discovered, too.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ __all__ = ["Reach", "Reachable"]
 
 _LOOK_SECONDS = 0.02
 _AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
-_NO_PROBE_SECONDS = 1.0  # wait for servers that cannot be probed
+_NO_PROBE_SECONDS = 1.0  # seconds to wait for servers that cannot be probed
 _MAX_SECONDS = 10.0
-"""Maximum wait: a busy server may not have answered by then, and is sent the requests nevertheless."""
+"""Maximum wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
 
 
 class Reachable(Protocol):
@@ -36,10 +37,10 @@ class Reachable(Protocol):
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the existing servers; None if no response can be lost."""
+        """Return the ids of the existing servers, or None if no response can be lost."""
 
     def probe(self) -> Ros2Probe | None:
-        """Return a probe of the servers; None if they have no request without effect."""
+        """Return a probe of the servers, or None if they have no request without effect."""
 
 
 class Reach:
@@ -54,15 +55,15 @@ class Reach:
         self._is_closed = False
 
     def start(self) -> None:
-        """Start to probe the existing servers, so that later requests need not wait."""
+        """Start probing the existing servers, so that later requests need not wait."""
         if not self._is_closed and (self._reaching is None or self._reaching.done()):
             self._ready_at = None
             self._reaching = asyncio.ensure_future(self._reach())
 
     async def wait(self, seconds: float = math.inf) -> None:
-        """Return once responses of the current servers arrive, or after ``seconds``.
+        """Return once responses from the current servers can arrive, or after ``seconds``.
 
-        The maximum is ten seconds, so that servers that have not answered by then do not delay every request.
+        The maximum is ten seconds, so that unresponsive servers do not delay every request.
         """
         servers = self._client.servers
         if servers is None or (self._reached is not None and servers <= self._reached):
@@ -94,7 +95,10 @@ class Reach:
                 return
 
     async def _has_reached(self, servers: frozenset[bytes]) -> bool:
-        """Wait until the servers have answered a probe, if they can be probed; return False if one disappears before that."""
+        """Wait until the servers have responded to a probe, if they can be probed.
+
+        Return False if a server disappears first.
+        """
         self._wanted = servers
         probe = await self._probe()
         if probe is None:
@@ -118,7 +122,7 @@ class Reach:
 
 async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
     pause = _AGAIN_SECONDS
-    # Stop if a server's node has exited, because its services will never be ready again.
+    # Stop if a server's node has exited, because the node's services will never be ready again.
     while is_current():
         if not probe.is_ready:
             await asyncio.sleep(_LOOK_SECONDS)
@@ -128,7 +132,7 @@ async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
         except asyncio.TimeoutError:
             pass
         except BridgeError:
-            # The actual requests will fail for the same reason and report it.
+            # The actual requests will fail for the same reason and report the error.
             await asyncio.sleep(pause)
         else:
             return True

@@ -24,9 +24,9 @@ __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 class TypeRule:
     """The exceptions for a ROS 1 type.
 
-    ``names``: its possible names in ROS 2, ``pkg/Name``. ``fields``: its fields -> those of ROS 2, with all that are passed;
-    None: fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side lacks. ``inlined``: a
-    field that ROS 2 replaces by that field's own fields.
+    ``names``: its possible names in ROS 2, ``pkg/Name``. ``fields``: maps all fields that are passed to ROS 2's fields;
+    None: fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side lacks. ``inlined``:
+    a field that ROS 2 replaces by that field's own fields.
     """
 
     names: tuple[str, ...] = ()
@@ -41,14 +41,17 @@ _NO_RULE = TypeRule()
 
 @dataclass(frozen=True)
 class Rules:
-    """Rules by ``pkg/Name`` of messages, services and actions. Parts of the latter are messages with ROS 1's names."""
+    """Rules for messages, services and actions, by ``pkg/Name``.
+
+    Parts of services and actions are messages with ROS 1's names.
+    """
 
     messages: Mapping[str, TypeRule] = field(default_factory=dict)
     services: Mapping[str, TypeRule] = field(default_factory=dict)
     actions: Mapping[str, TypeRule] = field(default_factory=dict)
 
     def message(self, ros1_type: str) -> TypeRule:
-        """Return the rule of a message type, an empty one if there is none."""
+        """Return the rule for a message type, an empty one if there is none."""
         return self.messages.get(ros1_type, _NO_RULE)
 
     def ros2_messages(self, ros1_type: str) -> tuple[str, ...]:
@@ -117,7 +120,7 @@ BUILT_IN = Rules(
             ),
             "tf/tfMessage": TypeRule(names=("tf2_msgs/TFMessage",)),
             "uuid_msgs/UniqueID": TypeRule(names=("unique_identifier_msgs/UUID",)),
-            # Fields that ROS 2 has added: they are empty from ROS 1, and dropped towards ROS 1.
+            # Fields that ROS 2 has added: they are empty in messages from ROS 1, and dropped in messages to ROS 1.
             "sensor_msgs/BatteryState": _only(ros2=("temperature",)),
             "sensor_msgs/Range": _only(ros2=("variance",)),
             "shape_msgs/SolidPrimitive": _only(ros2=("polygon",)),
@@ -139,7 +142,7 @@ BUILT_IN = Rules(
         }
     ),
 )
-"""The rules of the common packages."""
+"""The rules for the common packages."""
 
 _TYPE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _KEYS = {
@@ -162,7 +165,7 @@ _KEYS = {
 
 
 def parse_rules(text: str, where: str) -> Rules:
-    """Parse a file of rules. Raise BridgeError with the error and the rule's number."""
+    """Parse a file of rules. Raise BridgeError, with the error and the rule's number, if a rule is invalid."""
     try:
         loaded = safe_load(text)
     except yaml.YAMLError as error:

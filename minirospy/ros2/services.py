@@ -1,4 +1,4 @@
-"""Services between the two sides: open and close them, and answer calls."""
+"""Open and close services between the two sides, and handle calls."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ if TYPE_CHECKING:
 __all__ = ["ServiceBridge", "ServiceCodec"]
 
 _QUERY_SECONDS = 1.0
-"""Timeout, after which only services whose types are known are bridged."""
+"""Timeout, after which only services with known types are bridged."""
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _MAX_CALLS = 1_000
-"""Concurrent calls of a service to ROS 1; further ones are answered with an error."""
+"""Concurrent calls from a ROS 2 service to ROS 1; further calls fail with an error."""
 _MAX_UNDER_WAY = 8
-"""Concurrent requests to a ROS 2 server: its queue has 10 places, and further ones would be lost."""
+"""Concurrent requests to a ROS 2 server: its queue has 10 places, and further requests would be lost."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class ServiceCodec:
 
 
 class _Types:
-    """The codecs of services, by their types on both sides."""
+    """The codecs for services, by their types on both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -71,7 +71,7 @@ class _Types:
         self._codecs: dict[tuple[str, str], ServiceCodec] = {}
 
     def partner(self, type_: str, direction: Direction) -> str:
-        """Return the type on the calling side, for the type on the offering side."""
+        """Return the type on the calling side, given the type on the offering side."""
         if direction is Direction.TO_ROS1:
             names = self._rules.ros2_services(type_)
             return next((name for name in names if self._is_in_ros2(name)), names[0])
@@ -79,7 +79,7 @@ class _Types:
         return next((name for name in names if self._is_in_ros1(name)), names[0])
 
     def codec(self, ros1_type: str, ros2_type: str) -> ServiceCodec:
-        """Return the codec of a service. Raise TypesDiffer."""
+        """Return a service's codec. Raise TypesDiffer if its types cannot be converted."""
         key = (ros1_type, ros2_type)
         if key not in self._codecs:
             self._codecs[key] = self._made(ros1_type, ros2_type)
@@ -149,7 +149,7 @@ class ServiceBridge:
         await self._headers.close()
 
     async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[Pair]:
-        """Return the services to bridge, given those of ROS 1, and the reasons why some are not bridged."""
+        """Return the services to bridge, given the services in ROS 1, and the reasons why some are not bridged."""
         return pairs(await self._wanted(ros1), self._codec)
 
     async def look(self, ros1: Mapping[str, tuple[str, ...]]) -> bool:
@@ -167,7 +167,7 @@ class ServiceBridge:
         return service_links(ros1, types, ros2, self._types.partner)
 
     async def _header(self, key: tuple[str, str]) -> Header:
-        """Return a server's connection header, because the ROS 1 master does not know service types."""
+        """Return a server's connection header, needed because the ROS 1 master does not know service types."""
         header = await service_header(self._node, key[0])
         if "type" not in header:
             raise WireError(f"service [{key[0]}] names no type")
@@ -210,7 +210,7 @@ class _InRos1:
         await self._server
 
     async def close(self) -> None:
-        # Running calls are answered with an error.
+        # Running calls fail with an error.
         self._ended.set()
         await self._reach.close()
         await self._server.close()
@@ -262,7 +262,7 @@ class _InRos1:
         return answered.result()
 
     async def _becomes_ready(self) -> bool:
-        """Wait for the server: if the service has just been discovered, its client may not be connected yet."""
+        """Wait for the server; if the service has just been discovered, its client may not be connected yet."""
         loop = asyncio.get_running_loop()
         end = loop.time() + _ABSENT_LOOKS * _LOOK_SECONDS
         while not self._client.is_ready:
@@ -315,7 +315,7 @@ class _InRos2:
         task = asyncio.ensure_future(self._pass_on(request, answered))
         self._calls.add(task)
         task.add_done_callback(self._calls.discard)
-        # Also if the task is cancelled, even before its first step.
+        # Also needed if the task is cancelled, even before its first step.
         task.add_done_callback(lambda _: answered.cancel())
 
     async def _pass_on(self, request: bytes, answered: Future[bytes]) -> None:

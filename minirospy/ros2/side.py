@@ -88,7 +88,10 @@ def require_rclpy() -> None:
 
 
 _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
-"""Environment variables for Fast DDS's settings file; the second is for up to version 2, which _OLD_DISTRIBUTIONS have."""
+"""Environment variables for Fast DDS's settings file.
+
+_OLD_DISTRIBUTIONS have version 2 or older, which uses the second one.
+"""
 _OLD_DISTRIBUTIONS = ("humble", "iron", "jazzy")
 _PACKAGE = re.compile(r"[a-z](_?[a-z0-9]+)*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -96,7 +99,10 @@ _OTHER_SETTINGS = ("FASTDDS_BUILTIN_TRANSPORTS", "ROS_LOCALHOST_ONLY")
 
 
 def large_message_settings(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment variables that enlarge Fast DDS's buffers for large messages; {} if the user has configured it."""
+    """Return the environment variables that enlarge Fast DDS's buffers for large messages.
+
+    Return {} if the user has configured Fast DDS.
+    """
     if any(environment.get(name) for name in (*_PROFILES, *_OTHER_SETTINGS)):
         return {}
     if not environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp").startswith("rmw_fastrtps"):
@@ -109,7 +115,7 @@ class RclpySide:
     """The rclpy backend: one node and one executor, in one thread."""
 
     def __init__(self, name: str) -> None:
-        """Start the node. Raise BridgeError."""
+        """Start the node. Raise BridgeError if ROS 2 reports an error."""
         require_rclpy()
         os.environ.update(large_message_settings(os.environ))
         rclpy = importlib.import_module("rclpy")
@@ -127,7 +133,7 @@ class RclpySide:
                 use_global_arguments=False,
                 start_parameter_services=False,
             )
-        except Exception as error:  # rclpy's errors have no other common base
+        except Exception as error:  # rclpy's errors have no common base class
             with contextlib.suppress(Exception):
                 self._context.try_shutdown()
             raise BridgeError(f"ROS 2 does not start: {' '.join(str(error).split())}") from error
@@ -161,7 +167,10 @@ class RclpySide:
         return dict(self._class(type_).get_fields_and_field_types())
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
-        """Return a reliable publisher, which is compatible with every subscriber. Raise TypesDiffer."""
+        """Return a reliable publisher, which is compatible with every subscriber.
+
+        Raise TypesDiffer if the type is not installed.
+        """
         profile = self._profile(depth, is_reliable=True, is_latched=is_latched)
         publisher = self._node.create_publisher(self._class(type_), topic, profile)
         return _Publisher(self._calls, self._node, publisher)
@@ -176,7 +185,10 @@ class RclpySide:
         is_reliable: bool,
         is_latched: bool,
     ) -> Ros2Handle:
-        """Call ``deliver`` for each serialized message, in the executor's thread. Raise TypesDiffer."""
+        """Call ``deliver`` for each serialized message, in the executor's thread.
+
+        Raise TypesDiffer if the type is not installed.
+        """
         profile = self._profile(depth, is_reliable=is_reliable, is_latched=is_latched)
         return _Subscription(self._calls, self._node, self._class(type_), topic, deliver, profile)
 
@@ -214,11 +226,11 @@ class RclpySide:
         )
 
     def client(self, service: str, type_: str) -> Ros2Client:
-        """Return a client. Raise TypesDiffer."""
+        """Return a client. Raise TypesDiffer if the type is not installed."""
         return self._calls.client(service, self._service_class(type_))
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service. Raise TypesDiffer."""
+        """Offer a service. Raise TypesDiffer if the type is not installed."""
         server = self._calls.server(service, self._service_class(type_), answer)
         self._served.append(service)
         return _Served(self._calls, server, lambda: self._served.remove(service))
@@ -232,11 +244,11 @@ class RclpySide:
         return goal, result, feedback
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient:
-        """Return a client of an action. Raise TypesDiffer."""
+        """Return a client of an action. Raise TypesDiffer if the type is not installed."""
         return ActionClient(self._calls, action, self._action_class(type_))
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Offer an action. Raise TypesDiffer."""
+        """Offer an action. Raise TypesDiffer if the type is not installed."""
         service = send_goal_service(action)
         server = ActionServer(self._calls, action, self._action_class(type_), accept)
         self._served.append(service)
@@ -269,7 +281,7 @@ class RclpySide:
             except NotAnsweredError:
                 continue
             except Exception:  # noqa: BLE001 - whatever rclpy raises
-                # Only this callback failed: continue with the others.
+                # Only this callback failed: continue with the other callbacks.
                 _log.exception("a message of ROS 2 could not be passed on")
 
     def _end(self, info: _Info) -> Ros2End:
@@ -293,7 +305,7 @@ class RclpySide:
     @staticmethod
     def _class(type_: str) -> MessageClass:
         found = _imported(type_, "msg")
-        # minirospy's own ROS 1 packages have classes of that name, too.
+        # minirospy's own ROS 1 packages also have classes with that name.
         if not hasattr(found, "get_fields_and_field_types"):
             raise TypesDiffer(f"[{type_}] is not installed in ROS 2")
         return cast("MessageClass", found)
@@ -314,7 +326,7 @@ class RclpySide:
 
 
 class _Served:
-    """A service offered by the bridge; it is listed as the bridge's own until it is closed."""
+    """A service that the bridge offers; it is listed as the bridge's own until it is closed."""
 
     def __init__(self, calls: Calls, server: Ros2Handle, on_close: Callable[[], None]) -> None:
         self._calls = calls
@@ -367,7 +379,7 @@ class _Subscription:
         self._calls.end(lambda: self._node.destroy_subscription(self._subscription))
 
     def _arrived(self, data: bytes) -> None:
-        """Deliver a message and those queued after it, because the executor delivers one at a time, slowly."""
+        """Deliver a message and the messages queued after it, because the executor delivers messages slowly, one at a time."""
         handle = self._subscription.handle
         for _ in range(_DRAINED):
             if self._is_closed:
@@ -377,7 +389,7 @@ class _Subscription:
                 with handle:
                     taken = handle.take_message(self._class, True)
             except self._invalid_handle:
-                return  # closed meanwhile by the loop's thread
+                return  # the loop's thread closed the subscription in the meantime
             if taken is None:
                 return
             data = taken[0]

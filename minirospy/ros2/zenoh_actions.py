@@ -39,10 +39,10 @@ _BODY = _HEADER + 16
 _NO_ID = bytes(16)
 _SECOND = 1_000_000_000
 _ACCEPTED, _EXECUTING, _CANCELING = 1, 2, 3
-"""Statuses of a goal that has not ended: action_msgs/GoalStatus. 0 is unknown."""
+"""Statuses of a goal that has not ended (action_msgs/GoalStatus); 0 means unknown."""
 _UNKNOWN_GOAL, _ENDED_GOAL = 2, 3
-"""Errors of action_msgs/srv/CancelGoal."""
-_KEPT_SECONDS = 60.0  # a goal's result is kept after its end
+"""Error codes of action_msgs/srv/CancelGoal."""
+_KEPT_SECONDS = 60.0  # how long a goal's result is stored after the goal's end
 _MAX_GOALS = 2_000
 _CLOSE_SECONDS = 1.0
 
@@ -58,7 +58,10 @@ class ActionEnds(NamedTuple):
 
 
 class ActionType:
-    """The messages around goals, results and feedback. ``name``: ``pkg/action/Name``; ``fields``: looks up a part's fields."""
+    """The messages that contain goals, results and feedback.
+
+    ``name``: ``pkg/action/Name``; ``fields``: looks up a part's fields.
+    """
 
     def __init__(self, name: str, fields: Callable[[str], Fields]) -> None:
         self._name = name
@@ -69,16 +72,19 @@ class ActionType:
         return encode(f"{self._name}_{part}", self._fields, values)
 
     def read(self, part: str, data: bytes) -> dict[str, object]:
-        """Return the values of a part. Raise DeserializationError."""
+        """Return the values of a part. Raise DeserializationError if ``data`` is invalid."""
         return decode(f"{self._name}_{part}", self._fields, data)
 
     def response(self, status: int, result: bytes | None) -> bytes:
-        """Return the response to a request for a result; None is an empty result. Raise DeserializationError."""
+        """Return the response to a request for a result; None is an empty result.
+
+        Raise DeserializationError if it is invalid.
+        """
         values = {} if result is None else self.read("Result", result)
         return self.write("GetResult_Response", {"status": status, "result": values})
 
     def result(self, response: bytes) -> tuple[int, bytes]:
-        """Return the status and the result from such a response. Raise DeserializationError."""
+        """Return the status and the result from such a response. Raise DeserializationError if it is invalid."""
         found = self.read("GetResult_Response", response)
         return cast("int", found["status"]), self.write(
             "Result", cast("Mapping[str, object]", found["result"])
@@ -89,7 +95,7 @@ class ActionType:
         return encode(name, self._fields, values)
 
     def cancelled(self, request: bytes) -> tuple[bytes, int]:
-        """Return the goal's id and time from a cancel request. Raise DeserializationError."""
+        """Return the goal's id and time from a cancel request. Raise DeserializationError if it is invalid."""
         found = decode("action_msgs/srv/CancelGoal_Request", self._fields, request)
         info = cast("dict[str, dict[str, object]]", found["goal_info"])
         stamp = cast("dict[str, int]", info["stamp"])
@@ -106,7 +112,7 @@ def _time(stamp: int) -> dict[str, object]:
 
 
 def _split(data: bytes) -> tuple[bytes, bytes]:
-    """Return a goal's id and the data after it. Raise DeserializationError."""
+    """Return a goal's id and the data after it. Raise DeserializationError if the data is too short."""
     if len(data) < _BODY:
         raise DeserializationError("the message ends too early")
     return data[_HEADER:_BODY], data[:_HEADER] + data[_BODY:]
@@ -163,7 +169,7 @@ class ZenohActionClient:
         """Return None: no probe is needed."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the accepted goal, None if it is refused. It fails with BridgeError."""
+        """Send a goal; return the future of the accepted goal, None if it is refused. The future fails with BridgeError."""
         id = uuid.uuid4().bytes
         self._callbacks[id] = feedback
         accepted: Future[Ros2Goal | None] = Future()
@@ -177,7 +183,7 @@ class ZenohActionClient:
                     self._callbacks.pop(id, None)
                 accepted.set_result(sent)
             except InvalidStateError:
-                # The caller no longer waits, and the goal counts as refused in ROS 1, so it must not run.
+                # The caller no longer waits, and the goal counts as refused in ROS 1, so the goal must not run.
                 self._callbacks.pop(id, None)
                 if sent:
                     sent.cancel()
@@ -189,13 +195,13 @@ class ZenohActionClient:
         return accepted
 
     def cancel(self, id: bytes) -> None:
-        """Request the server to cancel a goal; the goal's result shows whether it has."""
+        """Request the server to cancel a goal; the goal's result shows whether it was cancelled."""
         self._cancel_goal.call(
             self._type.message("action_msgs/srv/CancelGoal_Request", {"goal_info": _info(id)})
         )
 
     def result(self, id: bytes) -> Future[tuple[int, bytes]]:
-        """Return the future of a goal's status and result. It fails with BridgeError."""
+        """Return the future of a goal's status and result. The future fails with BridgeError."""
         ended: Future[tuple[int, bytes]] = Future()
 
         def arrived(done: Future[bytes]) -> None:
@@ -234,7 +240,10 @@ def _fail(future: Future[Ros2Goal | None] | Future[tuple[int, bytes]], error: Ex
 
 @dataclass
 class _Goal:
-    """A ROS 2 client's goal. ``status`` is 0 until it is accepted; ``response`` has the result once the goal has ended."""
+    """A ROS 2 client's goal.
+
+    ``status`` is 0 until the goal is accepted; ``response`` contains the result once the goal has ended.
+    """
 
     id: bytes
     status: int = 0
@@ -247,7 +256,7 @@ class _Goal:
 
 
 class ZenohActionServer:
-    """An action that the bridge offers in ROS 2. It runs in one thread, so that everything is sent in order."""
+    """An action that the bridge offers in ROS 2. Runs in one thread, so that all messages are sent in order."""
 
     def __init__(self, node: ZenohNode, ends: ActionEnds, type_: ActionType, accept: Accept) -> None:
         self._name = ends.send_goal.name.removesuffix("/_action/send_goal")
@@ -269,7 +278,8 @@ class ZenohActionServer:
     def close(self) -> None:
         """Close after sending known results. Idempotent."""
         with contextlib.suppress(RuntimeError, concurrent.futures.TimeoutError):
-            # The first pass may submit responses for goals that have just ended; the second waits for these.
+            # The first pass may submit responses for goals that have just ended; the second pass waits for these
+            # responses.
             self._thread.submit(lambda: None).result(_CLOSE_SECONDS)
             self._thread.submit(lambda: None).result(_CLOSE_SECONDS)
         for server in self._servers:
@@ -285,7 +295,7 @@ class ZenohActionServer:
             except Exception:  # noqa: BLE001 - the others go on
                 _log.exception("action [%s] of ROS 1", self._name)
 
-        # After close() nothing is sent.
+        # After close(), no messages are sent.
         with contextlib.suppress(RuntimeError):
             self._thread.submit(guarded)
 
@@ -315,7 +325,7 @@ class ZenohActionServer:
             answered.set_result(self._decision(None))
             return
         goal.stamp, goal.status = time.time_ns(), _ACCEPTED
-        # The response is sent before anything that is submitted later.
+        # The response is sent before any message that is submitted later.
         answered.set_result(self._decision(goal))
         self._submit(lambda: self._start(goal))
         goal.there.ended.add_done_callback(lambda end: self._submit(lambda: self._end(goal, end)))
@@ -345,7 +355,7 @@ class ZenohActionServer:
         except CancelledError:
             status, result = ABORTED, None
         if status != SUCCEEDED and not (status == CANCELED and goal.status == _CANCELING):
-            # ROS 1 has preempted the goal for another one, which ROS 2 has no status for.
+            # ROS 1 has preempted the goal for another one, and ROS 2 has no status for that.
             status = ABORTED
         goal.status, goal.ended_at = status, time.monotonic()
         goal.response = self._type.response(status, result)

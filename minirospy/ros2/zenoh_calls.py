@@ -1,6 +1,6 @@
 """Clients and servers of ROS 2 services over Zenoh: a request is a query, the response its reply.
 
-Zenoh, and so the futures, call back in Zenoh's threads.
+Callbacks of Zenoh, and therefore of the futures, run in Zenoh's threads.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ _log = logging.getLogger(__name__)
 MAX_BYTES = 64 << 20
 MAX_UNDER_WAY = 200  # requests of a service whose responses have not been written yet
 _MAX_OF_ACTION = 2_000
-"""Pending requests of an action, more than goals: a request for a result waits for the goal's end."""
+"""Pending requests to an action, more than goals, because a request for a result waits until the goal has ended."""
 _MAX_SECONDS = 10_000_000
-"""Practically unlimited: the bridge has its own timeouts, and Zenoh's would end a long goal."""
+"""Practically unlimited: the bridge has its own timeouts, and Zenoh's timeout would end a long goal."""
 
 
 class ZenohClient:
@@ -44,7 +44,7 @@ class ZenohClient:
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         self._node = node
         self._end = end
-        # On a slow network, sending a request blocks for seconds; the caller is the loop.
+        # On a slow network, sending a request blocks for seconds, which must not block the caller, the loop.
         self._requests = concurrent.futures.ThreadPoolExecutor(1, "zenoh-requests")
         self._handle = Handle(node, end)
 
@@ -62,7 +62,7 @@ class ZenohClient:
         """Return None: no probe is needed."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return the future of the response, both as CDR. It fails with BridgeError."""
+        """Send a request and return the future of the response, both as CDR. The future fails with BridgeError."""
         answered: Future[bytes] = Future()
         name = self._end.name
 
@@ -111,11 +111,11 @@ class ZenohClient:
 
 
 class ZenohServer:
-    """A service that the bridge offers in ROS 2; ``answer`` takes a request's CDR and returns the future of the response's.
+    """A service that the bridge offers in ROS 2.
 
-    If the future raises MinirospyError, the call fails: the reason is sent in the response, if it has a field for it, else
-    as the query's error, which rmw_zenoh logs. ``thread``: the caller's executor for all of this, by default a separate
-    one.
+    ``answer`` takes a request's CDR and returns the future of the response's CDR. If the future raises MinirospyError,
+    the call fails: the reason is sent in the response, if the response has a field for the reason, else as the query's
+    error, which rmw_zenoh logs. ``thread``: the executor that sends replies, by default a separate one.
     """
 
     def __init__(
@@ -159,7 +159,7 @@ class ZenohServer:
                 self._replies.submit(self._take, query)
             except RuntimeError:
                 self._done()
-                query.drop()  # the action is closed
+                query.drop()  # the action has been closed
 
     def _take(self, query: Query) -> None:
         try:
@@ -169,7 +169,7 @@ class ZenohServer:
             answered = self._answer(query.payload.to_bytes())
         except (DeserializationError, ValueError, RuntimeError) as error:
             self._done()
-            # RuntimeError: the loop has been closed.
+            # RuntimeError: the loop was closed.
             self._refuse(query, "the bridge has ended" if isinstance(error, RuntimeError) else str(error))
             return
 
@@ -178,12 +178,12 @@ class ZenohServer:
                 self._replies.submit(self._finish, query, back, answered)
             except RuntimeError:
                 self._done()
-                query.drop()  # the service is closed
+                query.drop()  # the service has been closed
 
         answered.add_done_callback(finished)
 
     def _finish(self, query: Query, back: bytes, answered: Future[bytes]) -> None:
-        # Count a response until it is written: those that wait for a slow network use memory.
+        # Count a response until it is written, because responses that wait for a slow network use memory.
         try:
             self._reply(query, back, answered)
         finally:
@@ -196,10 +196,10 @@ class ZenohServer:
             reason = " ".join(str(error).split())
             _log.error("service [%s] of ROS 1: %s", self._end.name, reason)
             if self._response != ["bool", "string"]:
-                # Send an error: a response of zeros would look like a valid answer.
+                # Send an error, because a response of zeros would look like a valid response.
                 self._refuse(query, reason)
                 return
-            # A response such as those of SetBool and Trigger: success is false, followed by the reason.
+            # A response such as those for SetBool and Trigger: success is false, followed by the reason.
             text = reason.encode() + b"\0"
             data = CDR_HEADER + bytes(4) + struct.pack("<I", len(text)) + text
         except concurrent.futures.CancelledError:

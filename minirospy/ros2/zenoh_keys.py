@@ -35,7 +35,7 @@ _DEFAULT_DEPTH = 42
 
 
 class Kind(Enum):
-    """The kind of entity that a token declares."""
+    """The kinds of entities that tokens declare."""
 
     NODE = "NN"
     PUBLISHER = "MP"
@@ -46,14 +46,14 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Qos:
-    """The quality of service of an endpoint, as far as the bridge uses it."""
+    """An endpoint's quality of service, as far as the bridge uses it."""
 
     is_reliable: bool = True
     is_transient_local: bool = False
     depth: int = 10
 
     def __str__(self) -> str:
-        """Return its form in a token: the differences from rmw_zenoh's default."""
+        """Return the QoS as written in a token: the differences from rmw_zenoh's default."""
         depth = "" if self.depth == _DEFAULT_DEPTH else str(self.depth)
         return f"{'' if self.is_reliable else 2}:{1 if self.is_transient_local else ''}:,{depth}:,:,:,,"
 
@@ -61,7 +61,7 @@ class Qos:
 class Entity(NamedTuple):
     """A node, or an endpoint of a topic or service. ``type``: ``pkg/Name``, ``pkg/srv/Name`` or ``pkg/action/Name``.
 
-    ``session``: the id of its Zenoh session.
+    ``session``: the id of the entity's Zenoh session.
     """
 
     domain: str
@@ -83,17 +83,17 @@ class Entity(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Return the key of its messages or requests."""
+        """Return the key for the entity's messages or requests."""
         return data_key(self.domain, self.name, self.type, self.hash)
 
 
 def tokens_pattern(domain: str) -> str:
-    """Return the key expression of all tokens of a domain."""
+    """Return the key expression that matches all tokens in a domain."""
     return f"{_SPACE}/{domain}/**"
 
 
 def data_key(domain: str, name: str, type_: str, hash_: str) -> str:
-    """Return the key of a topic's messages, or a service's requests."""
+    """Return the key for a topic's messages or a service's requests."""
     return f"{domain}/{name.strip('/')}/{dds_name(type_)}/{hash_}"
 
 
@@ -125,7 +125,7 @@ def parse_token(key: str) -> Entity | None:
     head = (domain, session, int(id), Kind(kind), node, namespace.replace("%", "/"))
     if kind == Kind.NODE.value:
         return Entity(*head)
-    # Newer versions may append more.
+    # Newer versions may append more parts.
     if len(rest) < 4:
         return None
     name, found, qos = rest[0].replace("%", "/"), _DDS_NAME.fullmatch(rest[1]), _parse_qos(rest[3])
@@ -158,8 +158,8 @@ def gid_of(token: str) -> bytes:
 
 
 def xxh3_128(data: bytes) -> bytes:
-    """Return the XXH3 hash with 128 bits as rmw_zenoh writes it, little-endian."""
-    # The extra `fleet` brings it; without it, the rest of this module works.
+    """Return the 128-bit XXH3 hash in rmw_zenoh's byte order, little-endian."""
+    # The extra `fleet` installs xxhash; without it, the rest of this module works.
     import xxhash
 
     return xxhash.xxh3_128_intdigest(data).to_bytes(16, "little")
@@ -177,8 +177,11 @@ def attachment(sequence: int, time: int, gid: bytes) -> bytes:
 
 
 def reply_attachment(data: bytes, time: int) -> bytes:
-    """Return the attachment of a response to a request with the attachment ``data``. Raise ValueError if it is invalid."""
-    # Other versions of rmw_zenoh may send the id without its length; return it in the same form.
+    """Return the attachment of a response to a request with the attachment ``data``.
+
+    Raise ValueError if ``data`` is invalid.
+    """
+    # Other versions of rmw_zenoh may send the id without its length; return the attachment in the same format.
     if len(data) not in (_ATTACHMENT.size, _ATTACHMENT.size - 1):
         raise ValueError("this is not an attachment of rmw_zenoh")
     return data[: _TIME.start] + struct.pack("<q", time) + data[_TIME.stop :]

@@ -39,7 +39,7 @@ _MAX_ENTITIES = 50_000
 
 
 class Graph:
-    """All tokens except for those of this session. Methods may be called from any thread."""
+    """All tokens from other sessions. Methods may be called from any thread."""
 
     def __init__(self, own_session: str = "") -> None:
         self._own = own_session
@@ -49,7 +49,7 @@ class Graph:
         self._lock = threading.Lock()
 
     def set(self, key: str, is_there: bool) -> None:
-        """Add or remove a token; ignore one that cannot be parsed."""
+        """Add or remove a token; ignore a token that cannot be parsed."""
         entity = parse_token(key)
         if entity is None or entity.session == self._own:
             return
@@ -70,13 +70,13 @@ class Graph:
             return list(self._nodes.values())
 
     def ends(self, *kinds: Kind) -> list[Entity]:
-        """Return the endpoints of these kinds of all topics and services."""
+        """Return the endpoints of these kinds for all topics and services."""
         with self._lock:
             found = [each for ends in self._by_name.values() for each in ends.values()]
         return [each for each in found if each.kind in kinds]
 
     def of_name(self, name: str, *kinds: Kind) -> list[Entity]:
-        """Return the endpoints of these kinds of a topic or service."""
+        """Return the endpoints of these kinds for one topic or service."""
         with self._lock:
             found = list(self._by_name.get(name, {}).values())
         return [each for each in found if each.kind in kinds]
@@ -86,7 +86,7 @@ class ZenohNode:
     """A session with one node. ``graph``: the nodes and endpoints of other sessions."""
 
     def __init__(self, name: str, options: NetworkOptions) -> None:
-        """Open the session; waits for the router. Raise BridgeError."""
+        """Open the session and wait for the router. Raise BridgeError if that fails."""
         require_zenoh("ros2-bridge --zenoh", needs_hash=True)
         self.zenoh = importlib.import_module("zenoh")
         self.domain = parse_domain(os.environ.get("ROS_DOMAIN_ID", ""))
@@ -97,7 +97,7 @@ class ZenohNode:
         self.graph = Graph(self._zid)
         self._is_closed = False
         liveliness = self.session.liveliness()
-        # Declared until the session closes.
+        # These declarations last until the session closes.
         self._declared = [
             liveliness.declare_token(format_token(self.entity(Kind.NODE))),
             liveliness.declare_subscriber(
@@ -117,7 +117,7 @@ class ZenohNode:
         if self._is_closed:
             return
         self._is_closed = True
-        # If the link is broken, undeclaring fails; the peer notices the loss by itself.
+        # If the link is broken, undeclaring fails; the peer detects the loss itself.
         with contextlib.suppress(self.zenoh.ZError):
             self.session.close()
 
@@ -127,7 +127,7 @@ class ZenohNode:
 
     def _opened(self, options: NetworkOptions) -> Session:
         config = configured(options)
-        # Messages that are kept for late subscribers need timestamps.
+        # Messages that are stored for late subscribers need timestamps.
         config.insert_json5("timestamping/enabled", "true")
         try:
             session: Session = self.zenoh.open(config)
@@ -154,13 +154,13 @@ class Handle:
         self._sequence = itertools.count(1)
 
     def attachment(self) -> bytes:
-        """Return the attachment of the next message or request."""
+        """Return the attachment for the next message or request."""
         return attachment(next(self._sequence), time.time_ns(), self._gid)
 
     def close(self) -> None:
         """Undeclare the endpoint. Idempotent."""
         declared, self._declared = self._declared, ()
         for each in declared:
-            # The session is closed, which has undeclared it.
+            # Closing the session has already undeclared the endpoint.
             with contextlib.suppress(self._fault):
                 each.undeclare()

@@ -1,4 +1,4 @@
-"""Parameters in ROS 2 over Zenoh: services for those of ROS 1 on the bridge's node, and access to those of other nodes."""
+"""Parameters in ROS 2 over Zenoh: services on the bridge's node for ROS 1's parameters, and access to other nodes' parameters."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class ZenohParameterServer:
                 return encode(f"{whole}_Response", self._fields, response)
             except (MinirospyError, DeserializationError):
                 raise
-            except Exception as error:  # the client waits for an answer, whatever the error
+            except Exception as error:  # the client waits for a response, whatever the error
                 raise BridgeError(f"parameters of ROS 1: {' '.join(str(error).split())}") from error
 
         return lambda request: asyncio.run_coroutine_threadsafe(answered(request), self._loop)
@@ -106,7 +106,10 @@ class ZenohParameterServer:
 
 
 class ZenohNodeParameters:
-    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread. All raise BridgeError."""
+    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread.
+
+    All raise BridgeError if the call fails.
+    """
 
     def __init__(self, side: Ros2Side, fields: Callable[[str], Fields]) -> None:
         self._side = side
@@ -118,7 +121,7 @@ class ZenohNodeParameters:
         return _texts(cast("_Values", result)["names"])
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter; its type is 0 if it is not set."""
+        """Return a parameter, with type 0 if it is not set."""
         found = self._call(node, ParameterService.GET, {"names": [name]})["values"]
         values = cast("list[_Values]", found)
         return _read(values[0]) if values else Value(0)

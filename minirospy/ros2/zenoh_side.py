@@ -1,7 +1,7 @@
 """The ROS 2 backend over Zenoh, for nodes that run rmw_zenoh; no ROS 2 is installed here.
 
-Zenoh calls back in its own threads. Definitions are derived from those of ROS 1 and the rules; a type is not bridged if its
-hash in the other side's keys differs.
+Zenoh calls back in its own threads. Definitions are derived from ROS 1 definitions and the rules; a type is not bridged
+if its hash in the other side's keys differs.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class ZenohSide:
     """The Zenoh backend: one session with one node."""
 
     def __init__(self, name: str, options: NetworkOptions, definitions: Definitions) -> None:
-        """Open the session and wait for the router. Raise BridgeError."""
+        """Open the session and wait for the router. Raise BridgeError if that fails."""
         self._name = name
         self._node = ZenohNode(name, options)
         self._graph = self._node.graph
@@ -73,7 +73,7 @@ class ZenohSide:
         return dict(self._definitions.message(type_, is_humble=hash_ == NO_HASH))
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
-        """Return a publisher. Raise TypesDiffer."""
+        """Return a publisher. Raise TypesDiffer as :meth:`fields` does."""
         end = self._topic_end(Kind.PUBLISHER, topic, type_, Qos(True, is_latched, depth))
         return ZenohPublisher(self._node, end)
 
@@ -87,7 +87,10 @@ class ZenohSide:
         is_reliable: bool,
         is_latched: bool,
     ) -> Ros2Handle:
-        """Call ``deliver`` for each serialized message, in a thread of Zenoh's. Raise TypesDiffer."""
+        """Call ``deliver`` for each serialized message, in one of Zenoh's threads.
+
+        Raise TypesDiffer as :meth:`fields` does.
+        """
         end = self._topic_end(Kind.SUBSCRIPTION, topic, type_, Qos(is_reliable, is_latched, depth))
         return subscribe(self._node, end, deliver)
 
@@ -97,17 +100,17 @@ class ZenohSide:
         return {end.name: end.short_type for end in ends if not is_bridge(end.node)}
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the fields of a service's request and response. Raise TypesDiffer."""
+        """Return the fields of a service's request and response. Raise TypesDiffer as :meth:`fields` does."""
         self._service_end(Kind.CLIENT, "", type_.replace("/", "/srv/"))
         request, response = self._definitions.service(type_)
         return dict(request), dict(response)
 
     def client(self, service: str, type_: str) -> Ros2Client:
-        """Return a client. Raise TypesDiffer."""
+        """Return a client. Raise TypesDiffer as :meth:`fields` does."""
         return ZenohClient(self._node, self._service_end(Kind.CLIENT, service, type_.replace("/", "/srv/")))
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service. Raise TypesDiffer."""
+        """Offer a service. Raise TypesDiffer as :meth:`fields` does."""
         response = self._definitions.service(type_)[1]
         end = self._service_end(Kind.SERVICE, service, type_.replace("/", "/srv/"))
         return ZenohServer(self._node, end, response, answer)
@@ -123,12 +126,12 @@ class ZenohSide:
         return dict(goal), dict(result), dict(feedback_fields)
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient:
-        """Return a client of an action. Raise TypesDiffer."""
+        """Return a client of an action. Raise TypesDiffer as :meth:`fields` does."""
         ends = self._action_ends(action, type_, Kind.CLIENT, Kind.SUBSCRIPTION)
         return ZenohActionClient(self._node, ends, self._action_type(type_))
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Offer an action. Raise TypesDiffer."""
+        """Offer an action. Raise TypesDiffer as :meth:`fields` does."""
         ends = self._action_ends(action, type_, Kind.SERVICE, Kind.PUBLISHER)
         return ZenohActionServer(self._node, ends, self._action_type(type_), accept)
 
@@ -149,7 +152,7 @@ class ZenohSide:
         return self._node.entity(kind, topic, type_, hash_, qos)
 
     def _service_end(self, kind: Kind, name: str, type_: str) -> Entity:
-        """Return an endpoint of a service; ``type_``: ``pkg/srv/Name`` or ``pkg/action/Name_SendGoal``."""
+        """Return a service's endpoint; ``type_``: ``pkg/srv/Name`` or ``pkg/action/Name_SendGoal``."""
         hash_ = self._agreed(type_, self._definitions.hash(type_), _SERVICE, name)
         return self._node.entity(kind, name, type_, hash_, Qos())
 
@@ -168,7 +171,10 @@ class ZenohSide:
         return ActionType(type_.replace("/", "/action/"), self._definitions.fields)
 
     def _agreed(self, type_: str, own: str, kinds: tuple[Kind, ...], name: str = "") -> str:
-        """Return the hash of a type for keys: the local one if an endpoint of the other side has it too. Raise TypesDiffer."""
+        """Return the hash of a type to use in keys: the local hash, if an endpoint on the other side has it too.
+
+        Raise TypesDiffer otherwise.
+        """
         ends = self._graph.of_name(name, *kinds) if name else self._graph.ends(*kinds)
         hashes = {end.hash for end in ends if end.type == type_ and not is_bridge(end.node)}
         if own in hashes:
@@ -179,7 +185,7 @@ class ZenohSide:
             raise TypesDiffer(
                 f"[{type_}] has another definition in ROS 2: its hash there is {min(hashes)}, here {own}"
             )
-        # No endpoint has this type: use the form that most endpoints use.
+        # No endpoint has this type: use the key format that most endpoints use.
         are_humble = [end.hash == NO_HASH for end in self._graph.ends(*_TOPIC, *_SERVICE)]
         return NO_HASH if are_humble and all(are_humble) else own
 

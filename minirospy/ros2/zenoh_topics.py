@@ -1,4 +1,4 @@
-"""Publishers and subscriptions of ROS 2 over Zenoh, also for actions. Zenoh calls back in its own threads."""
+"""ROS 2 publishers and subscriptions over Zenoh, also for actions. Callbacks run in Zenoh's threads."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 
 
 class ZenohPublisher(Handle):
-    """A publisher with its endpoint's quality of service."""
+    """A publisher with the quality of service from its endpoint."""
 
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         outlet = _outlet(node, end)
@@ -32,23 +32,23 @@ class ZenohPublisher(Handle):
 
     @property
     def subscribers(self) -> int:
-        """Return the number of subscribers; 0 until those of other sessions are connected."""
+        """Return the number of subscribers; 0 until subscribers in other sessions are connected."""
         found = self._graph.of_name(self._end.name, Kind.SUBSCRIPTION)
         count = len([each for each in found if each.key == self._end.key])
-        # A transient local publisher keeps its messages, so none is lost.
+        # A transient local publisher stores its messages, so that none is lost.
         is_ready = self._end.qos.is_transient_local or self._outlet.matching_status.matching
         return count if is_ready else 0
 
     def publish(self, data: bytes) -> None:
-        """Send a message; it is dropped if the network is too slow."""
-        # The session may be closed.
+        """Send a message; drop it if the network is too slow."""
+        # The session may have been closed.
         with contextlib.suppress(self._fault):
             self._outlet.put(data, attachment=self.attachment())
 
 
 def _outlet(node: ZenohNode, end: Entity) -> Outlet:
     drop = node.zenoh.CongestionControl.DROP
-    # The bridge's own subscription to the topic ignores this session, so it must not count as a match.
+    # The bridge's own subscription to the topic ignores this session, so that subscription must not count as a match.
     remote = node.zenoh.Locality.REMOTE
     if not end.qos.is_transient_local:
         return node.session.declare_publisher(end.key, congestion_control=drop, allowed_destination=remote)
@@ -66,7 +66,7 @@ def _outlet(node: ZenohNode, end: Entity) -> Outlet:
 
 
 def subscribe(node: ZenohNode, end: Entity, deliver: Callable[[bytes], None]) -> Handle:
-    """Call ``deliver`` for each serialized message, in a thread of Zenoh's, until the handle is closed."""
+    """Call ``deliver`` for each serialized message, in one of Zenoh's threads, until the handle is closed."""
 
     def arrived(sample: Sample) -> None:
         if sample.kind != node.zenoh.SampleKind.PUT:

@@ -1,8 +1,8 @@
 """Access control: checks a request's Host, Origin and token, and filters names of topics, services and parameters.
 
-Pure. On loopback every user of this machine may connect, but no page of a foreign site: a browser sends the page's site in
-``Origin``, and in ``Host`` the name that it looked up (DNS rebinding). Beyond loopback a token is required.
-Source: RFC 6455, section 10.2 (Origin).
+Pure. On loopback, every user of this machine may connect, but no page from a foreign site may: a browser sends the page's
+site in ``Origin``, and the name that it looked up in ``Host`` (which reveals DNS rebinding). Beyond loopback, a token is
+required. Source: RFC 6455, section 10.2 (Origin).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 TOKEN_PROTOCOL = "minirospy.token."
-"""Prefix of a sub-protocol that carries a token, because a page cannot set headers of a WebSocket."""
+"""Prefix of a sub-protocol that carries a token, because a page cannot set a WebSocket's headers."""
 
 DESKTOP_ORIGINS = ("file://", "lichtblick://*", "foxglove://*", "app://*", "vscode-webview://*")
 APP_ORIGINS = (
@@ -40,14 +40,14 @@ APP_ORIGINS = (
     "https://studio.foxglove.dev",
     "https://lichtblick-suite.github.io",
 )
-"""The front ends' pages; a browser sends these origins for no other pages."""
+"""Origins of the front ends' pages; a browser sends these origins for no other pages."""
 
 _LOCAL_NAMES = ("localhost",)
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{8,200}")
 
 
 class Grant(Enum):
-    """The rights of a client."""
+    """A client's rights."""
 
     READ = "read-only"
     WRITE = "read-write"
@@ -73,7 +73,7 @@ class Credentials(NamedTuple):
 
     @property
     def token(self) -> str:
-        """Return the token from the header, a sub-protocol or the query, "" if there is none."""
+        """Return the token from the header, a sub-protocol or the query, or "" if there is none."""
         scheme, _, rest = self.authorization.partition(" ")
         if scheme.lower() == "bearer":
             return rest.strip()
@@ -86,12 +86,11 @@ class Credentials(NamedTuple):
 
 @dataclass(frozen=True)
 class Access:
-    """The rules of one listener.
+    """The access rules for one listener.
 
-    ``hosts``: names of this machine in addition to addresses and localhost. ``origins``: patterns of pages that may connect in
-    addition to those of this machine and of the front ends. Tokens: "" for none. ``requires_token``: for a listener
-    beyond loopback.
-    ``default_is_read``: clients that need no token have read-only access.
+    ``hosts``: names of this machine in addition to addresses and localhost. ``origins``: patterns of additional pages
+    that may connect, besides those from this machine and the front ends. Tokens: "" for none. ``requires_token``: set for
+    a listener beyond loopback. ``default_is_read``: clients that need no token have read-only access.
     """
 
     hosts: tuple[str, ...] = ()
@@ -109,12 +108,12 @@ class Access:
             raise BridgeError("a listener beyond loopback needs a token")
 
     def check(self, request: Credentials) -> Grant | Refusal:
-        """Return the rights of a request's sender, or the reason why it is refused."""
+        """Return the rights of a request's sender, or the reason for refusing the request."""
         if refusal := self.check_host(request.host):
             return refusal
         grant = self._grant_of(request.token)
         if grant:
-            # A page with the token was given it by the user: do not check its origin.
+            # The user has given the token to this page: do not check the page's origin.
             return grant
 
         if request.token and (self.read_token or self.write_token):
@@ -129,7 +128,7 @@ class Access:
         return Grant.READ if self.default_is_read else Grant.WRITE
 
     def check_host(self, host: str) -> Refusal | None:
-        """Return the refusal of a request with this Host header, None if it is allowed."""
+        """Return the reason for refusing a request with this Host header, or None if it is allowed."""
         if self._knows_host(host):
             return None
         return Refusal(
@@ -157,7 +156,7 @@ class Access:
 
     def _knows_origin(self, origin: str | None, host: str) -> bool:
         if origin is None:
-            return True  # not from a browser
+            return True  # the request is not from a browser
         lowered = origin.lower()
         parts = urlsplit(lowered)
         if parts.scheme in ("http", "https") and (
@@ -169,7 +168,7 @@ class Access:
 
 
 def new_token() -> str:
-    """Return a random token of 128 bits."""
+    """Return a random 128-bit token."""
     return secrets.token_urlsafe(16)
 
 
@@ -189,7 +188,7 @@ def is_loopback(host: str) -> bool:
 
 
 def without_token(target: str) -> str:
-    """Return a request's path for logs, without its query, which may contain a token."""
+    """Return a request's path for logs, without the query, which may contain a token."""
     return unquote(urlsplit(target).path)[:200]
 
 

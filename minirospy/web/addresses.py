@@ -1,4 +1,4 @@
-"""Addresses of the bridge for users: this machine's addresses, links of front ends, a QR code for the terminal."""
+"""The bridge's addresses for users: this machine's addresses, links to front ends, and a QR code for the terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LICHTBLICK_APP = "https://lichtblick-suite.github.io/lichtblick/"
 
 
 class Links(NamedTuple):
-    """The URLs of one listener. The front ends' links are for a browser on this machine: they contain no token."""
+    """The URLs for one listener. The front ends' links are for a browser on this machine, and contain no token."""
 
     websocket: list[str]
     foxglove: str
@@ -23,7 +23,7 @@ class Links(NamedTuple):
 
 
 def links(addresses: list[str], port: int, *, encrypted: bool) -> Links:
-    """Return the links of a listener at these addresses; the front ends' links use the first."""
+    """Return the links for a listener at these addresses; the front ends' links use the first address."""
     scheme = "wss" if encrypted else "ws"
     websocket = [f"{scheme}://{_in_uri(address)}:{port}" for address in addresses]
     query = f"ds=foxglove-websocket&ds.url={quote(websocket[0], safe='')}"
@@ -31,12 +31,12 @@ def links(addresses: list[str], port: int, *, encrypted: bool) -> Links:
 
 
 def own_addresses() -> list[str]:
-    """Return this machine's IPv4 addresses that other machines may reach, that of the default route first."""
+    """Return this machine's IPv4 addresses that other machines may reach, starting with the default route's address."""
     import psutil
 
     found: dict[str, None] = {}
     with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        # connect() of a UDP socket sends nothing: it selects the address to send from.
+        # connect() on a UDP socket sends no packet: it only selects the source address.
         probe.connect(("192.0.2.1", 9))
         found[str(probe.getsockname()[0])] = None
     for addresses in psutil.net_if_addrs().values():
@@ -48,7 +48,7 @@ def own_addresses() -> list[str]:
 
 
 def host_names() -> list[str]:
-    """Return the names by which other machines may reach this one: its host name, and its multicast DNS name."""
+    """Return the names by which other machines may reach this machine: its host name and its multicast DNS name."""
     name = socket.gethostname()
     return [name, f"{name.partition('.')[0]}.local"]
 

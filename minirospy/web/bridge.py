@@ -49,7 +49,7 @@ _DIAGNOSTICS_SECONDS = 1.0
 
 @dataclass(frozen=True)
 class BridgeOptions:
-    """``address`` is the address of all listeners; each protocol has a port, None if it is not served.
+    """``address`` is the address for all listeners; each protocol has a port, which is None if the protocol is not served.
 
     ``certificate`` and ``key`` are PEM files. Times are in seconds: ``max_refresh_interval`` between queries of an
     unchanged graph,
@@ -73,20 +73,20 @@ class BridgeOptions:
     retry_delay: float | None = None
     rosapi: bool = False
     transforms: bool = False
-    """``rosapi`` and ``transforms``: also run the services of rosapi, and tf2_web_republisher, for clients of rosbridge."""
-    name: str = "minirospy bridge"  # of the Foxglove server
+    """``rosapi`` and ``transforms``: for rosbridge clients, also run rosapi's services and tf2_web_republisher, respectively."""
+    name: str = "minirospy bridge"  # the Foxglove server's name
 
 
 @dataclass(frozen=True)
 class Extras:
-    """Additional endpoints and pages of the Foxglove listener; ``pages`` are public and need no token."""
+    """Additional endpoints and pages for the Foxglove listener; ``pages`` are public and need no token."""
 
     endpoints: Sequence[Endpoint] = ()
     pages: Mapping[str, HttpHandler] = field(default_factory=dict)
 
 
 class Bridge:
-    """Opens the graph of a node to browsers. Runs on the node's loop."""
+    """Opens a node's graph to browsers. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -127,7 +127,7 @@ class Bridge:
         self._reporting: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Open the listeners. Raise BridgeError."""
+        """Open the listeners. Raise BridgeError if one cannot be opened."""
         tls = self._tls()
         served: list[tuple[str, list[Endpoint], int | None]] = [
             ("foxglove", [self.foxglove, *self._extras.endpoints], self.options.foxglove_port),
@@ -175,7 +175,7 @@ class Bridge:
                 return listener
 
     async def _start_beside(self) -> None:
-        """Start rosapi and tf2_web_republisher for clients of rosbridge, unless another node provides them."""
+        """Start rosapi and tf2_web_republisher for rosbridge clients, unless another node provides them."""
         graph = await fetch(self.node.call_master)
         if self.options.rosapi and "/rosapi/topics" not in graph.services:
             from minirospy.web.rosapi.services import Rosapi
@@ -197,7 +197,7 @@ class Bridge:
         await close_all([part.close for part in parts])
 
     def status(self) -> dict[str, object]:
-        """Return the bridge's listeners and clients, for JSON."""
+        """Return the bridge's listeners and clients as JSON values."""
         clients = []
         for endpoint, listener in self.listeners.items():
             for connection in listener.connections:
@@ -256,7 +256,7 @@ class Bridge:
         exchange.respond(200, json.dumps(self.status(), indent=1).encode(), "application/json")
 
     async def _report(self) -> None:
-        """Publish the status of the clients as diagnostics, every second while there are clients."""
+        """Publish the clients' status as diagnostics, every second while there are clients."""
         from diagnostic_msgs.msg import DiagnosticArray
 
         publisher = self.node.advertise("/diagnostics", DiagnosticArray, queue_size=1)

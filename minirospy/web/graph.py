@@ -1,6 +1,6 @@
 """The ROS half that all clients share: one subscription per topic, one publication per topic, one view of the graph.
 
-Messages stay bytes. Queries of the graph are in ``introspect/``; nodes, topics and services are those of ``aio/``.
+Messages stay serialized. Graph queries are in ``introspect/``; nodes, topics and services come from ``aio/``.
 """
 
 from __future__ import annotations
@@ -34,7 +34,10 @@ MIN_REFRESH_INTERVAL = 0.25  # seconds between refreshes while the graph changes
 
 _QUEUE = 100
 _MAX_WAITING = 32_000_000
-"""Bytes of clients' messages that are queued for the subscribers of new topics; above this, only the newest per topic."""
+"""Bytes of clients' messages that are queued for the subscribers of new topics.
+
+Above this limit, only the newest message per topic is queued.
+"""
 
 _QUERY_SECONDS = 2.0
 """Timeout, after which the graph is reported without the service types that are still unknown."""
@@ -42,7 +45,7 @@ _QUERY_SECONDS = 2.0
 
 @dataclass(frozen=True)
 class Filters:
-    """The names that clients may use."""
+    """The filters for the names that clients may use."""
 
     topics: NameFilter = field(default_factory=NameFilter)
     publishable: NameFilter = field(default_factory=NameFilter)
@@ -52,7 +55,7 @@ class Filters:
 
 @dataclass(frozen=True)
 class Arrival:
-    """A message: its bytes, its publisher's connection header, and its receive time (nanoseconds of the node's time)."""
+    """A received message: its bytes, its publisher's connection header, and its receive time (nanoseconds of the node's time)."""
 
     body: bytes | memoryview
     header: Header
@@ -64,7 +67,7 @@ GraphListener = Callable[[Changes], object]
 
 
 class SharedTopic:
-    """A topic with at least one client as a listener."""
+    """A topic to which at least one client listens."""
 
     def __init__(self, graph: SharedGraph, topic: str) -> None:
         self.topic = topic
@@ -90,7 +93,7 @@ class SharedTopic:
         """Call ``listener`` with the last message of each latched publisher, then with each new message."""
         if self._subscription is None:
             self._subscription = self._graph.node.subscribe_raw(self.topic, self._deliver)
-        # If the topic was just being unsubscribed, existing connections do not deliver latched messages again.
+        # If the topic is just being unsubscribed, existing connections do not deliver latched messages again.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
             listener(Arrival(arrival.body, arrival.header, self._graph.now()))
@@ -125,7 +128,7 @@ class SharedTopic:
 
 
 class Publication:
-    """One client's handle of a topic that this node publishes; its method is ``publish(bytes)``."""
+    """One client's handle for a topic that this node publishes; clients call ``publish(bytes)``."""
 
     def __init__(self, graph: SharedGraph, topic: str, shared: _SharedPublisher) -> None:
         self.topic = topic
@@ -140,7 +143,10 @@ class Publication:
         return self._shared is None or self._shared.joining is None or self._shared.joining.done()
 
     async def joined(self) -> None:
-        """Wait for those subscribers, for a second at most: they do not receive messages published before that."""
+        """Wait for those subscribers, for at most a second.
+
+        They do not receive messages published before they connect.
+        """
         if self._shared and self._shared.joining:
             await asyncio.wait([self._shared.joining])
 
@@ -151,7 +157,10 @@ class Publication:
             shared.publisher.publish_raw(body)
 
     def publish_when_joined(self, body: bytes) -> None:
-        """Publish once the current subscribers are connected, in order. Does not block; a full queue drops its oldest."""
+        """Publish once the current subscribers are connected, in order.
+
+        Does not block; a full queue drops its oldest message.
+        """
         if self._waiting is None:
             if self.has_joined or not (self._shared and self._shared.joining):
                 self.publish(body)
@@ -204,7 +213,7 @@ class SharedGraph:
         self.node = node
         self._clock = clock
         self.waiting_bytes = 0
-        """Bytes of the clients' messages that are queued for subscribers of new topics."""
+        """Total bytes of clients' messages that are queued for subscribers of new topics."""
         self.filters = filters or Filters()
         self.snapshot = Snapshot()
         self.topics: dict[str, SharedTopic] = {}
@@ -226,7 +235,7 @@ class SharedGraph:
         )
 
     def now(self) -> int:
-        """Return the time for messages in nanoseconds: the node's, or that of ``clock`` if it is set."""
+        """Return the time for messages in nanoseconds: the time from ``clock`` if it is set, else the node's time."""
         if self._clock:
             return self._clock()
         now = self.node.now()
@@ -245,7 +254,7 @@ class SharedGraph:
     # --- the graph
 
     def watch(self, listener: GraphListener) -> None:
-        """Call ``listener`` with each change of the graph; for the first listener, the first change is the whole graph."""
+        """Call ``listener`` with each graph change; the first listener's first change is the whole graph."""
         self._listeners.append(listener)
         if self._watching is None:
             self.snapshot = Snapshot()
@@ -266,8 +275,8 @@ class SharedGraph:
         self._refresh_soon.set()
 
     async def look(self) -> None:
-        """Refresh the graph, and report changes. Raise MasterUnreachableError or RpcError."""
-        # One refresh at a time, so that an earlier one does not replace the snapshot of a later one.
+        """Refresh the graph, and report changes. Raise MasterUnreachableError or RpcError if the master's call fails."""
+        # Run one refresh at a time, so that an earlier refresh does not replace a later snapshot.
         async with self._looking:
             found = await fetch(self.node.call_master)
             await self._look_up_services(found)
@@ -309,7 +318,7 @@ class SharedGraph:
                 await asyncio.wait_for(self._refresh_soon.wait(), pause)
 
     def service_info(self, service: str) -> ServiceInfo | None:
-        """Return a service's type; None if it is unknown or not installed."""
+        """Return a service's type; or None if it is unknown or not installed."""
         return self._service_types.found.get((service, self.snapshot.services.get(service, ())))
 
     async def _look_up_services(self, found: Snapshot) -> None:
@@ -332,7 +341,7 @@ class SharedGraph:
         shared.add(listener)
 
     def unsubscribe(self, topic: str, listener: TopicListener) -> None:
-        """Stop calling ``listener``; unsubscribe from the topic with its last listener."""
+        """Stop calling ``listener``; unsubscribe from the topic when its last listener is removed."""
         shared = self.topics.get(topic)
         if shared:
             shared.remove(listener)
@@ -341,7 +350,7 @@ class SharedGraph:
 
     async def _end_topic(self, shared: SharedTopic) -> None:
         if shared.is_wanted:
-            return  # a new listener has been added meanwhile
+            return  # a new listener has been added in the meantime
         await shared.close()
         if not shared.is_wanted and self.topics.get(shared.topic) is shared:
             del self.topics[shared.topic]
@@ -365,7 +374,7 @@ class SharedGraph:
         return Publication(self, topic, shared)
 
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
-        """Unadvertise a topic when its last client has left."""
+        """Unadvertise a topic after its last client has left."""
         shared.clients -= 1
         if not shared.clients and self._publishers.get(topic) is shared:
             del self._publishers[topic]
@@ -375,7 +384,10 @@ class SharedGraph:
     # --- services
 
     async def call(self, service: str, md5sum: str, request: bytes) -> bytes:
-        """Call a service; return the response's bytes. Raise ServiceException, or BridgeError if clients may not call it."""
+        """Call a service; return the response's bytes.
+
+        Raise ServiceException, or BridgeError if clients may not call the service.
+        """
         if not self.filters.services(service):
             raise BridgeError(f"service [{service}] may not be called by clients")
         return await call_raw(self.node, service, md5sum, request)
@@ -394,6 +406,6 @@ class SharedGraph:
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # A task that is cancelled before its first step has not started the coroutine: close it.
+        # A task that is cancelled before its first step has not started the coroutine, so close the coroutine.
         task.add_done_callback(lambda _: work.close())
         return task

@@ -1,4 +1,4 @@
-"""Parse clients' JSON within limits: `[]` fifty million times would use gigabytes, and block all clients. Pure.
+"""Parse clients' JSON within limits, because `[]` fifty million times would use gigabytes and block all clients. Pure.
 
 The standard library's parser holds Python's global interpreter lock (GIL) until it has parsed the whole string, and so
 blocks all threads of the process. Large strings are parsed in pieces instead, by :func:`load_json_in_pieces` in a separate
@@ -24,23 +24,24 @@ __all__ = [
     "width_of",
 ]
 
-_MAX_VALUES = 4_000_000  # in one JSON string; as numbers they take 160 MB
-_MAX_STRINGS = 2_000_000  # in one JSON string, names of fields included; they take 150 MB
+_MAX_VALUES = 4_000_000  # values in one JSON string; as numbers they take 160 MB
+_MAX_STRINGS = 2_000_000  # strings in one JSON string, including field names; they take 150 MB
 _MAX_COLLECTIONS = 1_000_000  # lists and objects in one JSON string; they take 100 to 240 MB
-MAX_QUICK_CHARACTERS = 64 * 1024  # in any string that is parsed immediately: 2 ms at most
-MAX_QUICK_STRINGS = 4 * 1024 * 1024  # characters in a string with few values, such as an image in base64
+MAX_QUICK_CHARACTERS = 64 * 1024  # in any string that is parsed on the event loop: takes at most 2 ms
+# in a string with few values, such as a base64 image, that is parsed on the event loop
+MAX_QUICK_STRINGS = 4 * 1024 * 1024
 MAX_QUICK_VALUES = 20_000
-_PIECE = 32 * 1024  # characters of numbers that are parsed in one call
+_PIECE = 32 * 1024  # characters of numbers that one call parses
 
-_PIECE_VALUES = 1000  # of a list that become text in one call: 1 ms for floats
-_PIECE_CHARACTERS = 64 * 1024  # of a string
+_PIECE_VALUES = 1000  # values of a list that one call encodes: 1 ms for floats
+_PIECE_CHARACTERS = 64 * 1024  # characters of a string that one call encodes
 
 _SPACE = re.compile(r"[ \t\n\r]*")
 _MARKS = re.compile(r'[\[\]{}"]')
 
 
 _HEAD_SIZE = sys.getsizeof("\u0100") - 2 * 2
-"""Bytes of a non-ASCII str without its characters and the terminating one."""
+"""Size in bytes of a non-ASCII str, without its characters and the terminating character."""
 
 _BEYOND_LATIN = re.compile(rb"[\xc4-\xff]")
 _BEYOND_BMP = re.compile(rb"[\xf0-\xff]")
@@ -48,7 +49,10 @@ _CONTINUATIONS = bytes(range(0x80, 0xC0))
 
 
 def size_in_memory(data: bytes | bytearray) -> int:
-    """Return the bytes that a UTF-8 string takes as a str: one wide character makes every character take two or four."""
+    """Return the bytes that a UTF-8 string takes as a str.
+
+    One wide character makes every character take two or four.
+    """
     if data.isascii():
         return len(data)
     characters = len(data.translate(None, _CONTINUATIONS))
@@ -64,7 +68,7 @@ def width_of(text: str) -> int:
     if len(text) == 1:
         # Python 3.12 and later also store a UTF-8 copy in single-character strings.
         return 1 if text <= "\xff" else 2 if text <= "\uffff" else 4
-    # In other strings such a copy can only make this value too large.
+    # In other strings, such a copy can only make this value too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
     return found if found <= 2 else 4
 
@@ -73,14 +77,14 @@ def is_quick_text(text: str) -> bool:
     """Return whether a string can be parsed in a few milliseconds."""
     if len(text) <= MAX_QUICK_CHARACTERS:
         return True
-    # Brackets and commas in strings are counted as well: a large base64 string has none.
+    # Brackets and commas in strings are counted as well, which is harmless: a large base64 string contains none.
     return len(text) <= MAX_QUICK_STRINGS and sum(map(text.count, ",[{")) <= MAX_QUICK_VALUES
 
 
 def load_json(
     text: str | bytes, *, max_values: int = _MAX_VALUES, max_collections: int = _MAX_COLLECTIONS
 ) -> object:
-    """Parse JSON. Raise ValueError, also if it has too many values, or RecursionError."""
+    """Parse JSON. Raise ValueError if it is invalid or has too many values, or RecursionError if it is nested too deeply."""
     if isinstance(text, str):
         _check_counts(text, max_values, max_collections)
     found: object = json.loads(text)
@@ -88,7 +92,10 @@ def load_json(
 
 
 def load_json_in_pieces(text: str) -> object:
-    """Parse JSON as :func:`load_json` does without holding the GIL for long, for a thread next to the event loop."""
+    """Parse JSON as :func:`load_json` does, but without holding the GIL for long.
+
+    For use in a thread alongside the event loop.
+    """
     _check_counts(text, _MAX_VALUES, _MAX_COLLECTIONS)
     found: object = _PiecewiseDecoder().decode(text)
     return found
@@ -104,7 +111,7 @@ def _check_counts(text: str, max_values: int, max_collections: int) -> None:
 
 
 class _PiecewiseDecoder(json.JSONDecoder):
-    """The library's pure-Python decoder, which lets other threads run, but with the C parser for long arrays of numbers."""
+    """The library's pure-Python decoder, which lets other threads run, but which uses the C parser for long arrays of numbers."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -113,7 +120,10 @@ class _PiecewiseDecoder(json.JSONDecoder):
 
 
 def _array(start: tuple[str, int], scan_once: Callable[[str, int], tuple[object, int]]) -> tuple[object, int]:
-    """Parse the array after its opening bracket; return it and the end index. Raise JSONDecodeError or StopIteration."""
+    """Parse the array after its opening bracket; return it and the end index.
+
+    Raise JSONDecodeError or StopIteration if it is invalid.
+    """
     text, at = start
     values: list[object] = []
     at = _skip_space(text, at)
@@ -152,7 +162,7 @@ def _skip_space(text: str, at: int) -> int:
 
 
 def _numbers(text: str, start: int, end: int) -> list[object]:
-    """Parse the values in a part of an array. Raise JSONDecodeError, also if there are none."""
+    """Parse the values in a part of an array. Raise JSONDecodeError if they are invalid or if there are none."""
     found: list[object] = json.loads(f"[{text[start:end]}]")
     if not found:
         raise json.JSONDecodeError("Expecting value", text, start)
@@ -163,17 +173,20 @@ def _numbers(text: str, start: int, end: int) -> list[object]:
 
 
 def dump_json(value: object) -> str:
-    """Return the compact text of a value. Raise ValueError for NaN and infinities."""
+    """Return a value as compact JSON. Raise ValueError for NaN and infinities."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False)
 
 
 def dump_json_in_pieces(value: object) -> str:
-    """Do the same without keeping the GIL for long: for a thread beside the event loop. Keys of dictionaries are strings."""
+    """Do the same as :func:`dump_json` without holding the GIL for long, for a thread alongside the event loop.
+
+    Dictionary keys are strings.
+    """
     return "".join(_pieces(value))
 
 
 def _pieces(value: object) -> Iterator[str]:
-    """Yield the text of a value in parts."""
+    """Yield the JSON of a value in parts."""
     if isinstance(value, dict):
         mark = "{"
         for name, each in value.items():
@@ -183,7 +196,7 @@ def _pieces(value: object) -> Iterator[str]:
         yield "}" if value else "{}"
     elif isinstance(value, list):
         yield "["
-        # The elements of a message's array have one type.
+        # All elements of a message's array have the same type.
         is_nested = bool(value) and isinstance(value[0], dict | list | str)
         yield from _nested_elements(value) if is_nested else _numbers_of(value)
         yield "]"
@@ -197,13 +210,13 @@ def _pieces(value: object) -> Iterator[str]:
 
 
 def _numbers_of(values: list[object]) -> Iterator[str]:
-    """Yield the texts of a list's elements, which are numbers or null, with the commas between them."""
+    """Yield the JSON of a list's elements, which are numbers or null, with the commas between them."""
     for at in range(0, len(values), _PIECE_VALUES):
         yield ("," if at else "") + dump_json(values[at : at + _PIECE_VALUES])[1:-1]
 
 
 def _nested_elements(values: list[object]) -> Iterator[str]:
-    """Do the same for dictionaries, lists and strings: many small ones become text in one call."""
+    """Yield the JSON of dictionaries, lists and strings in a list; one call encodes many small elements."""
     mark, batch, size = "", list[object](), 0
     for each in values:
         of_each = _size(each)
@@ -222,7 +235,7 @@ def _nested_elements(values: list[object]) -> Iterator[str]:
 
 
 def _size(value: object) -> int:
-    """Return how many numbers take about as long as a value; if it is large, not all of it is counted."""
+    """Return the number of numbers that take about as long to encode as a value; counting stops early for a large value."""
     if isinstance(value, str):
         return 1 + len(value) * _PIECE_VALUES // _PIECE_CHARACTERS
     if not isinstance(value, dict | list):

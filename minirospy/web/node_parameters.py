@@ -24,7 +24,10 @@ _OFF = (None, False, 0, "", "None")
 async def private_parameters(
     node: Node, without_effect: Iterable[str] = (), given: Mapping[str, object] = MappingProxyType({})
 ) -> dict[str, object]:
-    """Return a node's private parameters, including ``given`` arguments; warn of each in ``without_effect`` that is set."""
+    """Return a node's private parameters, including ``given`` arguments.
+
+    Warn of each parameter in ``without_effect`` that is set.
+    """
     found = await node.get_param("~", {})
     private = {**(found if isinstance(found, dict) else {}), **given}
     for name in without_effect:
@@ -34,7 +37,7 @@ async def private_parameters(
 
 
 def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T) -> _T:
-    """Return a parameter. Raise BridgeError if it has another type."""
+    """Return a parameter. Raise BridgeError if it has a different type."""
     found = private.get(name, default)
     if not isinstance(found, kind) or (kind is int and isinstance(found, bool)):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be of type {kind.__name__}")
@@ -42,7 +45,7 @@ def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T)
 
 
 def number(private: Mapping[str, object], name: str, default: float) -> float:
-    """Return a numeric parameter. Raise BridgeError."""
+    """Return a numeric parameter. Raise BridgeError if it is not a number."""
     found = private.get(name, default)
     if isinstance(found, bool) or not isinstance(found, int | float):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be a number")
@@ -50,7 +53,7 @@ def number(private: Mapping[str, object], name: str, default: float) -> float:
 
 
 def texts(private: Mapping[str, object], name: str, default: Sequence[str]) -> list[str]:
-    """Return a parameter that is a list of strings. Raise BridgeError."""
+    """Return a parameter that is a list of strings. Raise BridgeError if it is not."""
     found = private.get(name, default)
     if not isinstance(found, list | tuple) or not all(isinstance(each, str) for each in found):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be a list of strings")
@@ -58,7 +61,10 @@ def texts(private: Mapping[str, object], name: str, default: Sequence[str]) -> l
 
 
 def globs(private: Mapping[str, object], name: str) -> list[str]:
-    """Return globs in one of rosbridge's forms: a list, or a string such as "['/tf', '/odom*']"; [] allows all."""
+    """Return globs, given in one of the formats that rosbridge accepts: a list, or a string such as "['/tf', '/odom*']".
+
+    [] allows all.
+    """
     found = private.get(name, "")
     if isinstance(found, str):
         found = [each.strip().strip("'\"") for each in found.strip().strip("[]").split(",")]
@@ -66,7 +72,7 @@ def globs(private: Mapping[str, object], name: str) -> list[str]:
 
 
 def address_of(private: Mapping[str, object]) -> str:
-    """Return the address to listen on. Raise BridgeError."""
+    """Return the address to listen on. Raise BridgeError if the parameter is invalid."""
     return value(private, "address", str, "") or "127.0.0.1"
 
 
@@ -75,7 +81,8 @@ def access_of(
 ) -> Access:
     """Return the access rules, with the tokens from the environment.
 
-    If other machines may connect and the environment has none, use this user's stored tokens. Raise BridgeError.
+    If other machines may connect and the environment has no tokens, use this user's stored tokens. Raise BridgeError if a
+    parameter is invalid or the tokens cannot be stored.
     """
     beyond = not is_loopback(address_of(private))
     tokens = Tokens(environ.get("MINIROSPY_BRIDGE_TOKEN", ""), environ.get("MINIROSPY_BRIDGE_READ_TOKEN", ""))

@@ -1,4 +1,4 @@
-"""The timeline of `rosbag play --foxglove`: a bridge in the player's process, whose clients control the player."""
+"""The timeline for `rosbag play --foxglove`: a bridge in the player's process, whose clients control the player."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAX_RATE = 100.0
 
 
 class PlayerPlayback:
-    """A player with the interface for clients of the Foxglove protocol."""
+    """Adapts a player to the interface for clients of the Foxglove protocol."""
 
     def __init__(self, player: Player, span: tuple[int, int]) -> None:
         self.range = span
@@ -32,11 +32,11 @@ class PlayerPlayback:
         self._did_seek = False
 
     def now(self) -> int:
-        """Return the bag's time, which stamps messages."""
+        """Return the bag's current time, which stamps messages."""
         return self._player.state().time
 
     def state(self) -> PlaybackState:
-        """Return the player's state, with the id of the request that it answers, each id once."""
+        """Return the player's state, with the id of the request to which it responds; each id is returned once."""
         state = self._player.state()
         status = (
             PlaybackStatus.ENDED
@@ -60,7 +60,7 @@ class PlayerPlayback:
 
 
 class PlayerBridge:
-    """A bridge for a player, on a separate loop; a context manager. Raise BridgeError."""
+    """A bridge for a player, on a separate loop; a context manager. Raise BridgeError if it cannot start."""
 
     def __init__(self, player: Player, span: tuple[int, int], port: int) -> None:
         self._playback = PlayerPlayback(player, span)

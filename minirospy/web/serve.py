@@ -33,7 +33,7 @@ __all__ = [
 
 
 _LARGE_BLOCK = 4 * 1024 * 1024
-"""Size of blocks that are returned to the system when freed; above that of camera images, because mapping takes time."""
+"""Size of blocks that are returned to the system when freed; larger than camera images, because mapping memory takes time."""
 
 
 class Part(Protocol):
@@ -52,8 +52,8 @@ _SWITCH_SECONDS = 0.0005  # GIL switch interval; with Python's 5 ms the loop wai
 def prefer_the_loop() -> None:
     """Reduce the event loop's delays by threads that process large messages, and by the garbage collector.
 
-    Call it after all imports: otherwise the collector visits their objects, for 15 ms each time a client sends thousands
-    of arrays.
+    Call this after all imports: otherwise the collector visits the imported objects, for 15 ms each time a client sends
+    thousands of arrays.
     """
     sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_SECONDS))
     gc.collect()
@@ -71,7 +71,7 @@ def require_libraries() -> None:
 
 
 def run_program(name: str, module: str) -> int:
-    """Run a node's program, whose module imports the libraries; return the exit status, 1 if a library is missing."""
+    """Run a node's program, whose module imports the libraries; return its exit status, or 1 if a library is missing."""
 
     def body() -> int:
         require_libraries()
@@ -81,7 +81,7 @@ def run_program(name: str, module: str) -> int:
 
 
 def exit_status(name: str, body: Callable[[], int]) -> int:
-    """Return the exit status of a program; if ``body`` raises MinirospyError, print it in one line and return 1."""
+    """Return a program's exit status; if ``body`` raises MinirospyError, print the error in one line and return 1."""
     try:
         return body()
     except MinirospyError as error:
@@ -112,10 +112,10 @@ def run(
 ) -> int:
     """Run a bridge on a node of this name until it is shut down; return the exit status.
 
-    ``argv``: remappings, as a launch file gives them; None: those of the process. ``start`` makes the bridge,
-    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for which
-    it would import message classes. ``registration_fault_lines`` are those of the node. ``connect`` opens
-    what may fail before the node takes its name: the master ends a running node of that name.
+    ``argv``: remappings, as a launch file passes them; None: the process's own. ``start`` makes the bridge,
+    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for
+    which it would import message classes. ``registration_fault_lines`` is passed to the node. ``connect`` opens resources
+    that may fail, before the node registers its name, because the master ends a running node with the same name.
     """
     return_large_blocks(_LARGE_BLOCK)
     loop = new_event_loop()
@@ -147,7 +147,7 @@ async def _run(
     def interrupt() -> None:
         nonlocal interrupted
         interrupted = True
-        # If there is no master yet, cancel the wait for it; later, shut down the node.
+        # If there is no master yet, cancel the wait for the master; otherwise, shut down the node.
         if node.is_started:
             node.shutdown("signal")
         else:
@@ -157,7 +157,7 @@ async def _run(
         number: signal.signal(number, lambda *_: loop.call_soon_threadsafe(interrupt))
         for number in (*interrupt_signals(), signal.SIGTERM)
     }
-    # On Windows Python handles a signal only when the loop next wakes up.
+    # On Windows, Python handles a signal only when the loop next wakes up.
     ticking = asyncio.ensure_future(_tick())
     bridge: _P | None = None
     try:

@@ -27,7 +27,7 @@ class Tokens(NamedTuple):
 
 
 def read_tokens(home: Path) -> Tokens | None:
-    """Return the tokens in ROS_HOME; None if there are none."""
+    """Return the tokens in ROS_HOME, or None if there are none."""
     try:
         with os.fdopen(open_file(home / _NAME, os.O_RDONLY), encoding="utf-8") as file:
             if sys.platform != "win32" and not _is_own(os.fstat(file.fileno())):
@@ -40,12 +40,15 @@ def read_tokens(home: Path) -> Tokens | None:
 
 
 def _is_own(found: os.stat_result) -> bool:
-    """Return whether a file belongs to this user and is private: in a shared folder, others may have created it."""
+    """Return whether a file belongs to this user and is private; other users may have created a file in a shared folder."""
     return found.st_uid == os.geteuid() and not stat.S_IMODE(found.st_mode) & 0o077
 
 
 def kept_tokens(home: Path, *, renews: bool = False) -> Tokens:
-    """Return the tokens in ROS_HOME; create new ones if there are none, or with ``renews``. Raise BridgeError."""
+    """Return the tokens in ROS_HOME; create new ones if there are none, or if ``renews``.
+
+    Raise BridgeError if they cannot be stored.
+    """
     found = None if renews else read_tokens(home)
     if found:
         return found

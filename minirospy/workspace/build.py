@@ -1,7 +1,7 @@
 """Build a workspace: packages in ``src`` -> ``devel``, with generated messages and the files to source.
 
-No compiler runs, and no files are copied: Python programs stay in the source folders, to which ``devel`` refers. Unchanged
-parts are not generated again. Source: http://wiki.ros.org/catkin/workspaces.
+No compiler runs, and no files are copied: Python programs stay in the source folders, and ``devel`` refers to them.
+Unchanged parts are not regenerated. Source: http://wiki.ros.org/catkin/workspaces.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ PROVIDED = frozenset(
     tf_conversions urdf urdfdom xacro xmlrpcpp
     """.split()  # noqa: SIM905
 )
-"""Packages without messages that Python packages depend on: minirospy provides their functions, or they need a compiler."""
+"""Packages without messages that Python packages depend on: minirospy provides their functions, or they require a compiler."""
 
 _KINDS = {".msg": "message", ".srv": "service", ".action": "action"}
 _RELAY = """# Made by catkin_make: {name!r} is in {folder!r}; what was generated for it is here.
@@ -67,8 +67,8 @@ with open(__file__, "rb") as _source:
 """
 
 
-# The interpreter that has rospy, unless its path is too long or contains white space, which a shebang line cannot
-# have.
+# Use the interpreter that has rospy, unless its path is too long or contains white space, which a shebang line does
+# not allow.
 _SHEBANG = (
     sys.executable
     if sys.executable and not re.search(r"\s|.{120}", sys.executable)
@@ -93,14 +93,14 @@ class Workspace(NamedTuple):
 
     @classmethod
     def at(cls, root: Path) -> Workspace:
-        """Return the workspace whose folder is ``root``, with folders of the usual names."""
+        """Return the workspace in the folder ``root``, with the usual folder names."""
         return cls(root, *(root / name for name in ("src", "build", "devel", "install")))
 
 
 def find_workspace(start: Path) -> Path:
-    """Return the workspace that contains ``start``: the folder that was built before, or that contains src.
+    """Return the workspace that contains ``start``: a folder that was built before, or that contains src.
 
-    Raise BuildError.
+    Raise BuildError if there is none.
     """
     start = start.resolve()
     for folder in (start, *start.parents):
@@ -115,8 +115,8 @@ def find_workspace(start: Path) -> Path:
 def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list[Plan]:
     """Return the plans of all packages below a folder, in build order.
 
-    ``variables`` as in read_plan; packages in CATKIN_BLACKLIST_PACKAGES are skipped.
-    Raise BuildError (a duplicate package name, a cycle), ManifestError, or DefinitionError.
+    ``variables`` are passed to read_plan; packages in CATKIN_BLACKLIST_PACKAGES are skipped. Raise BuildError if a
+    package name is duplicated or dependencies form a cycle, or ManifestError or DefinitionError if a file is invalid.
     """
     plans: dict[str, Plan] = {}
     left_out = (variables or {}).get("CATKIN_BLACKLIST_PACKAGES", "").split(";")
@@ -150,7 +150,7 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 
 
 class Report(NamedTuple):
-    """The result of building a package. ``made``: the generated parts, as a string; empty if nothing had changed."""
+    """The result of building a package. ``made``: the generated parts, as a string; empty if nothing has changed."""
 
     plan: Plan
     made: str
@@ -167,8 +167,8 @@ def build(
 ) -> None:
     """Build the ``chosen`` packages, or all, into the devel folder; call ``report`` with the result of each.
 
-    ``outside``: the packages of other workspaces and of minirospy.
-    Raise BuildError or DefinitionError.
+    ``outside``: the packages in other workspaces and in minirospy. Raise BuildError if a package cannot be built, or
+    DefinitionError if a definition is invalid.
     """
     builder = _Builder(workspace, plans, outside)
     for plan in plans:
@@ -193,11 +193,11 @@ def own_set_up(prefix: Path, sources: tuple[Path, ...], parents: tuple[Path, ...
 def write_set_up(
     prefix: Path, sources: tuple[Path, ...], environment: Mapping[str, str] = os.environ
 ) -> None:
-    """Write the setup files. The workspaces that are sourced in the environment become the parents of this one.
+    """Write the setup files. The workspaces that are sourced in the environment become this workspace's parents.
 
-    If none is sourced, keep the parents of the previous build.
+    If none is sourced, the previous build's parents remain.
     """
-    # A workspace whose own setup file is sourced must not extend itself.
+    # If the workspace's own setup file is sourced, it must not extend itself.
     own = {
         prefix,
         *(prefix.parent / name for name in ("devel", "install", "devel_isolated", "install_isolated")),
@@ -215,7 +215,7 @@ def write_set_up(
 
 
 class _Builder:
-    """Builds the packages of one workspace one after the other."""
+    """Builds the packages of one workspace, one after the other."""
 
     def __init__(self, workspace: Workspace, plans: Sequence[Plan], outside: Packages) -> None:
         self._workspace = workspace
@@ -224,7 +224,7 @@ class _Builder:
         self._stamps = workspace.build / "minirospy"
         self._folders = {**outside.folders(), **{plan.name: plan.folder for plan in plans}}
         self._catalogue = Catalogue(self._folders, {plan.name: plan.definitions for plan in plans})
-        # Generated code depends on the definitions, the CMakeLists.txt files, and the message compiler.
+        # Generated code depends on the definitions, the CMakeLists.txt files, and the message compiler's own code.
         ours = Path(__file__).parents[1]
         compiler = [
             *(ours / "core" / "idl").glob("*.py"),
@@ -279,12 +279,15 @@ class _Builder:
                 stamp.unlink()
 
     def _compile(self, plan: Plan, has_relay: bool) -> dict[Path, str]:
-        """Return the generated modules of a package: file -> text. Raise DefinitionError or BuildError."""
+        """Return a package's generated modules: file -> text.
+
+        Raise DefinitionError if a definition is invalid, or BuildError if a type is missing.
+        """
         folder = self._modules / plan.name
         try:
             texts = compile_package(self._catalogue, plan.name)
         except DefinitionError as error:
-            # The error for a type that contains itself names the type: replace it by its file.
+            # The error for a type that contains itself contains the type's name: replace the name by the type's file.
             files = {f"{plan.name}/{path.stem}": str(path) for path in plan.definitions}
             raise DefinitionError(files.get(error.file, error.file), error.line, error.text) from error
         modules = {folder / name: text for name, text in texts.items()}
@@ -295,7 +298,7 @@ class _Builder:
         return modules
 
     def _outside_key(self, names: Iterable[str]) -> str:
-        """Return a fingerprint of the messages of other workspaces: a parent workspace may have been rebuilt."""
+        """Return a fingerprint of other workspaces' messages, because a parent workspace may have been rebuilt."""
         known = [name for name in names if name in self._folders]
         return _key(
             path
@@ -305,7 +308,7 @@ class _Builder:
         )
 
     def _finish(self, stamp: Path, outputs: Iterable[Path], outside: list[str]) -> None:
-        """Record the outputs; remove those of the previous build that no longer exist."""
+        """Record the outputs; remove outputs of the previous build that are no longer generated."""
         names = sorted(map(str, outputs))
         self._remove(set(_read_stamp(stamp).get("outputs", [])) - set(names))
         note = {
@@ -442,7 +445,7 @@ def _read_stamp(stamp: Path) -> dict[str, Any]:
 def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
     """Return the programs in devel that run those in source folders: file -> text.
 
-    They put programs from setup.py on PATH, and let real ROS run a program that is not executable itself.
+    These programs put those from setup.py on PATH, and let real ROS run a program that is not executable itself.
     """
     places = {devel / "bin" / path.name: path for path in (setup.scripts if setup else ())}
     for rule in plan.installs:
@@ -475,7 +478,7 @@ def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
 
 
 def _counts(plan: Plan, setup: PythonSetup | None) -> str:
-    """Return ``2 messages, 1 service, package foo``."""
+    """Return a summary such as ``2 messages, 1 service, package foo``."""
     words = []
     for suffix, word in _KINDS.items():
         count = sum(path.suffix == suffix for path in plan.definitions)
@@ -490,7 +493,7 @@ def _counts(plan: Plan, setup: PythonSetup | None) -> str:
 
 
 def _line_of(file: Path, name: str) -> int:
-    """Return the first line of a file that contains a word; 1 if none does."""
+    """Return the first line of a file that contains a word; 1 if no line does."""
     word = re.compile(rf"(?<![\w]){re.escape(name)}(?![\w])")
     for number, line in enumerate(read_definition(file).split("\n"), 1):
         if word.search(line.split("#", 1)[0]):

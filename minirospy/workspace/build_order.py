@@ -22,10 +22,11 @@ _RUN_WITH = (Kind.BUILD_EXPORT, Kind.EXEC)
 def build_order(
     manifests: Mapping[str, Manifest], also: Mapping[str, Collection[str]] | None = None
 ) -> list[str]:
-    """Return the names of packages, each after its build dependencies; of several that could be next, the first by name.
+    """Return the names of packages, each after its build dependencies. If several could be next, the first by name is next.
 
-    A package's build dependencies are those that it needs to build and test, their run dependencies, and the packages that
-    ``also`` has for its name. Message generators and their dependencies come first. Raise CircularDependencyError.
+    A package's build dependencies are those that it needs to build and test, their run dependencies, and the packages
+    that ``also`` lists for its name. Message generators and their dependencies come first. Raise CircularDependencyError
+    if dependencies form a cycle.
     """
     routes = {name: _routes(name, manifests, (also or {}).get(name, ())) for name in manifests}
     early = _generators(manifests, routes)
@@ -49,7 +50,7 @@ def build_order(
 
 
 def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str]) -> dict[str, str]:
-    """Return a package's build dependencies, including indirect ones, each with the package that names it."""
+    """Return a package's build dependencies, including indirect ones, each mapped to the package that names it."""
     found = dict.fromkeys(sorted({*manifests[name].depends(*_BUILT_FROM), *also} & manifests.keys()), name)
     waiting = list(found)
     for each in waiting:
@@ -78,12 +79,12 @@ def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[
 def _circle(nodes: list[str], routes: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
     """Return the names of a cycle, each before its dependency, starting and ending with the first by name.
 
-    ``nodes`` is graphlib's cycle: each name before one that depends on it, with the first name repeated at the end.
+    ``nodes`` is graphlib's cycle: each name before a package that depends on it, with the first name repeated at the end.
     """
     backwards: list[str] = []
     for needed, name in pairwise(nodes):
         backwards.append(needed)
-        # Add the packages between the two, which are only run dependencies.
+        # Add the packages between these two, which are only run dependencies.
         between = routes[name][needed]
         while between != name:
             backwards.append(between)

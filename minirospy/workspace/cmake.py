@@ -34,7 +34,7 @@ _OPENERS = {end: name for name, end in _ENDS.items()}
 
 
 class Word(NamedTuple):
-    """An argument as written. ``quoted``: it remains one word, whatever it contains."""
+    """An argument as written. A ``quoted`` argument remains one word, whatever it contains."""
 
     text: str
     quoted: bool = False
@@ -43,7 +43,7 @@ class Word(NamedTuple):
 class Statement(NamedTuple):
     """A command: its name in lower case, its arguments, the line where it starts, and its body.
 
-    ``body`` has the commands before the closing ``endif()`` or ``endforeach()``, including ``else()``.
+    ``body`` contains the commands before the closing ``endif()`` or ``endforeach()``, including ``else()``.
     """
 
     name: str
@@ -61,7 +61,7 @@ def parse_cmake(text: str, where: str) -> tuple[Statement, ...]:
 
 
 def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> dict[str, list[str]]:
-    """Return arguments grouped by the preceding keyword; those before any keyword are under ``""``."""
+    """Return arguments grouped by the preceding keyword; arguments before the first keyword are under ``""``."""
     found: dict[str, list[str]] = {"": []}
     current = ""
     for word in arguments:
@@ -132,9 +132,9 @@ def _commands(text: str, where: str) -> Iterator[Statement]:
 
 
 def _is_closed(text: str, bracket: re.Match[str], unclosed: set[str]) -> bool:
-    """Return whether the bracket that opens here is closed later; if not, remember that in ``unclosed``.
+    """Return whether the bracket that opens here is closed later; if not, record that in ``unclosed``.
 
-    Without that each of thousands of brackets that open would be a search to the end of the file.
+    Without the record, each of thousands of opening brackets would cause a search to the end of the file.
     """
     level = bracket[1]
     if level not in unclosed and text.find(f"]{level}]", bracket.end()) < 0:
@@ -143,7 +143,7 @@ def _is_closed(text: str, bracket: re.Match[str], unclosed: set[str]) -> bool:
 
 
 def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
-    """Yield each token and its line."""
+    """Yield each token and its line number."""
     position, line = 0, 1
     unclosed: set[str] = set()
     while position < len(text):
@@ -159,13 +159,13 @@ def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
 
 
 def _shown(text: str) -> str:
-    """Return the first words of a string, for an error message."""
+    """Return a string's first words, for an error message."""
     return " ".join(text[:40].split())
 
 
 def _word(match: re.Match[str]) -> Word:
     if match["bracket"] is not None:
-        # A bracket argument has no variable references: escape them.
+        # A bracket argument contains no variable references: escape those that look like one.
         return Word(re.sub(r"([\\$])", r"\\\1", match["bracket"]), True)
     quoted = match["quoted"] is not None
     return Word(match["quoted"] if quoted else match["word"], quoted)

@@ -1,8 +1,8 @@
 """Evaluate a CMakeLists.txt: return the commands that CMake would run, with variables expanded.
 
-``if``, ``foreach``, ``macro``, ``function``, ``include``, ``add_subdirectory`` and ``return`` are evaluated, and the
-commands that set variables; all other commands are yielded. An unset variable is empty, and false, as in CMake.
-Source: https://cmake.org/cmake/help/latest/manual/cmake-commands.7.html.
+Evaluates ``if``, ``foreach``, ``macro``, ``function``, ``include``, ``add_subdirectory``, ``return``, and the commands
+that set variables; yields all other commands. An unset variable is empty, and false, as in CMake. Source:
+https://cmake.org/cmake/help/latest/manual/cmake-commands.7.html.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ _VARIABLE = re.compile(r"(?<!\\)\$(ENV)?\{([^${}]*)\}")
 _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
-"""Optional packages that Python packages search for; reported as found."""
-_MAX_LOOPS = 100_000  # of a foreach() with RANGE
-_MAX_DEPTH = 40  # nested files and macros; a deeper file includes itself
+"""Optional packages that Python packages search for, reported as found."""
+_MAX_LOOPS = 100_000  # iterations of a foreach() with RANGE
+_MAX_DEPTH = 40  # nested files and macros; a file nested deeper must include itself
 
 
 class Command(NamedTuple):
-    """A command: its name in lower case, its arguments, and its location: line, file and folder."""
+    """A command: its name in lower case, its arguments, and its location (line, file and folder)."""
 
     name: str
     arguments: tuple[str, ...]
@@ -38,7 +38,7 @@ class Command(NamedTuple):
 
 
 class _Macro(NamedTuple):
-    """A definition by ``macro()`` or ``function()``, and its file."""
+    """A macro or function defined by ``macro()`` or ``function()``, and its file."""
 
     has_scope: bool
     parameters: list[str]
@@ -47,7 +47,7 @@ class _Macro(NamedTuple):
 
 
 class _Leave(Exception):
-    """``return()``, ``break()`` or ``continue()``."""
+    """Raised by ``return()``, ``break()`` or ``continue()``."""
 
 
 def run_cmake(file: Path, variables: Mapping[str, str]) -> Iterator[Command]:
@@ -120,7 +120,7 @@ class _Run:
         }
 
     def file(self, file: Path) -> Iterator[Command]:
-        """Yield the commands of a file. Raise BuildError."""
+        """Yield a file's commands. Raise BuildError if the file cannot be read."""
         try:
             text = file.read_text(encoding="utf-8", errors="replace")
         except OSError as error:
@@ -352,7 +352,7 @@ class _Run:
             if arguments[0] == "GLOB":
                 found += top.glob("/".join([*folders, last]))
             elif top == self._folder:
-                # Only inside the package: if a variable is unset, `${UNSET}/*` would search the whole disk.
+                # Search only inside the package: if a variable is unset, `${UNSET}/*` would search the whole disk.
                 found += filter(Path.is_file, top.glob("/".join([*folders, "**", last])))
 
         names = [path.relative_to(base) if base and path.is_relative_to(base) else path for path in found]
@@ -410,7 +410,7 @@ def _version(text: str) -> list[int]:
 
 _COMPARE: dict[str, Callable[[str, str], bool]] = {
     "MATCHES": lambda left, right: bool(re.search(right, left)),
-    # Generated files do not exist here. CMake returns true for them, so that they are generated.
+    # Generated files do not exist at this point. CMake returns true for them, so that they are generated.
     "IS_NEWER_THAN": lambda left, right: True,
     **{
         prefix + name: lambda left, right, read=read, test=test: test(read(left), read(right))  # type: ignore[misc]
@@ -442,7 +442,8 @@ class _Condition:
             "IS_DIRECTORY": lambda name: bool(name) and (folder / name).is_dir(),
             "IS_SYMLINK": lambda name: bool(name) and (folder / name).is_symlink(),
             "IS_ABSOLUTE": lambda name: Path(name).is_absolute(),
-            # A target exists if it is one for generated code. Commands and policies are CMake's own, so they exist.
+            # A target exists if it is a target for generated code. Commands and policies are CMake's own, so they
+            # exist.
             "TARGET": lambda name: bool(re.search(r"_gen(erate_messages|cfg|cpp|py)", name)),
             "COMMAND": lambda name: True,
             "POLICY": lambda name: True,
@@ -489,7 +490,7 @@ class _Condition:
             return self._value(left) in _items(self._known.get(self._word().text, ""))
 
         if _TRUE.match(left.text) or _FALSE.match(left.text):
-            # Constants stand for themselves, even if a variable of that name exists.
+            # Constants represent themselves, even if a variable with that name exists.
             return bool(_TRUE.match(left.text))
         return not left.quoted and not _FALSE.match(self._known.get(left.text, ""))
 

@@ -33,7 +33,10 @@ class NewPackage(NamedTuple):
 
 
 def create_package(parent: Path, package: NewPackage) -> list[Path]:
-    """Create the package's folder below ``parent``; return the created files and folders. Raise UsageError."""
+    """Create the package's folder below ``parent``; return the created files and folders.
+
+    Raise UsageError if the description is invalid or the package exists.
+    """
     if not _NAME.match(package.name):
         raise UsageError(
             f"[{package.name}] is not a name for a package: lower-case letters, digits and underscores, a letter first"
@@ -60,7 +63,7 @@ def create_package(parent: Path, package: NewPackage) -> list[Path]:
     if package.meta:
         return made
     if "roscpp" in package.depends:
-        # ROS's folder for C++ headers.
+        # ROS puts C++ headers into this folder.
         made.append(folder / "include" / package.name)
     made.append(folder / "src")
 

@@ -38,8 +38,8 @@ class CircularDependencyError(MinirospyError):
 class Dependencies:
     """The dependencies between packages; each manifest is read once, on first use.
 
-    Metapackages are left out, as by rospack, unless ``with_metapackages``, as by rosstack. When all manifests are searched,
-    ``complain`` is called with the error of each one that cannot be read.
+    Metapackages are left out, as in rospack; ``with_metapackages`` includes them, as in rosstack. When all manifests are
+    searched, ``complain`` is called with the error for each manifest that cannot be read.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Dependencies:
 
     @cached_property
     def copies(self) -> dict[str, list[Path]]:
-        """Return all packages, sorted, each with the folders of that name; the first folder is used."""
+        """Return all packages, sorted, each with the folders that contain a package of that name; the first folder is used."""
         return {
             name: folders
             for name, folders in sorted(self._packages.copies().items())
@@ -82,16 +82,19 @@ class Dependencies:
         return folder
 
     def manifest(self, name: str) -> Manifest:
-        """Return the manifest of a package or metapackage. Raise NotFoundError or ManifestError."""
+        """Return the manifest of a package or metapackage.
+
+        Raise NotFoundError if it does not exist, ManifestError if it is invalid.
+        """
         if name not in self._manifests:
-            # Imported late: `rospack find` does not need it.
+            # Imported here because `rospack find` does not need it.
             from minirospy.workspace.manifest import read_manifest
 
             self._manifests[name] = read_manifest(self._packages.find(name), self._variables)
         return self._manifests[name]
 
     def direct(self, name: str) -> list[str]:
-        """Return a package's direct dependencies, ordered by kind of tag. Raise NotFoundError or ManifestError."""
+        """Return a package's direct dependencies, ordered by kind of tag. Raise as :meth:`manifest` does."""
         self.folder(name)
         dependencies = self.manifest(name).dependencies
         wanted = [each.name for tag in _RUNNING for each in dependencies if each.tag == tag]
@@ -100,7 +103,7 @@ class Dependencies:
     def all(self, name: str) -> list[str]:
         """Return a package's direct and indirect dependencies, each after its own dependencies.
 
-        Raise CircularDependencyError, or as :meth:`direct` does.
+        Raise CircularDependencyError if the dependencies form a cycle, or the errors of :meth:`direct`.
         """
         found: dict[str, None] = {}
 
@@ -116,14 +119,14 @@ class Dependencies:
         return list(found)
 
     def tree(self, name: str) -> Iterator[tuple[int, str]]:
-        """Yield each dependency below the package that names it, with its depth from 0; repeat it if several packages name it.
+        """Yield (dependency, depth), each dependency after the package that depends on it; depths start at 0.
 
-        Raise as :meth:`all` does.
+        A dependency of several packages is yielded several times. Raise the errors of :meth:`all`.
         """
         return _walk(name, self.direct, ())
 
     def chains(self, name: str, target: str) -> list[tuple[str, ...]]:
-        """Return each path from a package to one of its dependencies. Raise as :meth:`all` does."""
+        """Return each path from a package to one of its dependencies. Raise the errors of :meth:`all`."""
         found = []
         path: list[str] = [name]
         for depth, each in self.tree(name):
@@ -133,12 +136,15 @@ class Dependencies:
         return found
 
     def dependents(self, name: str) -> list[str]:
-        """Return the packages that directly depend on this one, sorted. Raise NotFoundError."""
+        """Return the packages that directly depend on this one, sorted. Raise NotFoundError if it does not exist."""
         self.folder(name)
         return [other for other in self.copies if other != name and name in self._direct_or_none(other)]
 
     def all_dependents(self, name: str) -> list[str]:
-        """Return the packages that directly or indirectly depend on this one, sorted. Raise NotFoundError."""
+        """Return the packages that directly or indirectly depend on this one, sorted.
+
+        Raise NotFoundError if it does not exist.
+        """
         found: dict[str, None] = {}
         waiting = [name]
         while waiting:
@@ -149,7 +155,7 @@ class Dependencies:
         return sorted(found)
 
     def keys(self, name: str) -> list[str]:
-        """Return every dependency of a package, of any kind, sorted. Raise NotFoundError or ManifestError."""
+        """Return all of a package's dependencies, of every kind, sorted. Raise the errors of :meth:`manifest`."""
         self.folder(name)
         return sorted(self.manifest(name).depends())
 

@@ -1,6 +1,7 @@
 """A table of ROS 1 packages and modules that minirospy lacks, such as those in C++ or Qt, and their replacements.
 
-It is used if a package, program or module is not found: packages in a workspace or an installation take precedence.
+The table is used only if a package, program or module is not found, so packages in a workspace or an installation take
+precedence.
 """
 
 from __future__ import annotations
@@ -133,7 +134,7 @@ _INSTEAD = {
     "rosserial_server": "`rosrun rosserial_python serial_node.py` serves the same devices",
     "ps3joy": "pair the pad with the system's Bluetooth settings, then `rosrun joy joy_node`",
 }
-"""minirospy's replacements for some of these packages and for others."""
+"""minirospy's replacements for some of these packages and for other packages."""
 
 _QT_REPOSITORIES = (
     "ros-visualization's python_qt_binding, qt_gui_core (branch melodic-devel of both), rqt (kinetic-devel) and {plugin} "
@@ -164,7 +165,7 @@ _QT_LIBRARIES = (
 _MESSAGES = {
     "costmap_converter": "https://github.com/rst-tu-dortmund/costmap_converter",
 }
-"""Packages of definitions -> the arguments of `git clone` for the ROS 1 version."""
+"""Packages of definitions, with the arguments that `git clone` needs for their ROS 1 version."""
 
 IMPORTED = frozenset(
     {
@@ -185,7 +186,7 @@ SUBMODULES = {
     "roslaunch.netapi": "`rosnode list` lists the nodes; a roslaunch does not serve its list of processes",
     "roswtf.context": "`roswtf` and `minirospy doctor` make the checks, and roswtf.model has the classes of errors",
 }
-"""Submodules of ROS packages that minirospy's packages lack -> their replacement; `overlay/` has a module for each."""
+"""Submodules of ROS packages that minirospy's packages lack, with their replacements; `overlay/` has a module for each."""
 
 
 def advice(name: str) -> str:

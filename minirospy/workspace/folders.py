@@ -1,4 +1,4 @@
-"""The folders of ROS's files from the environment: ROS_HOME and the folders in it.
+"""The folders for ROS's files, from the environment: ROS_HOME and the folders in it.
 
 Source: http://wiki.ros.org/ROS/EnvironmentVariables.
 """

@@ -19,7 +19,7 @@ _SHEBANG = re.compile(rb"^#!\s*\S*/(?:env\s+)?python[\d.]*\s*$")
 
 
 def install(workspace: Workspace, plan: Plan) -> int:
-    """Copy the files that one package installs; return their number. Raise BuildError."""
+    """Copy the files that one package installs; return their number. Raise BuildError if a folder is in a file's place."""
     copies = dict(_copies(workspace, plan))
     for target, (source, program) in copies.items():
         if target.is_symlink() or target.is_dir():
@@ -32,7 +32,7 @@ def install(workspace: Workspace, plan: Plan) -> int:
 
 
 def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path, bool]]]:
-    """Yield target and (source, whether to make it executable) of each installed file."""
+    """Yield target and (source, whether to make it executable) for each installed file."""
     share = workspace.install / "share" / plan.name
     modules = workspace.install / DIST_PACKAGES
     yield share / "package.xml", (plan.folder / "package.xml", False)

@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 VARIABLES: Mapping[str, str] = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3"}
-"""The default variables of conditions."""
+"""The default values of variables in conditions."""
 
 _CONVENTIONAL_NAME = re.compile(r"^[a-z][a-z0-9_-]*$")
 PACKAGE_NAME = re.compile(r"^[a-zA-Z0-9][a-zA-Z0-9_.-]*$")
@@ -55,7 +55,7 @@ class Kind(Enum):
 
 
 class Dependency(NamedTuple):
-    """A dependency on a package or a rosdep key; ``tag`` is the tag in the file (``run_depend``), ``line`` its line."""
+    """A dependency on a package or a rosdep key; ``tag`` is its tag in the file (``run_depend``), ``line`` the tag's line."""
 
     name: str
     kinds: frozenset[Kind]
@@ -123,12 +123,12 @@ class Manifest(NamedTuple):
 
     @property
     def build_type(self) -> str:
-        """Return the package's build tool, by default catkin."""
+        """Return the package's build tool; catkin by default."""
         return next((export.text for export in self.exports if export.tag == "build_type"), "") or "catkin"
 
 
 def naming_warning(name: str) -> str | None:
-    """Return catkin's warning about a package name that does not follow the conventions (REP 144), None if it does."""
+    """Return catkin's warning about a package name that does not follow the conventions (REP 144), or None if it does."""
     if _CONVENTIONAL_NAME.match(name):
         return None
     return (
@@ -162,7 +162,7 @@ def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] |
 def evaluate_condition(condition: str, variables: Mapping[str, str]) -> bool:
     """Return whether ``$ROS_VERSION == 1 and ...`` is true; values are compared as strings, an unknown variable is empty.
 
-    Raise ValueError with the reason if it does not parse.
+    Raise ValueError, with the reason, if the condition does not parse.
     """
     return _Condition(condition, variables).value()
 
@@ -171,7 +171,7 @@ def evaluate_condition(condition: str, variables: Mapping[str, str]) -> bool:
 
 
 class _Element:
-    """A tag, its line, its children, and the text in the tag and its children."""
+    """A tag, with its line, its children, and the text in the tag and its children."""
 
     __slots__ = ("attributes", "children", "line", "parts", "tag")
 
@@ -184,7 +184,7 @@ class _Element:
 
     @property
     def text(self) -> str:
-        """Return the text, with each run of white space replaced by one space."""
+        """Return the text, with each run of white space replaced by a single space."""
         return " ".join("".join(self.parts).split())
 
 
@@ -232,7 +232,7 @@ _OLD_KINDS = {
 }
 _KINDS = {
     "depend": {Kind.BUILD, Kind.BUILD_EXPORT, Kind.EXEC},
-    # Not part of formats 2 and 3, but used there.
+    # Not part of formats 2 and 3, but packages use it there.
     "run_depend": {Kind.BUILD_EXPORT, Kind.EXEC},
     **{kind.value: {kind} for kind in Kind},
 }
@@ -257,7 +257,7 @@ _VERSIONS = {"version_lt", "version_lte", "version_eq", "version_gte", "version_
 _CONDITIONAL = {*_ALL_KINDS, "conflict", "replace", "group_depend", "member_of_group"}
 _VERSION = re.compile(r"^\d+\.\d+\.\d+$")
 _EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-a-z\d%]+(\.[-a-z\d%]+)*\.[a-z]{2,}", re.ASCII | re.IGNORECASE)
-"""Addresses that catkin accepts; it exits with an error for any other."""
+"""Addresses that catkin accepts; catkin exits with an error for any other address."""
 
 
 class _Reader:
@@ -387,7 +387,7 @@ class _Reader:
 # --- conditions
 
 _TOKEN = re.compile(r"""\s*(?:(==|!=|<=|>=|<|>|[()])|(\$?[A-Za-z0-9_-]+)|("[^"]*"|'[^']*')|(\S))""", re.ASCII)
-_MAX_BRACKETS = 50  # nested in a condition; the parser recurses three times per level
+_MAX_BRACKETS = 50  # nested in a condition; the parser recurses three times per nesting level
 _COMPARE = {
     "==": str.__eq__,
     "!=": str.__ne__,

@@ -1,4 +1,4 @@
-"""Running .cfg files, programs that describe a node's parameters: package.cfg.NAMEConfig, and documents.
+"""Run .cfg files, which are programs that describe a node's parameters: they generate package.cfg.NAMEConfig and documents.
 
 Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfgFile.
 """
@@ -21,9 +21,9 @@ _OVERLAY = Path(__file__).parents[1] / "overlay"
 
 
 def make_options(plan: Plan, devel: Path) -> tuple[list[Path], tuple[str, ...]]:
-    """Run the .cfg files of a package; return the files written to devel, and warnings.
+    """Run a package's .cfg files; return the files written to devel, and warnings.
 
-    Raise BuildError if one fails.
+    Raise BuildError if a .cfg file fails.
     """
     made: list[Path] = []
     warnings: list[str] = []

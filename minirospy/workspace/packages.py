@@ -1,7 +1,7 @@
 """Find the folders of ROS packages, and their programs.
 
-ROS_PACKAGE_PATH is searched before minirospy's own packages, so a workspace's package hides the built-in one of the same name.
-Source: http://wiki.ros.org/ROS/EnvironmentVariables (ROS_PACKAGE_PATH), http://wiki.ros.org/rosrun.
+ROS_PACKAGE_PATH is searched before minirospy's own packages, so that a workspace's package hides the built-in package of
+the same name. Source: http://wiki.ros.org/ROS/EnvironmentVariables (ROS_PACKAGE_PATH), http://wiki.ros.org/rosrun.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _SHOWN = 12  # programs listed in an error: about one line
 
 
 class NotExecutableError(MinirospyError):
-    """A file of that name exists, but it is neither Python nor executable."""
+    """A file with that name exists, but it is neither Python nor executable."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -52,10 +52,10 @@ class NotExecutableError(MinirospyError):
 
 
 class Packages:
-    """The packages that are visible in an environment. A package's name is the one in its package.xml."""
+    """The packages that are visible in an environment. A package's name is the name in its package.xml."""
 
     def __init__(self, environment: Environment | None = None) -> None:
-        # Packages do not depend on ROS_MASTER_URI or on the machine's name: skip both lookups.
+        # Packages do not depend on ROS_MASTER_URI or on the machine's name, so skip both lookups.
         environment = environment or Environment.read(host="localhost", master_uri=_ANY_MASTER)
         self.roots = (*environment.package_path, *built_in_roots())
         self._crawls: dict[Path, list[Path]] = {}
@@ -95,7 +95,7 @@ class Packages:
         return {name: folders[0] for name, folders in self.copies().items()}
 
     def copies(self) -> dict[str, list[Path]]:
-        """Return all packages, each with the folders of that name; the first folder is used."""
+        """Return all packages, each with the folders that contain a package of that name; the first folder is used."""
         found: dict[str, dict[Path, None]] = {}
         for root in self.roots:
             for folder in self._crawled(root):
@@ -108,15 +108,15 @@ class Packages:
         return sorted({path.name for path in _files(folder) if _is_program(path)})
 
     def find_executable(self, package: str, name: str) -> list[str]:
-        """Return the command that runs a package's program; of several programs with the name, the first.
+        """Return the command that runs a package's program, the first if several have the name.
 
-        Python programs run in this interpreter, not in the one that ``env`` finds. Raise NotFoundError with similar names, or
-        NotExecutableError.
+        Python programs run in this interpreter, not in the one that ``env`` finds. Raise NotFoundError, with similar
+        names, if there is none, or NotExecutableError if the file cannot be run.
         """
         return self.find_executables(package, name)[0]
 
     def find_executables(self, package: str, name: str) -> list[list[str]]:
-        """Return each command for a program name, or a path in the package; several folders may have a program of the name.
+        """Return each command for a program name or a path in the package; several folders may have a program with that name.
 
         Raise as :meth:`find_executable` does.
         """
@@ -140,7 +140,10 @@ class Packages:
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}{hidden}")
 
     def find_resource(self, package: str, name: str) -> Path:
-        """Return a launch file of a package, by its path in the package or by its name. Raise NotFoundError."""
+        """Return a launch file of a package, by its path in the package or by its name.
+
+        Raise NotFoundError if there is none.
+        """
         folder = self.find(package)
         if (folder / name).is_file():
             return folder / name
@@ -153,7 +156,7 @@ class Packages:
         raise NotFoundError("file", name, same_kind, hint)
 
     def hidden_hint(self, package: str, name: str, found: Path) -> str:
-        """Return a hint if another package of the same name, which the found one hides, has the file; else ""."""
+        """Return a hint if the file is in another package of the same name, which the found package hides; otherwise ""."""
         for folder in self.copies().get(package, ()):
             if folder != found and any(path.name == name for path in _files(folder)):
                 return f"; the package of that name in {folder}, which this one hides, has it"
@@ -166,7 +169,7 @@ class Packages:
 
 
 class CrawlTime(NamedTuple):
-    """A folder that is searched for packages: the time in seconds, including subfolders, and whether it has a package."""
+    """A folder that is searched for packages: the time in seconds, including subfolders, and whether it contains a package."""
 
     folder: Path
     seconds: float
@@ -192,7 +195,10 @@ def crawl_times(root: Path) -> list[CrawlTime]:
 
 
 def built_in_roots() -> tuple[Path, ...]:
-    """Return the folders of minirospy's own packages: next to the Python package in a checkout, else in its ``share``."""
+    """Return the folders that contain minirospy's own packages.
+
+    They are next to the Python package in a checkout, else in its ``share``.
+    """
     share = _OURS / "share"
     base = share if share.is_dir() else _OURS.parent
     return (base / "msgs", base / "rpi_feros", base / "launch", _OURS / "ros")
@@ -209,7 +215,7 @@ def crawl(root: Path) -> Iterator[Path]:
 
 
 def _subfolders(folder: Path) -> list[Path]:
-    """Return the subfolders that may contain packages, sorted; [] if a marker file says to ignore the folder."""
+    """Return the subfolders that may contain packages, sorted; [] if a marker file marks the folder as ignored."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:
@@ -224,12 +230,12 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _leads_back(entry: os.DirEntry[str]) -> bool:
-    """Return whether an entry is a link to a folder that contains it, which would make the search endless."""
+    """Return whether an entry is a link to one of its own parent folders, which would make the search endless."""
     return entry.is_symlink() and Path(entry.path).parent.resolve().is_relative_to(Path(entry.path).resolve())
 
 
 def package_name(folder: Path) -> str | None:
-    """Return the name in a folder's package.xml (by default the folder's name); None if there is no such file."""
+    """Return the name in a folder's package.xml (by default the folder's name); None if it has no package.xml."""
     try:
         text = (folder / _MANIFEST).read_bytes()
     except OSError:
@@ -259,7 +265,7 @@ def _files(folder: Path) -> Iterator[Path]:
         Path(prefix) for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if prefix
     ]
     if folder.parent.name == "share":
-        # The programs of /usr/share/PKG are in /usr/lib/PKG, whatever workspace is sourced.
+        # The programs for /usr/share/PKG are in /usr/lib/PKG, whatever workspace is sourced.
         prefixes.append(folder.parents[1])
     for prefix in dict.fromkeys(prefixes):
         programs = prefix / "lib" / (package_name(folder) or folder.name)
@@ -289,7 +295,7 @@ def is_python(path: Path) -> bool:
 
 
 def why_ros_refuses(program: Path) -> str | None:
-    """Return why ROS 1 would not run a Python program that minirospy runs, and a remedy; None if it would.
+    """Return the reason why ROS 1 would not run a Python program that minirospy runs, and a remedy, or None.
 
     ROS 1 lets the system choose the interpreter, which requires execute permission and a shebang line.
     """
@@ -309,7 +315,7 @@ def why_ros_refuses(program: Path) -> str | None:
 def with_prefix(prefix: list[str], command: list[str]) -> list[str]:
     """Return a program's command with a prefix such as ``gdb --args`` or ``python3 -m pdb``.
 
-    A prefix that runs Python files itself is followed by the file only, as in ROS 1.
+    If the prefix runs Python files itself, only the file follows, as in ROS 1.
     """
     if any(_RUNS_PYTHON.fullmatch(Path(word).stem) for word in prefix):
         command = command[-1:]

@@ -25,7 +25,7 @@ from minirospy.workspace.manifest import PACKAGE_NAME, VARIABLES, Kind, Manifest
 __all__ = ["DIST_PACKAGES", "Install", "Plan", "Test", "read_plan"]
 
 DIST_PACKAGES = "lib/python3/dist-packages"
-"""The folder of Python packages below a devel or install folder, as in ROS on Debian and Ubuntu."""
+"""The folder for Python packages below a devel or install folder, as in ROS on Debian and Ubuntu."""
 
 _FOLDERS = {"add_message_files": "msg", "add_service_files": "srv", "add_action_files": "action"}
 _COMPILED = ("add_executable", "add_library", "catkin_add_gtest", "add_rostest_gtest")
@@ -62,18 +62,18 @@ _BEFORE = {
     "catkin_python_setup": ("generate_messages", "generate_dynamic_reconfigure_options"),
     "generate_dynamic_reconfigure_options": ("catkin_package",),
 }
-"""Commands that catkin requires before others, although the order has no effect here."""
+"""Commands that catkin requires before other commands, although the order has no effect here."""
 _GENERATORS = {"message_generation", "genmsg", "actionlib_msgs"}
-"""Packages that define CMake's message macros; one of them must be found first."""
+"""Packages that define CMake's message macros; at least one must be found before the macros are used."""
 _CMAKE_VERSION = "3.25.1"  # the CMake version that package files see
 
 
 class Install(NamedTuple):
     """Files for the install folder: ``sources`` below the package; ``destination`` below the install folder.
 
-    For a folder with a trailing slash, its contents are copied; otherwise the folder itself.
-    ``chosen`` and ``excluded`` are regular expressions for paths to include (none: all) and to exclude.
-    ``program``: make it executable; ``python``: a script to which devel refers; ``optional``: it may be missing.
+    For a folder with a trailing slash, its contents are copied; otherwise the folder itself. ``chosen`` and ``excluded``
+    are regular expressions for paths to include (none: all) and to exclude. ``program``: make the files executable;
+    ``python``: scripts to which devel refers; ``optional``: they may be missing.
     """
 
     command: Command
@@ -110,10 +110,10 @@ class Test(NamedTuple):
 class Plan(NamedTuple):
     """A package's part in the build.
 
-    ``definitions`` are the .msg, .srv and .action files; ``message_depends`` the packages whose messages they may
-    contain; ``needs`` the packages found by find_package, with the lines; ``skipped`` the targets that need a
-    compiler; ``has_setup``: setup.py names Python packages; ``not_installed``: definitions that are not installed;
-    ``options``: the .cfg files of dynamic_reconfigure.
+    ``definitions`` are the .msg, .srv and .action files; ``message_depends`` the packages whose messages these may
+    contain; ``needs`` the packages found by find_package, with the lines; ``skipped`` the targets that need a compiler;
+    ``has_setup``: setup.py names Python packages; ``not_installed``: definitions that are not installed; ``options``: the
+    .cfg files of dynamic_reconfigure.
     """
 
     name: str
@@ -139,11 +139,11 @@ class Plan(NamedTuple):
 def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
     """Return the plan of the package in ``folder``; ``variables`` are those set by ``catkin_make -DNAME=VALUE``.
 
-    Raise ManifestError or BuildError.
+    Raise ManifestError if package.xml is invalid, or BuildError if CMakeLists.txt is.
     """
     manifest = read_manifest(folder)
     if not PACKAGE_NAME.match(manifest.name):
-        # The package's name becomes the name of folders and modules.
+        # The package's name becomes part of folder and module names.
         problem = next(problem for problem in manifest.problems if "is not a package name" in problem.text)
         raise ManifestError(str(manifest.path), *problem)
 
@@ -202,7 +202,7 @@ class _Collector:
         }
 
     def read(self, command: Command) -> None:
-        """Record what a command requires. Raise BuildError."""
+        """Record a command's effect on the plan. Raise BuildError if the command is invalid."""
         reader = self._readers.get(command.name)
         if reader is None:
             return
@@ -213,7 +213,7 @@ class _Collector:
                 self._refused(command, f"{command.name}() must be called before {later}()")
 
     def _refused(self, command: Command, text: str) -> None:
-        """Warn of an error that real catkin reports, but that this build can ignore."""
+        """Warn about an error that real catkin reports, but that this build can ignore."""
         self.warn(command.file, command.line, f"real catkin refuses this: {text}")
 
     def warn(self, file: Path, line: int, text: str) -> None:
@@ -221,7 +221,7 @@ class _Collector:
         self._warnings.append(f"{file}:{line}: {text}")
 
     def check(self) -> None:
-        """Warn of definitions that no macro names, and if generate_messages() is missing."""
+        """Warn about definitions that no macro names, and about a missing generate_messages()."""
         for macro, kind in _FOLDERS.items():
             for path in sorted((self._folder / kind).glob(f"*.{kind}")):
                 if path not in self._definitions:
@@ -236,7 +236,7 @@ class _Collector:
             self._definitions.clear()
 
     def plan(self) -> Plan:
-        """Return the plan from all commands."""
+        """Return the plan that results from all commands."""
         return Plan(
             name=self._manifest.name,
             folder=self._folder,
@@ -254,7 +254,7 @@ class _Collector:
         )
 
     def _path(self, command: Command, name: str) -> str:
-        """Return a path that a command names, relative to the package."""
+        """Return, relative to the package, a path that a command names."""
         if command.folder == self._folder:
             return name
         path = Path(os.path.relpath(command.folder / name, self._folder)).as_posix()
@@ -337,7 +337,7 @@ class _Collector:
             self._option_files.append(file)
 
     def _catkin_package(self, command: Command) -> None:
-        """Check that package.xml names the packages in CATKIN_DEPENDS, as dependencies for the build and for the run."""
+        """Check that package.xml names the packages in CATKIN_DEPENDS, both as build and as run dependencies."""
         if "catkin" not in self._manifest.depends(Kind.BUILDTOOL):
             self._refused(command, "package.xml must say <buildtool_depend>catkin</buildtool_depend>")
 
@@ -391,7 +391,7 @@ class _Collector:
         place = given.get("DESTINATION", [])
         kind = next((kind for kind in ("PROGRAMS", "FILES", "DIRECTORY") if kind in command.arguments), None)
         if kind is None or not place:
-            # TARGETS, CODE, SCRIPT and EXPORT are for compiled targets.
+            # TARGETS, CODE, SCRIPT and EXPORT apply to compiled targets.
             return
         chosen, excluded = _patterns(command.arguments)
         self._installs.append(
@@ -413,7 +413,7 @@ def _error(command: Command, text: str) -> BuildError:
 
 
 def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the patterns that ``PATTERN x`` and ``REGEX x`` include, and those that they exclude with ``EXCLUDE``."""
+    """Return the patterns that ``PATTERN x`` and ``REGEX x`` include, and the patterns with ``EXCLUDE``, which they exclude."""
     chosen: list[str] = []
     excluded: list[str] = []
     for index, (kind, text) in enumerate(pairwise(arguments)):

@@ -1,7 +1,7 @@
 """Read the contents of a package's setup.py: Python packages, modules and scripts.
 
-The file is executed with a ``setup()`` that only records its arguments, so it may compute anything, and needs neither
-setuptools nor catkin_pkg. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
+The file is executed with a ``setup()`` that only records its arguments, so that it may compute anything, and needs
+neither setuptools nor catkin_pkg. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _Kind = TypeVar("_Kind")
 
 
 class PythonSetup(NamedTuple):
-    """Names -> their paths: top-level packages (folders), modules (files), scripts (files).
+    """Top-level packages (folders), modules (files) and scripts (files), by name.
 
     ``warnings`` has a line for each package whose folder is missing, which catkin ignores.
     """
@@ -41,7 +41,7 @@ class PythonSetup(NamedTuple):
 
 
 def read_python_setup(folder: Path) -> PythonSetup:
-    """Return the packages and scripts in ``folder``/setup.py. Raise BuildError with the line."""
+    """Return the packages and scripts in ``folder``/setup.py. Raise BuildError, with the line, if it fails."""
     file = folder / "setup.py"
     given = _run(file)
     roots = _given(file, given, "package_dir", dict, "{'': 'src'}")
@@ -70,7 +70,10 @@ def read_python_setup(folder: Path) -> PythonSetup:
 
 
 def _given(file: Path, given: Mapping[str, object], name: str, kind: type[_Kind], form: str) -> _Kind:
-    """Return an argument of ``setup()``, an empty ``kind`` if it is missing or None. Raise BuildError."""
+    """Return an argument of ``setup()``, or an empty ``kind`` if it is missing or None.
+
+    Raise BuildError if its type is wrong.
+    """
     value = given.get(name) or kind()
     if not isinstance(value, kind):
         raise BuildError(str(file), 0, f"{name} is {value!r}: {name}={form} is its form")
@@ -85,7 +88,7 @@ def _names(file: Path, given: Mapping[str, object], name: str) -> list[str]:
 
 
 def _run(file: Path) -> Mapping[str, object]:
-    """Run a setup.py and return the arguments of its ``setup()``. Raise BuildError."""
+    """Run a setup.py and return the arguments passed to ``setup()``. Raise BuildError if it fails."""
     given: dict[str, object] = {}
     why = ""
 
@@ -113,7 +116,7 @@ def _run(file: Path) -> Mapping[str, object]:
 
 
 class _StandIn(types.ModuleType):
-    """A module that has every attribute: an empty class, unless the attribute is set."""
+    """A module that has every attribute; each is an empty class, unless the attribute is set."""
 
     def __getattr__(self, name: str) -> type:
         if name.startswith("__"):
@@ -138,7 +141,7 @@ class _Finder(MetaPathFinder, Loader):
         for name in self._contents:
             parent, _, child = name.rpartition(".")
             if parent == module.__name__:
-                # Without this, `from catkin_pkg import python_setup` would return an empty class.
+                # Without this, `from catkin_pkg import python_setup` would import an empty class.
                 setattr(module, child, importlib.import_module(name))
 
 
@@ -147,7 +150,7 @@ _TOOLS = {"catkin_pkg", "distutils", "setuptools"}
 
 @contextmanager
 def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
-    """Replace the modules that a setup.py imports, with a ``setup`` that records its arguments; change to its folder.
+    """Replace the modules that a setup.py imports, with a ``setup`` that records its arguments; change to the file's folder.
 
     As for a script, modules in its folder can be imported; they are unloaded afterwards.
     """
@@ -188,7 +191,7 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
     sys.meta_path.insert(0, finder)
     sys.path.insert(0, str(folder))
     os.chdir(folder)
-    # Set the variables that catkin's build sets: a terminal without a sourced setup.bash has none of them.
+    # Set the variables that catkin's build sets, because a terminal without a sourced setup.bash has none of them.
     os.environ.update({name: VARIABLES[name] for name in unset})
     try:
         yield

@@ -1,7 +1,7 @@
 """The files to source, such as ``devel/setup.bash``, as strings. Pure.
 
-They run in the shell alone, so that a new terminal does not wait for Python. Sourcing a workspace's setup file removes the
-variables of the previously sourced one, and prepends those of the parent workspaces and its own.
+The files run without Python, so that a new terminal starts quickly. Sourcing a workspace's setup file removes the values
+that the previously sourced workspace set, and prepends the values for the parent workspaces and the workspace itself.
 Source: http://wiki.ros.org/catkin/workspaces, http://wiki.ros.org/ROS/EnvironmentVariables.
 """
 
@@ -21,8 +21,8 @@ SHELLS = ("bash", "zsh", "sh", "fish", "powershell", "bat")
 class SetUp(NamedTuple):
     """The data for the setup files.
 
-    ``prefix``: the devel or install folder; ``sources``: its folders of packages; ``parents``: the prefixes of the
-    parent workspaces, nearest first; ``programs``: the folder of minirospy's commands; ``share``: its own
+    ``prefix``: the devel or install folder; ``sources``: the workspace's package folders; ``parents``: the prefixes of
+    the parent workspaces, nearest first; ``programs``: the folder of minirospy's commands; ``share``: minirospy's own
     packages; ``functions``: the folder of ros.bash, ros.fish, ros.ps1, ros.bat.
     """
 
@@ -35,11 +35,11 @@ class SetUp(NamedTuple):
 
 
 def setup_files(setup: SetUp) -> dict[str, str]:
-    """Return file name -> text of all setup files of a prefix."""
+    """Return all setup files of a prefix: file name -> text."""
     files = {
         ".catkin": ";".join(map(str, setup.sources)),
         "setup.sh": _posix(setup, _others_make_way(setup)),
-        # As `setup.sh --extend`: keep the sourced workspaces.
+        # These work like `setup.sh --extend`: they keep the sourced workspaces.
         "local_setup.sh": _posix(setup, ""),
         "env.sh": _ENV,
         "setup.fish": _fish(setup),
@@ -156,7 +156,7 @@ _minirospy_workspace() {
 
 
 def _others_make_way(setup: SetUp) -> str:
-    """Return the code that removes previously sourced workspaces, and adds the parents of this one."""
+    """Return the code that removes previously sourced workspaces and adds this workspace's parents."""
     chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
     return f"""if [ "${{1:-}}" != --extend ]; then
   # Remove the workspaces that were sourced before.
@@ -296,7 +296,7 @@ def _fish_base(setup: SetUp) -> str:
 
 
 def _fish_quoted(path: Path) -> str:
-    """Return a path as one word for fish, whose single quotes allow two escapes, unlike those of other shells."""
+    """Return a path as one word for fish, whose single quotes allow two escapes, unlike in other shells."""
     return "'" + str(path).replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 
@@ -329,7 +329,7 @@ def _bat(setup: SetUp, others: str) -> str:
     text = _BAT.format(
         base=_bat_base(setup), others=others, share=share, functions=setup.functions / "ros.bat"
     )
-    # cmd.exe does not find labels in a file with LF line endings.
+    # cmd.exe does not find labels in a file with LF line endings, so use CRLF.
     return text.replace("@DIST_PACKAGES@", DIST_PACKAGES.replace("/", "\\")).replace("\n", "\r\n")
 
 

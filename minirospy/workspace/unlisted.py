@@ -1,7 +1,8 @@
 """Add messages to plans that no add_message_files() names, but that other definitions use as fields.
 
-Real catkin builds such a package: it finds the file when it computes the md5sum of the containing type. But it generates no
-class for the message, so that Python programs cannot create it. Here the class is generated, with a warning.
+Real catkin builds such a package, because it finds the file when it computes the md5sum of the containing type. However,
+it generates no class for the message, so Python programs cannot create the message. Here the class is generated, with a
+warning.
 """
 
 from __future__ import annotations
@@ -22,8 +23,11 @@ _FIELD = re.compile(
 
 
 def with_unlisted(plans: Mapping[str, Plan]) -> dict[str, Plan]:
-    """Return the plans with used but unlisted messages added to their definitions. Raise DefinitionError."""
-    # Check first whether any exist: most workspaces have none, and then no definition need be read.
+    """Return the plans with used but unlisted messages added to their definitions.
+
+    Raise DefinitionError if a definition is invalid.
+    """
+    # Check first whether any exist: most workspaces have none, and no definition need be read for them.
     unlisted = {
         f"{plan.name}/{path.stem}": path
         for plan in plans.values()

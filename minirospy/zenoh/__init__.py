@@ -1,1 +1,1 @@
-"""Code for the library eclipse-zenoh that the fleet and the bridge to ROS 2 share."""
+"""Code that the fleet and the ROS 2 bridge share for using the library eclipse-zenoh."""

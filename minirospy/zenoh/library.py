@@ -1,4 +1,4 @@
-"""Zenoh's library for all bridges: protocols for the part that is used, which has no types, and a session's configuration."""
+"""Zenoh's library for all bridges: protocol classes for its API, which has no type hints, and a session's configuration."""
 
 from __future__ import annotations
 
@@ -31,14 +31,16 @@ MAX_PORT = 65_535
 _MAX_PORT_DIGITS = 5
 INTERNET_PROTOCOLS = frozenset({"quic", "quic_datagram", "tcp", "tls", "udp", "ws", "wss"})
 PROTOCOLS = INTERNET_PROTOCOLS | {"serial", "shm", "unixpipe", "unixsock-stream", "vsock"}
-"""Zenoh's link protocols; a build of Zenoh reports an error for those that it lacks."""
+"""Zenoh's link protocols; Zenoh reports an error for a protocol that its build lacks."""
 _HOST = re.compile(r"[\w*][\w.*%-]*|\[[0-9A-Fa-f:.]+(%[\w.-]+)?\]")
 _SESSIONS = 10_000
 _SEND_BUFFER = 65_536
 _POOLS = {"rx": 256, "acc": 32, "app": 32, "tx": 32, "net": 32}
 _THREADS = f"({', '.join(f'{pool}: (worker_threads: {count})' for pool, count in _POOLS.items())})"
-"""Zenoh sets SO_LINGER to 10 s, so closing a dead link blocks a thread, mostly of its pool rx, for 10 s. Measured: the loss of
-100 robots together is noticed after 30 s with 32 threads in each pool, after 11 s with 128 in rx; the lease is 10 s.
+"""Zenoh sets SO_LINGER to 10 s, so that closing a dead link blocks a thread, mostly one in its rx pool, for 10 s.
+
+Measured: the loss of 100 robots together is noticed after 30 s with 32 threads in each pool, after 11 s with 128 threads
+in rx. The lease is 10 s.
 """
 _CONNECT_MS = 3000
 
@@ -62,7 +64,7 @@ class Bytes(Protocol):
 
 
 class Sample(Protocol):
-    """A message, a reply, or a change of a token."""
+    """A message, a reply, or a token change."""
 
     key_expr: object
     payload: Bytes
@@ -75,14 +77,14 @@ class _ReplyError(Protocol):
 
 
 class Reply(Protocol):
-    """An answer to a query."""
+    """A reply to a query."""
 
     ok: Sample | None
     err: _ReplyError | None
 
 
 class Query(Protocol):
-    """A request."""
+    """A query from a peer."""
 
     key_expr: object
     payload: Bytes | None
@@ -102,7 +104,7 @@ class Declared(Protocol):
 
 
 class Matching(Protocol):
-    """A publisher's matching status: whether it has subscribers."""
+    """A publisher's matching status, that is, whether it has subscribers."""
 
     matching: bool
 
@@ -136,7 +138,7 @@ class _Info(Protocol):
 
 
 class Session(Protocol):
-    """A session."""
+    """A Zenoh session."""
 
     info: _Info
 
@@ -156,7 +158,7 @@ class Session(Protocol):
 
 
 class Config(Protocol):
-    """A configuration."""
+    """A Zenoh configuration."""
 
     def get_json(self, key: str) -> str: ...
 
@@ -167,8 +169,8 @@ class Config(Protocol):
 class NetworkOptions:
     """The endpoints to connect to and to listen on. By default, connect to a local router, and do not listen.
 
-    ``config``: a file in Zenoh's format, for TLS, users and everything else; ``source``: the option that names it. ``scouts``:
-    whether to discover peers by multicast.
+    ``config``: a file in Zenoh's format, for TLS, users and all other settings; ``source``: the option that names this
+    file. ``scouts``: whether to discover peers by multicast.
     """
 
     connect: tuple[str, ...] = ()
@@ -179,9 +181,9 @@ class NetworkOptions:
 
 
 def to_endpoint(text: str, *, listens: bool = False) -> str:
-    """Return a Zenoh endpoint; HOST and HOST:PORT mean TCP. Raise EndpointError if it can never work.
+    """Return a Zenoh endpoint; HOST and HOST:PORT mean TCP. Raise EndpointError if the endpoint can never work.
 
-    ``listens``: its port may be 0, for any free one.
+    ``listens``: the port may be 0, which selects any free port.
     """
     if not text or has_controls(text) or " " in text:
         raise EndpointError(text, f"is not an endpoint, as tcp/192.168.1.5:{DEFAULT_PORT}")
@@ -211,7 +213,7 @@ def to_endpoint(text: str, *, listens: bool = False) -> str:
 
 
 def unresolved(endpoints: Iterable[str]) -> list[str]:
-    """Return the hosts of endpoints that do not resolve now. Blocks. They may resolve later, for example once mDNS runs."""
+    """Return the hosts in endpoints that do not resolve now. They may resolve later, for example once mDNS runs. Blocks."""
     found = []
     for endpoint in endpoints:
         protocol, _, rest = endpoint.partition("/")
@@ -236,12 +238,13 @@ def is_loopback_endpoint(endpoint: str) -> bool:
 
 
 def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False, needs_hash: bool = False) -> None:
-    """Raise BridgeError with what to install if Zenoh's library is missing, or speaks another protocol.
+    """Raise BridgeError, with installation advice, if Zenoh's library is missing or uses another protocol version.
 
-    ``who`` needs it. ``has_many_links``: others will connect. ``needs_hash``: the library xxhash, too.
+    ``who``: the feature that needs it. ``has_many_links``: many peers will connect. ``needs_hash``: the library xxhash is
+    needed, too.
     """
     if has_many_links:
-        # Set it before the import: Zenoh reads it once.
+        # Set the variable before the import, because Zenoh reads it only once.
         os.environ.setdefault("ZENOH_RUNTIME", _THREADS)
     line = install_command("minirospy[fleet]", upgrade=True)
     libraries = {"eclipse-zenoh": "zenoh.ext"} | ({"xxhash": "xxhash"} if needs_hash else {})
@@ -257,7 +260,7 @@ def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False, needs
 
 
 def configured(options: NetworkOptions) -> Config:
-    """Return Zenoh's configuration from the file and the options; it listens only if one of them requests it."""
+    """Return Zenoh's configuration from the file and the options; it listens only if either requests that."""
     zenoh = importlib.import_module("zenoh")
     default: Config = zenoh.Config()
     config: Config = default
@@ -302,9 +305,10 @@ def configured(options: NetworkOptions) -> Config:
         ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
         ("transport/unicast/max_sessions", _SESSIONS),
         ("transport/unicast/accept_pending", 1000),
-        # Keep-alives per lease of 10 s. TCP retransmits lost data, so one fewer than Zenoh's default is enough.
+        # Keep-alives per 10 s lease. TCP retransmits lost data, so one fewer than Zenoh's default is enough.
         ("transport/link/tx/keep_alive", 3),
-        # Data in the kernel's buffer is sent before any higher priority: at 4 Mbit/s for some 0.3 s instead of 1.3 s.
+        # Data in the kernel's buffer is sent before any data of higher priority: at 4 Mbit/s this takes some 0.3 s
+        # instead of 1.3 s.
         ("transport/link/tcp/so_sndbuf", _SEND_BUFFER),
         # Shared memory would pass large messages between local gateways in /dev/shm, which is small in containers.
         ("transport/shared_memory/enabled", False),
@@ -315,5 +319,5 @@ def configured(options: NetworkOptions) -> Config:
 
 
 def one_line(error: Exception) -> str:
-    # Remove the location in Zenoh's source, which is of no use to the user.
+    # Remove the location in Zenoh's source code, which is useless to the user.
     return escaped(re.sub(r" at /\S*\.rs:\d+\.?", "", " ".join(str(error).split())))[:500]

@@ -1,9 +1,9 @@
 """Remove SO_LINGER from Zenoh's TCP links, so that closing them does not block.
 
-Zenoh sets SO_LINGER to 10 s on each link: if the peer is lost, closing the link blocks one of Zenoh's threads for 10 s, and
-others wait for that thread. A router that lost 1,000 robots together closed their links for minutes, and read nothing from
-half of those that had reconnected (eclipse-zenoh 1.10.2, which has no option for it). Without SO_LINGER the kernel sends
-the remaining data after the close.
+Zenoh sets SO_LINGER to 10 s on each link: if the peer is lost, closing the link blocks one of Zenoh's threads for 10 s,
+and other threads wait for it. A router that lost 1,000 robots together spent minutes closing their links, and read
+nothing from half of the robots that had reconnected (eclipse-zenoh 1.10.2, which has no option to change this). Without
+SO_LINGER the kernel sends the remaining data after the close.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class LingerRemover:
         """Number of polls that have examined each open file."""
 
     def look(self) -> int:
-        """Remove SO_LINGER from new links; return how many. Does nothing on Windows."""
+        """Remove SO_LINGER from new links; return the number of links changed. Does nothing on Windows."""
         if sys.platform == "win32":
             return 0
         looks: dict[tuple[int, int], int] = {}
@@ -53,7 +53,7 @@ class LingerRemover:
 
 
 def _removes(number: int, file: os.stat_result) -> bool:
-    """Remove SO_LINGER if Zenoh has set it; return whether it had."""
+    """Remove SO_LINGER from a socket if Zenoh has set it; return whether it was set."""
     if not stat.S_ISSOCK(file.st_mode):
         return False
     with socket.socket(fileno=os.dup(number)) as sock:

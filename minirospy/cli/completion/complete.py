@@ -1,13 +1,14 @@
 """`minirospy complete INDEX WORD...`: print the completions at the cursor, one per line. Called by shells for TAB.
 
-The input is the words of a command line as the shell holds them (quotes included), and INDEX, the index of the word at the
-cursor. The output is candidates as the shell is to insert them: quoted if necessary, with a vertical tab for each line feed
-inside (`minirospy complete --one-line INDEX WORD...`: without line feeds; `--powershell`: without line feeds, words and
-candidates in PowerShell's syntax). A candidate that ends in ``/`` or ``=`` can be continued; any other is followed by a space.
+The input consists of a command line's words as the shell stores them (quotes included), and INDEX, the index of the word
+at the cursor. The output consists of candidates in the form that the shell inserts: quoted if necessary, with a vertical
+tab for each line feed inside (`minirospy complete --one-line INDEX WORD...`: without line feeds; `--powershell`: without
+line feeds, words and candidates in PowerShell's syntax). A candidate that ends in ``/`` or ``=`` can be continued; any
+other is followed by a space.
 
-Verbs and options come from the command's own parser, not from a second list. So do the completers of arguments and of options'
-values: see minirospy.command.parser.Parser.add_argument. Completion never fails with an error, and waits for a master only as
-long as a user would. Source: http://wiki.ros.org/rosbash#Tab_completion.
+Verbs and options come from the command's own parser, not from a second list. The same applies to the completers for
+arguments and option values: see minirospy.command.parser.Parser.add_argument. Completion never fails with an error, and
+waits for a master only as long as a user would. Source: http://wiki.ros.org/rosbash#Tab_completion.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def candidates(
     index: int, words: Sequence[str], *, one_line: bool = False, shell: Shell = POSIX
 ) -> list[str]:
-    """Return the candidates for ``words[index]`` as the shell is to insert them; ``one_line``: without line feeds."""
+    """Return the candidates for ``words[index]`` in the form that the shell inserts; ``one_line``: without line feeds."""
     if not 0 < index <= len(words):
         return []
     word = shell.read(words[index] if index < len(words) else "")
@@ -70,11 +71,11 @@ def candidates(
     try:
         found = _of_command(command, before, word.text)
         fitting = (completers.on_one_line(text) if one_line else text for text in found)
-        # Drop names with control characters: the shell would send them to the terminal.
+        # Drop names with control characters, because the shell would send them to the terminal.
         fitting = (text for text in fitting if not has_controls(text.translate(_SPACES)))
         return [shell.write(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
-        # An unknown package or type: the command itself will report it.
+        # The package or type is unknown: the command itself will report it.
         return []
 
 
@@ -99,7 +100,7 @@ def _of_minirospy(before: list[str], word: str) -> Iterable[str]:
 
 
 def _of_entry(entry: Entry, before: list[str], word: str) -> Iterable[str]:
-    """Return the candidates for a command's next word, from the command's parser."""
+    """Return the candidates for a command's next word, using the command's parser."""
     if entry.completer:
         return _completer(entry.completer)(Cursor("", tuple(before), word))
     grammar: Command | Family | Verb | None = entry.load_grammar()
@@ -114,13 +115,13 @@ def _of_entry(entry: Entry, before: list[str], word: str) -> Iterable[str]:
 
 
 def _of_parser(parser: Parser, verb: str, before: list[str], word: str) -> Iterable[str]:
-    """Return the candidates for the next word of a parser's command line."""
+    """Return the candidates for the next word of a command line, using the command's parser."""
     options = {name: action for action in parser._actions for name in action.option_strings}
     given: list[str] = []
     pending: argparse.Action | None = None
     for each in before:
         if each in options:
-            # The value of an option with an optional value is a number: do not complete the next word as that value.
+            # An optional option value is a number: do not complete the next word as that value.
             pending = options[each] if options[each].nargs not in (0, "?") else None
         elif pending is not None:
             pending = pending if pending.nargs in ("+", "*") else None

@@ -1,7 +1,7 @@
 """The candidates for completion: packages, files, launch arguments, names in the graph, types, whole messages.
 
-A completer takes a :class:`Cursor` and returns unquoted candidates; `complete` selects those that match. Queries to the graph
-have a short timeout: without a master, or if it does not answer, there are no candidates.
+A completer takes a :class:`Cursor` and returns unquoted candidates; `complete` selects those that match. Queries to the
+graph have a short timeout: if no master responds, there are no candidates.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ __all__ = [
 
 LIVE_SECONDS = 0.8  # timeout for the master and for nodes
 
-_MAX_LETTERS = 1000  # characters in a parameter's value on a command line
+_MAX_LETTERS = 1000  # characters of a parameter's value on a command line
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 
@@ -47,7 +47,7 @@ class Cursor(NamedTuple):
 
 
 class Text(str):
-    """A candidate that the user will edit: written in quotes rather than with a backslash before each blank."""
+    """A candidate that the user will edit, and which is therefore quoted instead of having a backslash before each blank."""
 
     __slots__ = ()
 
@@ -56,7 +56,7 @@ Completer = Callable[[Cursor], Iterable[str]]
 
 
 def nothing(_: Cursor) -> Iterable[str]:
-    """Return no candidates, for a number, an expression or a new name."""
+    """Return no candidates: the argument is a number, an expression or a new name."""
     return ()
 
 
@@ -82,7 +82,7 @@ def build_targets(cursor: Cursor) -> Iterable[str]:
 
 
 def package_folders(cursor: Cursor) -> Iterable[str]:
-    """Return ``pkg/``, then ``pkg/folder/``; for roscd also the folders of logs and of test results."""
+    """Return ``pkg/``, then ``pkg/folder/``; for roscd, also the log and test result folders."""
     if any(not word.startswith("-") for word in cursor.given):
         return []
     package, slash, _ = cursor.word.partition("/")
@@ -108,7 +108,7 @@ _OWN_FOLDERS = {"log": _logs, "test_results": _results}
 
 
 def package_file(cursor: Cursor) -> Iterable[str]:
-    """Return packages, then the names and paths of files in the chosen one."""
+    """Return packages, then the names and paths of files in the chosen package."""
     if not cursor.given:
         return _packages().names()
     if len(cursor.given) > 1:
@@ -123,7 +123,7 @@ def package_path(cursor: Cursor) -> Iterable[str]:
 
 
 def package_file_and_target(cursor: Cursor) -> Iterable[str]:
-    """Return packages, then files of the chosen one, then destinations."""
+    """Return packages, then files in the chosen package, then destinations."""
     return files(cursor) if len(cursor.given) > 1 else package_file(cursor)
 
 
@@ -137,7 +137,7 @@ def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
 
 
 def _below(root: Path, shown: str, word: str) -> list[str]:
-    """Return the contents of the folder that ``word`` is in; ``shown`` replaces ``root`` at the start."""
+    """Return the contents of the folder that contains ``word``; ``shown`` replaces ``root`` at the start of each path."""
     head, _, prefix = word.rpartition("/")
     folder = root.joinpath(*head.split("/")[1:])
     assert head.split("/")[0] == shown
@@ -171,7 +171,10 @@ def _entries(folder: Path, *, hidden: bool) -> list[str]:
 
 
 def rosrun_words(cursor: Cursor) -> Iterable[str]:
-    """Return rosrun's options, packages, programs of the chosen one; then files and remappings for the program's arguments."""
+    """Return rosrun's options, packages, and the chosen package's programs.
+
+    Then files and remappings for the program's arguments.
+    """
     given = list(cursor.given)
     while given and given[0].startswith("-"):
         if given.pop(0) in ("-p", "--prefix"):
@@ -223,7 +226,10 @@ def _pack_words(cursor: Cursor, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
 
 
 def launch_words(cursor: Cursor) -> Iterable[str]:
-    """Yield packages, launch files in the chosen one, or paths; then ``arg:=`` for each argument that the file declares."""
+    """Yield packages, launch files in the chosen package, or paths.
+
+    Then ``arg:=`` for each argument that the file declares.
+    """
     if ":=" not in cursor.word:
         if not cursor.given:
             yield from _packages().names()
@@ -267,7 +273,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
     if not cursor.given:
         return []
     file = _launch_file(cursor)
-    # Give missing arguments an empty value, and collect errors in a list, so that neither hides nodes.
+    # Set missing arguments to an empty value, and collect errors in a list, so that neither hides nodes.
     values = {arg.name: "" for arg in describe_args(file) if arg.default is None}
     spec = load_sources([LaunchSource(file, None, values)], _packages(), problems=[])
     return _as_typed((node.name for node in spec.named_runnables()), cursor.word)
@@ -277,7 +283,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
 
 
 def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
-    """Return what ``ask`` gets from the master and the nodes; [] if that takes longer than LIVE_SECONDS."""
+    """Return the result of ``ask``, which queries the master and nodes; [] if that takes longer than LIVE_SECONDS."""
     import threading
 
     from minirospy.introspect.graph import Graph
@@ -296,12 +302,12 @@ def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
 
 
 def _as_typed(names: Iterable[str], word: str) -> list[str]:
-    """Return global names, with the leading slash only if ``word`` has one."""
+    """Return global names, keeping the leading slash only if ``word`` has one."""
     return [name.removeprefix("/") for name in names] if word and not word.startswith("/") else list(names)
 
 
 def topics(cursor: Cursor) -> Iterable[str]:
-    """Return the topics; for echo and type also the fields of a topic."""
+    """Return the topics; for echo and type, also the fields of a topic's messages."""
     from minirospy.introspect.topics import find_topic, topic_names
 
     fields = cursor.verb in ("echo", "type") and "/" in cursor.word[1:]
@@ -358,8 +364,8 @@ def parameter_value(cursor: Cursor) -> Iterable[str]:
         return []
     ask = cursor.given[0]
     found = _live(lambda graph: [format_value(get_parameter(graph, graph.resolve(ask))).removesuffix("\n")])
-    # Lists and dictionaries can be written on one line. Nobody edits a whole robot description there, so skip long
-    # values.
+    # Lists and dictionaries can be written on one line. Skip long values: nobody edits a whole robot description on a
+    # command line.
     return [on_one_line(Text(text)) for text in found if len(text) <= _MAX_LETTERS]
 
 
@@ -389,7 +395,7 @@ def _catalogue() -> Catalogue:
 
 
 def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
-    """Return ``pkg/``, then ``pkg/Type``, because all types would be hundreds; for `rosmsg show` also bare names."""
+    """Return ``pkg/``, then ``pkg/Type``, because a list of all types would be too long; for `rosmsg show` also bare names."""
     from minirospy.introspect.interfaces import Interfaces, Kind
 
     package, slash, _ = cursor.word.partition("/")
@@ -458,7 +464,7 @@ def request_text(cursor: Cursor) -> Iterable[str]:
 def _text(spec: MessageSpec, catalogue: Catalogue) -> Text:
     from minirospy.introspect.prototype import prototype
 
-    # Within double quotes an interactive shell would replace !! by the previous command.
+    # Within double quotes, an interactive shell would replace !! with the previous command.
     return Text(prototype(spec, catalogue).replace('!!binary ""', "[]"))
 
 
@@ -493,7 +499,8 @@ def on_one_line(text: str) -> str:
         elif isinstance(node, yaml.ScalarNode) and "\n" in node.value:
             node.style = '"'
 
-    # Compose nodes, because loading values and dumping them changes them: a field called `on` would become `true`.
+    # Compose YAML nodes, because loading and dumping values would change them: a field called `on` would become
+    # `true`.
     root = yaml.compose(text, yaml.SafeLoader)
     flow(root)
     return Text(
@@ -505,21 +512,21 @@ def on_one_line(text: str) -> str:
 
 
 def pins(cursor: Cursor) -> Iterable[str]:
-    """Return the pins of the virtual board that are wired; for press, those with buttons."""
+    """Return the virtual board's wired pins; for press, the pins with buttons."""
     from minirospy.board.model import BUTTONS, LEDS
 
     return map(str, BUTTONS if cursor.verb in ("press", "release") else (*LEDS, *BUTTONS))
 
 
 def dashboard_views(_: Cursor) -> Iterable[str]:
-    """Return the dashboard's views, and the layouts that are not named like a view."""
+    """Return the dashboard's views, and those layouts whose names differ from all views."""
     from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
     return dict.fromkeys((*VIEWS, *LAYOUTS))
 
 
 def dashboard_layouts(_: Cursor) -> Iterable[str]:
-    """Return the layouts that are part of the dashboard's page."""
+    """Return the layouts that the dashboard's page includes."""
     from minirospy.web.dashboard.views import LAYOUTS
 
     return LAYOUTS

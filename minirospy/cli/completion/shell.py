@@ -17,7 +17,7 @@ __all__ = ["COMMAND", "main"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command."""
+    """Run the command; return the exit status as minirospy.command.command defines it."""
     return COMMAND.main(argv)
 
 
@@ -38,7 +38,7 @@ def _parser() -> Parser:
 def _shell(shell: str | None) -> None:
     default = os.environ.get("SHELL", "bat" if sys.platform == "win32" else "bash")
     name = shell or Path(default).stem
-    # pwsh is PowerShell's program on Linux and macOS, and on Windows from version 6 on.
+    # pwsh is PowerShell's program name on Linux and macOS, and on Windows from version 6 on.
     name = "powershell" if name == "pwsh" else name
     if name not in SHELLS:
         raise UsageError(f"there is nothing for the shell [{name}], only for {', '.join(SHELLS)}")

@@ -1,4 +1,4 @@
-"""Remove and add the quotes and escapes in the words of a shell's command line. Pure."""
+"""Remove and add quotes and escapes in the words of a shell's command line. Pure."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _PLAIN_IN_POWERSHELL = re.compile(r"[\w+=:./\\~-]*\Z")
 
 
 class Word(NamedTuple):
-    """A word without its quotes; an unclosed ``quote`` was opened at ``text[at:]``."""
+    """A word without its quotes. If a ``quote`` is not closed, ``text[at:]`` is the part after the opening quote."""
 
     text: str
     quote: str
@@ -28,7 +28,7 @@ class Word(NamedTuple):
 
 
 class Shell(NamedTuple):
-    """A shell's syntax: functions that read a word, and write a candidate for a word."""
+    """A shell's syntax: functions that read a word and write a candidate for a word."""
 
     read: Callable[[str], Word]
     write: Callable[[str, Word], str]
@@ -65,9 +65,9 @@ def _read_posix(word: str) -> Word:
 
 
 def _write_posix(text: str, word: Word) -> str:
-    """Return ``text`` in the shell's syntax, in the quotes that the user opened; else a :class:`Text` in double quotes."""
+    """Return ``text`` in the shell's syntax: in the quotes that the user opened, or in double quotes for a :class:`Text`."""
     if word.quote:
-        # Leave the quotes of a folder open: the user may continue the path.
+        # Leave the quotes around a folder open, because the user may continue the path.
         end = "" if text.endswith("/") else word.quote
         return _escaped(text[: word.at]) + word.quote + _inside(text[word.at :], word.quote) + end
     if "\n" in text or (isinstance(text, Text) and not _PLAIN.match(text)):
@@ -79,7 +79,7 @@ def _inside(text: str, quote: str) -> str:
     text = text.replace("\n", _LINE_FEED)
     if quote == "'":
         return text.replace("'", r"'\''")
-    # An interactive shell expands an exclamation mark from its history, in double quotes as well.
+    # An interactive shell expands an exclamation mark from its history, even in double quotes.
     return re.sub(r'(["$`\\])', r"\\\1", text).replace("!", "\"'!'\"")
 
 
@@ -91,7 +91,7 @@ def _escaped(text: str) -> str:
 
 
 def _read_powershell(word: str) -> Word:
-    """Return a word without its quotes; ``quote`` is the one at its start, whether it is closed or not."""
+    """Return a word without its quotes; ``quote`` is the quote at the word's start, whether it is closed or not."""
     text = ""
     quote = ""
     read = 0
@@ -114,7 +114,7 @@ def _read_powershell(word: str) -> Word:
 
 
 def _write_powershell(text: str, word: Word) -> str:
-    """Return ``text`` in the quotes that the user opened, else in single quotes if it needs any."""
+    """Return ``text`` in the quotes that the user opened, else in single quotes if ``text`` needs quotes."""
     if word.quote == '"':
         return '"' + re.sub(r'([`$"])', r"`\1", text) + '"'
     if word.quote or not _PLAIN_IN_POWERSHELL.match(text):

@@ -1,4 +1,4 @@
-"""Checks of this machine's ROS installation, its network and its graph: takes an environment, yields findings.
+"""Checks this machine's ROS installation, network and graph: takes an environment, yields findings.
 
 Source: http://wiki.ros.org/roswtf, http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/Troubleshooting.
 """
@@ -19,7 +19,7 @@ __all__ = ["Examination", "Finding", "Status", "ok", "problem", "warning"]
 
 
 class Examination:
-    """All checks in order; ``findings`` yields each result when it is available. A context manager.
+    """Runs all checks in order; ``findings`` yields each result when it is available. A context manager.
 
     ``machines``: names or addresses of other machines to check; ``offline`` skips the network checks.
     """
@@ -52,7 +52,7 @@ class Examination:
             yield problem("variables", str(error), "correct it, or unset it")
             return
         host, port = environment.master_address
-        # Look up all names in parallel: if the name server is unreachable, wait for one timeout only.
+        # Look up all names in parallel, so that an unreachable name server costs only one timeout.
         known = addresses_of((host, environment.host, self._environ.get("ROS_HOSTNAME") or environment.host))
         place = MasterLocation(host, port, known[host])
         yield from check_variables(self._environ, environment, place, known)
@@ -61,7 +61,7 @@ class Examination:
         yield from check_packages(environment)
 
     def listen(self, report: Callable[[Finding], object]) -> bool:
-        """Answer the doctors of other machines until the context exits; return False if no master was found."""
+        """Answer requests from doctors on other machines until the context exits; return False if no master was found."""
         if self._listen is None:
             return False
         self._listen(report)

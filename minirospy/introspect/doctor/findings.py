@@ -17,7 +17,10 @@ class Status(str, Enum):
 
 
 class Finding(NamedTuple):
-    """The result of one check. ``check``: its subject; ``text``: the observation; ``advice``: what to do, "" for nothing."""
+    """The result of one check.
+
+    ``check``: its subject; ``text``: the observation; ``advice``: what to do, "" if nothing is needed.
+    """
 
     check: str
     status: Status
@@ -31,10 +34,10 @@ def ok(check: str, text: str) -> Finding:
 
 
 def warning(check: str, text: str, advice: str) -> Finding:
-    """Return a finding that may be the cause of a fault."""
+    """Return a finding that may be the cause of a failure."""
     return Finding(check, Status.WARNING, text, advice)
 
 
 def problem(check: str, text: str, advice: str) -> Finding:
-    """Return a finding that is a fault."""
+    """Return a finding that is certainly a failure."""
     return Finding(check, Status.PROBLEM, text, advice)

@@ -1,4 +1,4 @@
-"""Checks of tf frames: duplicate publishers, loops, several trees, and invalid, old or future transforms.
+"""Checks tf frames for duplicate publishers, loops, several trees, and invalid, old or future transforms.
 
 Source: http://wiki.ros.org/roswtf ("tf"), http://wiki.ros.org/tf/Errors%20explained.
 """
@@ -25,14 +25,17 @@ _TOPICS = {"/tf": False, "/tf_static": True}
 _SECONDS = 1.5  # listening time, long enough to receive transforms published at 1 Hz
 _OLD_SECONDS = 1.0
 _AHEAD_SECONDS = 1.1
-"""Tolerance for future stamps: static_transform_publisher stamps ahead by its period, in practice at most a second."""
+"""Tolerance for future stamps:
+
+static_transform_publisher stamps each transform one period ahead, in practice at most a second.
+"""
 _SIMILAR = 0.8
 _SHOWN = 5
 
 
 @dataclass
 class Observation:
-    """The stamps seen of one child frame, in nanoseconds; ``offset`` is the newest stamp minus its arrival time."""
+    """The stamps received for one child frame, in nanoseconds; ``offset`` is the newest stamp minus its arrival time."""
 
     child: str
     senders: set[str] = field(default_factory=set)
@@ -42,7 +45,10 @@ class Observation:
 
 
 def check_frames(environment: Environment, state: SystemState) -> Iterator[Finding]:
-    """Listen to /tf for _SECONDS if it is published, and yield the faults of the frames. Raise as ToolNode does."""
+    """Listen to /tf for _SECONDS if it is published, and yield the problems found in its frames.
+
+    Raise the errors of ToolNode.
+    """
     published = [topic for topic in _TOPICS if state.publishers.get(topic)]
     if not published:
         return
@@ -68,7 +74,7 @@ def check_frames(environment: Environment, state: SystemState) -> Iterator[Findi
         yield problem(
             "frames", f"no transforms, but other bytes: {names}", "publish tf2_msgs/TFMessage there"
         )
-    # The workers have stopped with the node. With simulated time, stamps and arrival times cannot be compared.
+    # The workers stopped together with the node. With simulated time, stamps and arrival times cannot be compared.
     yield from frame_findings([*seen.values()], is_simulated=bool(state.publishers.get("/clock")))
 
 
@@ -84,7 +90,7 @@ def _add(seen: dict[str, Observation], body: bytes, sender: str, now: int, *, is
 
 
 def frame_findings(seen: Sequence[Observation], *, is_simulated: bool = False) -> Iterator[Finding]:
-    """Yield the faults of the frames, or one ok finding if there are none."""
+    """Yield the problems found in the frames, or one ok finding if there are none."""
     if not seen:
         yield warning(
             "frames",
@@ -157,7 +163,7 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
         while at not in tree and at in parent and at not in way:
             way[at] = None
             at = parent[at]
-        # Frames in a loop get any frame of the loop as their tree.
+        # Assign the frames in a loop to the tree of any frame in the loop.
         tree.update(dict.fromkeys(way, tree.get(at, at)))
 
     hints: list[str] = []
@@ -178,7 +184,7 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
 
 
 def _similar(name: str, others: Iterable[str]) -> str:
-    """Return the most similar name, "" if there is none; ignore names that differ only in their numbers."""
+    """Return the most similar name, "" if there is none; ignore names that differ only in their digits."""
 
     def plain(text: str) -> str:
         return text.strip("/").lower().replace("-", "_")
@@ -198,7 +204,7 @@ def _similar(name: str, others: Iterable[str]) -> str:
 
 
 def _times(seen: Sequence[Observation]) -> Iterator[Finding]:
-    """Yield stamps far from their arrival time: for each node the largest offset ahead and the largest behind."""
+    """Yield a finding for stamps far from their arrival time: for each node, the largest offset ahead and the largest behind."""
     worst: dict[tuple[str, bool], tuple[float, str]] = {}
     for each in sorted(seen, key=_child):
         if each.offset is None:

@@ -1,4 +1,4 @@
-"""Checks of the graph: nodes that do not answer, publishers and subscribers that do not connect, dead services.
+"""Checks the graph for nodes that do not respond, publishers and subscribers that do not connect, services that do not respond.
 
 Source: http://wiki.ros.org/roswtf ("Online checks").
 """
@@ -50,7 +50,7 @@ _SHOWN = 5
 
 @dataclass(frozen=True)
 class NodeAnswer:
-    """The answers of a node to queries; ``trouble`` is set if it did not answer.
+    """A node's responses to queries; ``trouble`` is set if the node did not respond.
 
     ``seconds``: duration of the first call; ``stats`` (getBusStats): only if the caller requests them.
     """
@@ -69,7 +69,7 @@ Answers = dict[str, NodeAnswer]
 
 
 class _Pair(NamedTuple):
-    """A publisher and a subscriber of one topic."""
+    """A publisher and a subscriber on the same topic."""
 
     topic: str
     publisher: str
@@ -77,7 +77,7 @@ class _Pair(NamedTuple):
 
 
 def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats: bool = False) -> Answers:
-    """Query all registered nodes in parallel, except for ``besides``, and return their answers."""
+    """Query all registered nodes in parallel, except for ``besides``, and return their responses."""
     tables = (state.publishers, state.subscribers, state.services)
     names = sorted({node for table in tables for nodes in table.values() for node in nodes} - {besides})
     nodes = graph.addresses(names)
@@ -98,7 +98,7 @@ def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats
 
 
 def check_nodes(answers: Answers, place: MasterLocation) -> Iterator[Finding]:
-    """Yield a problem for nodes that do not answer: one line for all nodes of a machine that fail in the same way."""
+    """Yield a problem for nodes that do not respond: one line for all nodes on a machine that fail in the same way."""
     groups: dict[tuple[str, Fault], list[NodeAnswer]] = {}
     for answer in answers.values():
         if answer.trouble:
@@ -117,7 +117,7 @@ def check_nodes(answers: Answers, place: MasterLocation) -> Iterator[Finding]:
 
 
 def node_trouble(host: str, trouble: Trouble, place: MasterLocation) -> tuple[str, str]:
-    """Return (problem, advice) for a node that is registered at ``host`` and does not answer there."""
+    """Return (problem, advice) for a node that is registered at ``host`` and does not respond there."""
     if trouble.fault is Fault.NAME:
         return (
             f"are registered as being at '{host}', a name that this machine does not know",
@@ -151,7 +151,7 @@ def node_trouble(host: str, trouble: Trouble, place: MasterLocation) -> tuple[st
 
 
 def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Yield topics whose nodes report different types, and topics without publishers."""
+    """Yield findings for topics whose nodes report different types, and for topics without publishers."""
     differing = differing_types(state, answers)
     for topic, types in differing.items():
         found = "; ".join(f"{type_}: {_names(nodes)}" for type_, nodes in sorted(types.items()))
@@ -190,7 +190,7 @@ def _near(topic: str, published: set[str]) -> str:
 
 
 def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Yield the publishers and subscribers that should be connected and are not."""
+    """Yield a finding for each publisher and subscriber that should be connected but are not."""
     pairs = [
         _Pair(topic, publisher, subscriber)
         for topic, publishers in state.publishers.items()
@@ -206,7 +206,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
     ]
     missing = [pair for pair in pairs if not _is_connected(pair, answers)]
     if missing:
-        # Nodes that have just started may connect within this time: check again.
+        # Nodes that have just started may connect within this time, so check again.
         time.sleep(_AGAIN_SECONDS)
         names = {name for pair in missing for name in pair[1:]}
         again = in_parallel(
@@ -234,7 +234,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
 
 
 def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Yield services that do not answer, except for those of nodes that were reported themselves."""
+    """Yield a problem for each service that does not respond, unless its node was already reported."""
     names = [
         name
         for name, nodes in sorted(state.services.items())
@@ -329,7 +329,7 @@ def _is_connected(pair: _Pair, answers: Answers) -> bool:
 
 
 def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
-    """Return the advice if the publisher's definition of the type differs from this machine's; else ""."""
+    """Return the advice if the publisher's definition of the type differs from this machine's, or "" if the definitions agree."""
     from minirospy.core.idl.load import message_class
 
     uri = answers[pair.publisher].node.uri or ""
@@ -344,7 +344,10 @@ def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
 
 
 def _probe_service(graph: Graph, name: str) -> str:
-    """Return a problem with a service's type, "" for none. Raise as ServiceClient, and RpcRefused if it is unregistered."""
+    """Return a problem with a service's type, "" if there is none.
+
+    Raise the errors of ServiceClient, and RpcRefused if the service was unregistered.
+    """
     from minirospy.core.idl.load import service_class
     from minirospy.runtime.node.service_client import ServiceClient
 
@@ -363,7 +366,7 @@ def _probe_service(graph: Graph, name: str) -> str:
 
 
 def _names(names: Iterable[str]) -> str:
-    """Return the first few names, and the number of the others."""
+    """Return the first few names and how many more there are."""
     all_ = list(names)
     more = f" and {len(all_) - _SHOWN} more" if len(all_) > _SHOWN else ""
     return ", ".join(all_[:_SHOWN]) + more

@@ -1,8 +1,9 @@
-"""Check the connection between two machines in both directions: one listens, the other requests that it connects back.
+"""Check the connection between two machines in both directions: one listens, the other requests a connection back.
 
-The listener is a service of type std_srvs/Trigger. A client that can call it has reached that machine. The response reports
-whether that machine has reached the client's node, by subscribing to its topic and receiving a message of 16 KiB. The
-response's message is JSON: the listener's ``host`` and ``time``, and ``fault`` and ``text`` of a failure ("" for none).
+The listener is a service of type std_srvs/Trigger. A client that can call it has reached the listener's machine. The
+response reports whether the listener's machine has reached the client's node, by subscribing to that node's topic and
+receiving a message of 16 KiB. The response's message is JSON: the listener's ``host`` and ``time``, and a failure's
+``fault`` and ``text`` ("" if there was none).
 """
 
 from __future__ import annotations
@@ -43,9 +44,9 @@ _PADDING = "x" * 16384
 
 
 def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -> None:
-    """Start to connect back to each doctor that requests it; call ``report`` with each result, in a separate thread.
+    """Start connecting back to each doctor that requests a check; call ``report`` with each result, in a separate thread.
 
-    Raise MasterUnreachableError or RpcError.
+    Raise MasterUnreachableError if no master answers, or RpcError if a call fails.
     """
 
     def connect_back(_: memoryview, fields: Header) -> bytes:
@@ -87,14 +88,14 @@ def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -
 
 
 def listeners(state: SystemState, answers: Answers) -> Answers:
-    """Return the answers of the doctors that listen."""
+    """Return the responses of the doctors that listen."""
     return {node: answer for node, answer in answers.items() if node + _SERVICE in state.services}
 
 
 def check_listeners(
     own: DoctorNode, graph: Graph, answers: Answers, place: MasterLocation
 ) -> Iterator[Finding]:
-    """Call the listeners and yield one or two findings for each."""
+    """Call the listeners and yield one or two findings for each listener."""
     services = [
         node + _SERVICE for node, answer in answers.items() if node.startswith(PREFIX) and not answer.trouble
     ]
@@ -107,7 +108,7 @@ def check_listeners(
 
     for service, result in zip(services, in_parallel(ask, services, _ANSWER_SECONDS), strict=True):
         if isinstance(result, RpcRefused):
-            continue  # a doctor that does not listen
+            continue  # this doctor does not listen
         if isinstance(result, Exception):
             here = trouble_of(result)
             host = host_port(graph.node_uri(service.removesuffix(_SERVICE)) or "")[0]
@@ -136,7 +137,10 @@ def check_listeners(
 
 
 def _call(uri: str, service: str, caller_id: str) -> str:
-    """Return the message of a listener's response. Raise OSError or WireError."""
+    """Return the message in a listener's response.
+
+    Raise OSError if the connection fails, WireError if the response is invalid.
+    """
     type_ = service_class("std_srvs/Trigger")
     client = ServiceClient(uri, service, type_._md5sum, caller_id, timeout=CONNECT_SECONDS, same_host=False)
     try:

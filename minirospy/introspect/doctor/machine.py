@@ -1,4 +1,4 @@
-"""Checks of this machine without the network: Python, environment variables and packages.
+"""Checks this machine without using the network: Python, environment variables and packages.
 
 Source: http://wiki.ros.org/ROS/EnvironmentVariables, http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/roswtf.
 """
@@ -33,7 +33,7 @@ _MEANT = (
 
 
 def check_python() -> Iterator[Finding]:
-    """Yield the Python version, and which rospy programs import."""
+    """Yield the Python version, and the rospy that programs import."""
     import importlib.util
 
     what = f"{platform.python_version()}, minirospy {minirospy.__version__}"
@@ -57,9 +57,9 @@ def check_variables(
     master: MasterLocation,
     known: Mapping[str, list[str]],
 ) -> Iterator[Finding]:
-    """Yield findings about the variables for the master's and this machine's address, each by itself and in combination.
+    """Yield findings about the variables for the master's and this machine's address, separately and in combination.
 
-    ``known``: the addresses of the host names in them.
+    ``known``: the addresses of the host names in the variables.
     """
     found = [*_host_findings(environ, environment, master, known), *_other_findings(environ, environment)]
     if not found:
@@ -97,7 +97,7 @@ def _host_findings(
     own = known[host]
     by_ip, is_address = bool(ip and not hostname), _is_address(host)
     if by_ip and own and not is_address:
-        # `192.168.1` resolves as well, to 192.168.0.1.
+        # Strings such as `192.168.1` resolve too: to 192.168.0.1.
         is_name = not ip.replace(".", "").isdigit()
         yield warning(
             "variables",
@@ -172,7 +172,7 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
                 "variables",
                 f"logs cannot be written to {folder}: {there} {why}",
                 f"export {variable}=<a folder of your own>"
-                # A folder owned by root is usually left by `sudo roscore`.
+                # A root-owned folder usually results from `sudo roscore`.
                 + (f", or `sudo chown -R $USER {there}`" if there == folder and there.is_dir() else ""),
             )
             break
@@ -192,7 +192,8 @@ def check_packages(environment: Environment, here: Path | None = None) -> Iterat
                 f"source {workspace / 'devel' / 'setup.bash'}",
             )
         )
-    # A sourced workspace adds minirospy's packages to the path: skip them. The user's packages may replace them.
+    # A sourced workspace adds minirospy's packages to the path: skip those packages. The user's packages may replace
+    # them.
     mine = Packages.below(*(path for path in environment.package_path if path not in built_in_roots()))
     copies = mine.copies()
     for name, folders in sorted(copies.items()):
@@ -231,7 +232,7 @@ def _dependency_findings(environment: Environment, mine: list[str]) -> Iterator[
             for each in manifest.dependencies
             if each.tag in ("run_depend", "exec_depend", "depend") and each.name not in known
         ]
-        # Ignore rosdep keys of system packages.
+        # Ignore rosdep keys that name system packages.
         missing = [each for each in dict.fromkeys(missing) if not _is_system_key(each)]
         if missing:
             yield warning(

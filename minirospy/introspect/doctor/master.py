@@ -1,4 +1,4 @@
-"""Checks of the master: whether it answers, which machine is at fault if it does not, and its clock's offset."""
+"""Checks the master: whether it responds, which machine is at fault if it does not, and how far its clock is off."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["check_clock", "check_master", "clock_finding"]
 
-_FEEL_SECONDS = 0.1  # clock difference from which tf is affected
+_FEEL_SECONDS = 0.1  # clock difference above which tf is affected
 
 _WRONG_SECONDS = 1.0
 
 
 def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
-    """Yield whether a master answers, or one problem if none does."""
+    """Yield a finding that a master responds, or one problem if none does."""
     if not place.addresses:
         yield problem(
             "master",
@@ -41,7 +41,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
     try:
         pid = f", pid {master.get_pid()}"
     except RpcFault:
-        pid = ""  # another implementation's master, which lacks this call
+        pid = ""  # this master is another implementation, which lacks the call
     except (MasterUnreachableError, RpcError) as error:
         yield _unreachable(master.uri, place, trouble_of(error))
         return
@@ -54,7 +54,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
 
 
 def check_clock(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
-    """Yield the difference between the master's clock and the local one; nothing if the master is local."""
+    """Yield a finding on the difference between the master's clock and the local one; nothing if the master is local."""
     if place.is_local:
         return
     before = time.time()
@@ -67,7 +67,7 @@ def check_clock(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]
     if seconds is None:
         yield ok("clock", f"{place.host} does not report its time: compare `date` on both machines")
         return
-    # The header has whole seconds, rounded down.
+    # The header's time is rounded down to whole seconds.
     yield clock_finding(f"the master's machine ({place.host})", seconds, time.time() - 1.0, time.time())
 
 
@@ -136,7 +136,7 @@ def _status(master: MasterProxy) -> dict[str, object]:
 
 
 def _http_date(place: MasterLocation) -> float | None:
-    """Return the time in the server's HTTP Date header, which Python's server sends."""
+    """Return the time from the HTTP Date header, which Python's HTTP server sends."""
     from email.utils import parsedate_to_datetime
 
     request = serialize_request(place.host, "/RPC2", serialize_call("getPid", ("/doctor",)))

@@ -1,4 +1,4 @@
-"""Checks of another machine that the user names: whether it is reachable, and whether a doctor there tests the return path."""
+"""Checks a machine that the user names: whether it is reachable, and whether a doctor there tests the return path."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["check_listens", "check_machine"]
 
 
 def check_machine(host: str, port: int) -> Iterator[Finding]:
-    """Yield whether this machine can connect to ``host`` at ``port``, the master's."""
+    """Yield a finding on whether this machine can connect to ``host`` at ``port``, the master's port."""
     known = addresses(host)
     if not known:
         yield problem(
@@ -61,12 +61,12 @@ def check_machine(host: str, port: int) -> Iterator[Finding]:
 
 
 def check_listens(host: str, listeners: Answers, master_uri: str) -> Iterator[Finding]:
-    """Yield a warning if none of ``listeners``, the doctors that connect back, is at ``host``."""
+    """Yield a warning if none of ``listeners``, the doctors that connect back, runs on ``host``."""
     theirs = [host_port(answer.node.uri or "")[0] for answer in listeners.values()]
     known = addresses_of([host, *theirs])
     here = {host, *known[host]}
     if not known[host] or is_own_address(known[host][0]):
-        return  # reported by check_machine
+        return  # check_machine reported this already
     if not any(here & {name, *known[name]} for name in theirs):
         yield warning(
             "both directions",

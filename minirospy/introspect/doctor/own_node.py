@@ -1,4 +1,4 @@
-"""The doctor's own node: checks whether other machines, the master's first, reach nodes on this one.
+"""The doctor's own node: checks whether other machines, the master's first, reach nodes on this machine.
 
 It is a normal node of the graph while the doctor runs: peers that reach it also reach the user's nodes.
 """
@@ -35,10 +35,10 @@ from minirospy.runtime.transport.loop import LoopThread
 
 __all__ = ["PREFIX", "DoctorNode", "check_own_address", "check_way_back", "unreached_finding"]
 
-PREFIX = "/minirospy_doctor"  # prefix of the names of such nodes
+PREFIX = "/minirospy_doctor"  # prefix of the doctors' node names
 
 _LETTER_BYTES = 16 * 1024
-"""Size of the message, more than one packet: some tunnels drop everything that exceeds their packet size."""
+"""Message size, larger than one packet: some tunnels drop all packets that exceed their limit."""
 
 _log = logging.getLogger(__name__)
 
@@ -54,7 +54,7 @@ class DoctorNode:
         self.name = names.anonymous_name(PREFIX)
         self.letter = self.name + "/letter"
         self.told_by_master = threading.Event()
-        """Set when the master has called this node."""
+        """Set after the master has called this node."""
         self._loop = LoopThread("minirospy-doctor")
         self.node = _NotifiedNode(self.name, environment, self.told_by_master)
         self._log_links = threading.Condition()
@@ -64,7 +64,7 @@ class DoctorNode:
         try:
             self._loop.run(self.node.start())
         except BaseException:
-            # Ctrl-C may interrupt the start after the node's servers are open: close them.
+            # Ctrl-C may interrupt the start after the node's servers were opened: close them.
             self._loop.run(self.node.close())
             self._loop.close()
             raise
@@ -80,14 +80,17 @@ class DoctorNode:
         self._loop.close()
 
     def register(self) -> None:
-        """Register the node's topics: its letter, and /rosout as every node does.
+        """Register the node's topics: its own message's topic, and /rosout, which every node publishes.
 
-        Raise MasterUnreachableError or RpcError.
+        Raise MasterUnreachableError if no master answers, or RpcError if the call fails.
         """
         self._loop.run(self._register())
 
     def serve(self, name: str, handler: Handler) -> None:
-        """Provide a std_srvs/Trigger service. Raise MasterUnreachableError or RpcError."""
+        """Provide a std_srvs/Trigger service.
+
+        Raise MasterUnreachableError if no master answers, or RpcError if the call fails.
+        """
         type_ = service_class("std_srvs/Trigger")
         server = self.node.make_service(
             name,
@@ -110,7 +113,7 @@ class DoctorNode:
         text = message_class("std_msgs/String")
         letter = Publication(self.letter, InterfaceType.of(text), latch=True)
         body = b"x" * _LETTER_BYTES
-        # A std_msgs/String has the layout of a frame: a length and the bytes.
+        # A serialized std_msgs/String has the same layout as a frame: a length, then the bytes.
         letter.publish(serialize_frame(serialize_frame(body)))
         log = message_class("rosgraph_msgs/Log")
         type_ = InterfaceType.of(log)
@@ -134,7 +137,7 @@ class DoctorNode:
 
 
 class _NotifiedNode(Node):
-    """A node that records calls from the master."""
+    """A node that records that the master has called it."""
 
     def __init__(self, name: str, environment: Environment, notified: threading.Event) -> None:
         super().__init__(name, environment)
@@ -145,7 +148,7 @@ class _NotifiedNode(Node):
 
 
 def check_own_address(own: DoctorNode) -> Iterator[Finding]:
-    """Yield whether this machine reaches its own nodes at the address that they advertise."""
+    """Yield a finding on whether this machine reaches its own nodes at the address that they advertise."""
     host, ports = own.environment.host, own.environment.ports
     slave = SlaveProxy(own.node.uri, own.name, CONNECT_SECONDS, same_host=False)
     try:
@@ -166,7 +169,7 @@ def check_own_address(own: DoctorNode) -> Iterator[Finding]:
 
 
 def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[str]) -> Iterator[Finding]:
-    """Yield whether the master calls this node, and whether /rosout's subscribers (``log_listeners``) connect to it."""
+    """Yield findings on whether the master calls this node, and /rosout's subscribers (``log_listeners``) connect to it."""
     if not own.told_by_master.wait(CONNECT_SECONDS):
         yield unreached_finding(own, f"the master's machine ({master_host})", master_host, None)
         return

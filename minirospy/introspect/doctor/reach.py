@@ -1,6 +1,6 @@
-"""Checks that an address can be reached: a host and a port in, a named fault out.
+"""Checks whether a host and port can be reached, and names the fault if not.
 
-Everything blocks its thread for a bounded time; :func:`in_parallel` makes many calls at the same time.
+Every function blocks the calling thread for a bounded time; :func:`in_parallel` makes many calls at the same time.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ __all__ = [
 ]
 
 CONNECT_SECONDS = 1.5
-"""Connect timeout: a reachable peer answers within this, even over a poor radio link."""
+"""Connect timeout: a reachable peer responds within this time, even over a poor radio link."""
 
 RESUME = "it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
 """Advice for :attr:`Fault.LATE`."""
 
-LOOK_UP_SECONDS = 2.0  # for a name server's answer
+LOOK_UP_SECONDS = 2.0  # for a name server's response
 
 _MAX_THREADS = 32
 _MAX_BYTES = 1024 * 1024
@@ -62,12 +62,12 @@ _R = TypeVar("_R")
 
 
 class Fault(str, Enum):
-    """The reason why an address does not answer, as far as this machine can determine it."""
+    """The reason why an address does not respond, as far as this machine can determine it."""
 
     NAME = "name"  # the host name does not resolve
     REFUSED = "refused"  # the machine is up, but no process listens on the port
     SILENT = "silent"
-    """No answer: the machine is off, the address belongs to another machine, or a firewall drops the packets."""
+    """No response: the machine is off, the address belongs to another machine, or a firewall drops the packets."""
     LATE = "late"  # connected, but no response: the process is busy or suspended
     NO_ROUTE = "no route"  # no network, or a firewall rejects the packets
     STRANGER = "stranger"  # the peer does not speak a ROS protocol
@@ -95,7 +95,7 @@ class MasterLocation(NamedTuple):
 
     @property
     def own_address(self) -> str:
-        """Return this machine's address as seen from the master's; "" without a route."""
+        """Return this machine's address as seen from the master's machine; "" if there is no route."""
         return own_address_towards(self.addresses[0]) if self.addresses else ""
 
 
@@ -151,7 +151,10 @@ def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict
 
 
 def look_up(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
-    """Look up a name as :func:`addresses` does, but raise OSError. The system's own timeout is half a minute."""
+    """Look up a name as :func:`addresses` does, but raise OSError on failure.
+
+    Needed because the system's own timeout is half a minute.
+    """
     (found,) = in_parallel(_ask_resolver, [host], timeout)
     if isinstance(found, Exception):
         raise socket.gaierror(socket.EAI_NONAME, f"the name '{host}' is not known") from found
@@ -170,7 +173,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_own_address(address: str) -> bool:
-    """Return whether an address is one of this machine's: others cannot be bound."""
+    """Return whether an address belongs to this machine: other addresses cannot be bound."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -181,7 +184,7 @@ def is_own_address(address: str) -> bool:
 
 
 def own_address_towards(address: str) -> str:
-    """Return this machine's address on the route to another one; "" without a route. Sends nothing."""
+    """Return this machine's address on the route to another address; "" if there is no route. Sends no packets."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -205,7 +208,8 @@ def read_topic(
 ) -> tuple[Header, bytes]:
     """Return the connection header of the publisher at ``uri`` (its Slave API) and, with ``wait``, its first message.
 
-    Each step has ``timeout`` seconds. Raise RpcError, WireError or OSError.
+    Each step has its own ``timeout`` in seconds. Raise RpcError if the call fails, WireError if its data is invalid, or
+    OSError if the connection fails.
     """
     look_up(host_port(uri)[0])
     with contextlib.closing(SlaveProxy(uri, caller_id, timeout, same_host=False)) as slave:
@@ -226,7 +230,7 @@ def read_topic(
 
 
 def _receive(sock: socket.socket, most: int) -> bytes:
-    """Return a block that is preceded by its length. Raise WireError or OSError."""
+    """Read a length-prefixed block. Raise WireError if it is longer than ``most``, OSError if the connection fails."""
 
     def exactly(count: int) -> bytes:
         data = b""
@@ -246,9 +250,9 @@ def _receive(sock: socket.socket, most: int) -> bytes:
 def in_parallel(
     function: Callable[[_A], _R], arguments: Iterable[_A], timeout: float
 ) -> list[_R | Exception]:
-    """Return the result of ``function``, or its exception, for each argument; TimeoutError for one that takes longer.
+    """Return the result of ``function``, or its exception, for each argument, or TimeoutError for a call that takes too long.
 
-    Runs in daemon threads: a name lookup cannot be cancelled, and must not keep the program from exiting.
+    Runs in daemon threads: a name lookup cannot be cancelled, and must not prevent the program from exiting.
     """
     waiting = list(enumerate(arguments))
     results: list[_R | Exception] = [TimeoutError("timed out")] * len(waiting)

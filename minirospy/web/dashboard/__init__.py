@@ -1,1 +1,1 @@
-"""The dashboard: one page for the graph and the board, served by the bridge. Its functions: docs/dashboard.md."""
+"""The dashboard: one page for the graph and the board, served by the bridge. docs/dashboard.md describes its functions."""

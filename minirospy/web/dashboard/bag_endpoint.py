@@ -64,11 +64,11 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
         self._starting: asyncio.Task[None] | None = None
 
     async def record(self, name: str, suffix: str, topics: Sequence[str], compression: str) -> None:
-        """Start a recording. Raise MinirospyError."""
+        """Start a recording. Raise MinirospyError if it cannot be started."""
         is_starting = self._starting and not self._starting.done()
         if is_starting or (self.recording and not self.recording.state().is_ended):
             raise UsageError("there is a recording already: stop it first")
-        # The page may be closed during the start: the child process must not be lost.
+        # The page may be closed during the start, and the child process must not be lost then.
         self._starting = self.spawn(self._start(name, suffix, topics, compression))
         await asyncio.shield(self._starting)
 
@@ -88,7 +88,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
             self.changed()
 
     async def close(self) -> None:
-        """End all sessions, whose connections are closed, and complete the recording."""
+        """End all sessions, whose connections have been closed, and complete the recording."""
         await super().close()
         await self._close_recording()
 
@@ -108,7 +108,7 @@ class BagSession(JsonSession):
         self._endpoint = endpoint
         self._bag: OpenBag | None = None
         self._shown: dict[str, int] = {}
-        """Topics whose messages are sent, and the time of the last message sent, -1 if none."""
+        """Topics whose messages are sent, each with the time of the last message sent, or -1 if none was."""
         self._thumbnails: deque[tuple[str, int]] = deque()
         self._sent: dict[str, str] = {}
         handlers: Mapping[str, Handler] = {
@@ -188,7 +188,7 @@ class BagSession(JsonSession):
         try:
             bag = self._bag = await asyncio.wrap_future(future)
         except asyncio.CancelledError:
-            # The page was closed during the opening: close the bag in that thread.
+            # The page was closed during the opening: close the bag in that session's thread.
             future.add_done_callback(_close_opened)
             raise
         start, end = bag.span
@@ -214,7 +214,7 @@ class BagSession(JsonSession):
         self._sent.pop("state", None)
         if bag:
             bag.output.close()
-            # If the client leaves now, only the wait is cancelled, not the closing.
+            # If the client leaves now, only the waiting is cancelled, not the closing.
             await asyncio.shield(asyncio.wrap_future(self._thread.submit(bag.close)))
 
     async def _play(self, fields: Fields) -> None:
@@ -234,8 +234,8 @@ class BagSession(JsonSession):
         bag = self._opened()
         bag.player.control(is_paused=True)
         now = bag.state.time
-        # A step is all messages of one time. After a seek, the messages at that time are already shown but not yet
-        # published.
+        # A step publishes all messages that have the same time. After a seek, the messages at that time are already
+        # shown but not yet published.
         count = bag.timeline.count_at(now) if bag.player.is_fresh else 0
         after = bag.timeline.time_after(now)
         if after is not None:
@@ -254,7 +254,7 @@ class BagSession(JsonSession):
         for line in bag.output.switch(bag.timeline, topics, clock=bool(fields.get("clock"))):
             self.send_error(line)
         bag.player.control(has_clock=bag.output.has_clock)
-        # Publish earlier latched messages, which new subscribers would not receive otherwise.
+        # Publish earlier latched messages, because new subscribers would not receive them otherwise.
         time = bag.state.time
         for topic, body in await self.in_thread(lambda: bag.latched_before(new, time)):
             bag.output.send(topic, body)

@@ -19,12 +19,12 @@ __all__ = ["BagFolder", "FoundBag"]
 _SUFFIXES = (".bag", ".mcap")
 _MAX_BAGS = 1000
 _MAX_ENTRIES = 50_000
-"""Files and folders to visit: the working folder may be a home folder."""
+"""Limit for visited files and folders, because the working folder may be a home folder."""
 
 _MAX_DEPTH = 8
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .+-]{0,99}")
 _RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
-"""Device names of Windows."""
+"""Windows device names."""
 
 
 class FoundBag(NamedTuple):
@@ -68,7 +68,7 @@ class BagFolder:
         return sorted(found.values(), key=lambda bag: bag.modified, reverse=True)
 
     def path_of(self, name: str) -> Path:
-        """Return the file of an existing bag, by its name as in :meth:`bags`. Raise BagError."""
+        """Return the file of an existing bag, given its name as in :meth:`bags`. Raise BagError if there is none."""
         if name in self._given:
             return self._given[name]
         parts = name.split("/")
@@ -90,7 +90,7 @@ class BagFolder:
         return path
 
     def new_file(self, name: str, suffix: str) -> Path:
-        """Return the file for a new recording. Raise UsageError if the name is not valid, or is in use."""
+        """Return the file for a new recording. Raise UsageError if the name is invalid or in use."""
         stem = name.removesuffix(suffix)
         if not _NAME.fullmatch(stem) or stem.endswith((".", " ")) or _RESERVED.match(stem):
             raise UsageError(
@@ -104,7 +104,7 @@ class BagFolder:
         return path
 
     def _entries(self) -> Iterator[os.DirEntry[str]]:
-        """Yield the bags in the folder and below, level by level."""
+        """Yield the bags in the folder and its subfolders, level by level."""
         left = _MAX_ENTRIES
         level = [self.root]
         for _ in range(_MAX_DEPTH):
@@ -146,7 +146,7 @@ def _is_file(entry: os.DirEntry[str]) -> bool:
 
 
 def _is_link(path: Path) -> bool:
-    """Return whether a path is a symbolic link, or on Windows a junction."""
+    """Return whether a path is a symbolic link or, on Windows, a junction."""
     status = path.lstat()
     reparse = getattr(stat, "FILE_ATTRIBUTE_REPARSE_POINT", 0x400)
     return stat.S_ISLNK(status.st_mode) or bool(getattr(status, "st_file_attributes", 0) & reparse)

@@ -30,11 +30,11 @@ _log = logging.getLogger(__name__)
 
 _SECOND = 10**9
 _MAX_WAITING = 200
-"""Messages queued for the loop; if the queue is full, the player waits."""
+"""Messages queued for the loop. If the queue is full, the player waits."""
 
 
 class GraphOutput:
-    """Publishes a player's messages on the loop's graph: the enabled topics, and the clock."""
+    """Publishes a player's messages on the loop's graph: the messages on enabled topics, and the clock."""
 
     def __init__(self, graph: SharedGraph) -> None:
         """Must be called on the loop."""
@@ -58,7 +58,7 @@ class GraphOutput:
         return self._clock is not None
 
     def switch(self, timeline: Timeline, topics: Collection[str], *, clock: bool) -> list[str]:
-        """Enable exactly these topics; return one line for each that cannot be published."""
+        """Enable exactly these topics; return one line for each topic that cannot be published."""
         refused = []
         for topic in [each for each in self._publications if each not in topics]:
             self._publications.pop(topic).close()
@@ -105,20 +105,20 @@ class GraphOutput:
     # --- in the player's thread
 
     def open(self, player: Controls) -> None:
-        """See :meth:`Output.open`: nothing to do, the session stops the player."""
+        """See :meth:`Output.open`. Does nothing, because the session stops the player."""
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """See :meth:`Output.advertise`: nothing to do, a topic is advertised when it is enabled."""
+        """See :meth:`Output.advertise`. Does nothing, because a topic is advertised when it is enabled."""
 
     def offer(self, player: Controls) -> None:
-        """See :meth:`Output.offer`: nothing to do, the page controls the player."""
+        """See :meth:`Output.offer`. Does nothing, because the page controls the player."""
 
     def has_all_subscribers(self) -> bool:
         """See :meth:`Output.has_all_subscribers`."""
         return True
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """See :meth:`Output.running`: reads no keys, because the process has other work."""
+        """See :meth:`Output.running`. Reads no keys, because the process does other work."""
         return nullcontext()
 
     def publish(self, number: int, message: StoredMessage) -> None:
@@ -133,11 +133,11 @@ class GraphOutput:
             self._post(lambda: self._send_clock(time))
 
     def waiting_bytes(self) -> int:
-        """See :meth:`Output.waiting_bytes`: none, because queued messages are sent even after the player has stopped."""
+        """See :meth:`Output.waiting_bytes`. Returns 0, because queued messages are sent even after the player has stopped."""
         return 0
 
     def print(self, text: str, end: str = "\n") -> None:
-        """See :meth:`Output.print`: prints nothing, the page shows the state."""
+        """See :meth:`Output.print`. Prints nothing, because the page shows the state."""
 
     def _send_clock(self, time: int) -> None:
         if self._clock:
@@ -156,14 +156,15 @@ class GraphOutput:
         try:
             self._loop.call_soon_threadsafe(run)
         except RuntimeError:
-            # The loop is closed.
+            # The loop has been closed.
             self._free.release()
 
 
 class OpenBag:
     """An opened bag: a timeline, and a player that is paused at the start. Methods block: do not call them on the loop.
 
-    ``on_change`` is called in the player's thread when the player has moved or stopped. Raise BagError or OSError.
+    ``on_change`` is called in the player's thread when the player has moved or stopped. Raise BagError if the bag is
+    invalid, OSError if it cannot be read.
     """
 
     def __init__(
@@ -171,7 +172,7 @@ class OpenBag:
     ) -> None:
         self.name = name
         self.output = output
-        self.failure = ""  # error that stopped the player, "" for none
+        self.failure = ""  # the error that stopped the player, or "" if there was none
         self._files = ExitStack()
         with ExitStack() as opened:
             try:
@@ -193,12 +194,12 @@ class OpenBag:
 
     @property
     def state(self) -> PlayerState:
-        """Return the player's state, with its time limited to the bag's. May be called from any thread."""
+        """Return the player's state, with its time limited to the bag's time range. May be called from any thread."""
         found = self.player.state()
         return found._replace(time=min(max(found.time, self.span[0]), self.span[1]))
 
     def latched_before(self, topics: Collection[str], time: int) -> list[tuple[str, bytes]]:
-        """Return the last message of each latched topic of these, for late subscribers."""
+        """Return the last message on each of these topics that is latched, for late subscribers."""
         return [
             (topic, message.body)
             for topic in topics

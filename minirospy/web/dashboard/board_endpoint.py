@@ -1,4 +1,4 @@
-"""The virtual board for the page: its lights, buttons and simulated person, with JSON over WebSocket.
+"""The virtual board for the page: lights, buttons and simulated person, as JSON over WebSocket.
 
 The server sends ``{"name", "boards", "leds": [[pin, color, level]], "buttons": [[pin, level]], "pins": [[pin, function,
 level]], "person": [x, y] | null, "fields": [...], "writes"}`` after each change; a client sends ``{"press": pin}``,
@@ -66,7 +66,7 @@ class BoardSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: the board cannot be changed with it"
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """See :meth:`JsonSession.parse`: the name of an operation is its only field."""
+        """See :meth:`JsonSession.parse`. An operation's only field is named after the operation."""
         (name,) = fields
         return name, fields
 
@@ -76,7 +76,7 @@ class BoardSession(JsonSession):
         try:
             directory = BoardDirectory.find(name)
             self._boards = await self.in_thread(directory.names)
-            # Opening a board starts it, a process, if it does not run.
+            # Opening a board that is not running starts a process.
             if name and name not in self._boards and not self.client.is_owner:
                 raise BoardError(
                     f"there is no board [{directory.name}]: {self.client.why_not_owner('start boards')}"
@@ -105,7 +105,7 @@ class BoardSession(JsonSession):
 
     async def _press(self, fields: Fields) -> None:
         pin = _pin(fields["press"])
-        # Record it first, so that it is released even if the client leaves before the answer.
+        # Record the pin first, so that it is released even if the client leaves before the response.
         self._pressed.add(pin)
         await self.in_thread(partial(self._opened().press, pin))
 

@@ -1,8 +1,8 @@
 """Open a link in the local user's browser, if there is one.
 
-The link contains a secret, and every user of the machine can list command lines. So the browser is started with a file that
-only this user can read: a page that redirects to the link. Browsers send neither Referer nor Origin for a page opened from
-a file.
+The link contains a secret, and every user of the machine can list command lines. Therefore the browser is started with a
+file that only this user can read: a page that redirects to the link. Browsers send neither Referer nor Origin for a page
+opened from a file.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _SNAPS = (Path("/snap/bin/firefox"), Path("/snap/bin/chromium"))
 
 
 def has_screen(environ: Mapping[str, str], platform: str = sys.platform) -> bool:
-    """Return whether a browser has a display: without one, a text browser would take over the terminal."""
+    """Return whether a browser has a display; without a display, a text browser would take over the terminal."""
     if platform in ("win32", "darwin"):
         return True
     return any(environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME", "BROWSER"))
@@ -46,8 +46,8 @@ class LinkFile:
     """A link's page in a folder that only this user can access."""
 
     def __init__(self, link: str) -> None:
-        """Create the file. Raise OSError."""
-        # mkdtemp makes the folder accessible to this user only, on Windows by its access control list.
+        """Create the file. Raise OSError if that fails."""
+        # mkdtemp makes the folder accessible only to this user; on Windows by its access control list.
         self._folder = Path(tempfile.mkdtemp(prefix="minirospy-browser-", dir=_parent()))
         self.path = self._folder / "dashboard.html"
         try:
@@ -70,7 +70,7 @@ def open_link(link: str) -> Callable[[], object] | None:
     if not has_screen(os.environ):
         return None
     if os.environ.get("WSL_DISTRO_NAME"):
-        # A Windows browser cannot open a file by its Linux path.
+        # A Windows browser cannot open a file given by its Linux path.
         return _open(link, lambda: None)
     try:
         file = LinkFile(link)
@@ -86,7 +86,7 @@ def _open(address: str, remove: Callable[[], object]) -> Callable[[], object]:
 
 
 def _parent() -> Path | None:
-    """Return the parent of the file's folder, None for the system's temporary folder."""
+    """Return the folder in which to create the file's folder, or None for the system's temporary folder."""
     home = Path.home()
     if any(each.exists() for each in _SNAPS) and os.access(home, os.W_OK):
         return home

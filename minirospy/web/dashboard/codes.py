@@ -1,8 +1,8 @@
 """One-time codes that the local browser exchanges for the token, so that the token is never in a file or a command line.
 
-A code is valid once, for a minute. It is in a file that only this user can read (browser.py). On Linux the connection that
-sends it must also belong to this user or to root; a connection whose owner is unknown is refused. Other systems have no
-table of connections that an unprivileged program can read: there the code alone is sufficient.
+A code is valid once, for a minute, and is stored in a file that only this user can read (browser.py). On Linux the
+connection that sends it must also belong to this user or to root; a connection whose owner is unknown is refused. Other
+systems have no table of connections that an unprivileged program can read: on those systems the code alone is sufficient.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Codes:
             self._forget(code)
 
     def serve(self, exchange: Exchange) -> None:
-        """Answer a page that sends a code as a bearer token. If the request is refused, the code stays valid."""
+        """Respond to a page that sends a code as a bearer token. If the request is refused, the code stays valid."""
         code = exchange.request.headers.get("authorization", "").removeprefix("Bearer ")
         if not self.token_of(code):
             exchange.respond(403, b"this link has been used\n")
@@ -97,7 +97,7 @@ class Codes:
 
 
 def _is_trusted(request: HttpRequest) -> bool:
-    """Return whether a request is from this user or root; always True on other systems than Linux."""
+    """Return whether a request is from this user or root; always True on systems other than Linux."""
     if sys.platform != "linux":
         return True
     return owner_of((request.peer, request.peer_port), (request.address, request.port)) in (

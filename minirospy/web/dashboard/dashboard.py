@@ -37,8 +37,8 @@ class Dashboard:
     ) -> None:
         """``options.foxglove_port`` is the port of the page and its data; the 3D view opens ``rviz_file``.
 
-        ``bags``: the bags that may be opened, by default those in the working folder. ``publishes_joints``: publish joints as
-        joint_state_publisher_gui does, even if no page is open.
+        ``bags``: the bags that may be opened, by default all bags in the working folder. ``publishes_joints``: publish
+        joints as joint_state_publisher_gui does, even if no page is open.
         """
         master_uri = node.master_uri
         self.codes = Codes()
@@ -56,11 +56,11 @@ class Dashboard:
 
     @property
     def port(self) -> int:
-        """Return the port of the page after :meth:`start`."""
+        """Return the page's port, after :meth:`start`."""
         return self.bridge.listeners["foxglove"].port
 
     async def start(self) -> None:
-        """Listen. Raise BridgeError."""
+        """Start listening. Raise BridgeError if a port cannot be opened."""
         await self.bridge.start()
         if self._joints.always_publishes:
             self._joints.start_work()
@@ -69,8 +69,8 @@ class Dashboard:
         """Disconnect all clients. Idempotent."""
         self.codes.close()
         async with AsyncExitStack() as closing:
-            # Close in reverse order, and all even if one fails. Players use the bridge's graph until their sessions
-            # end.
+            # Close in reverse order, and close all parts even if one fails. Players use the bridge's graph until
+            # their sessions end.
             for part in (
                 self._tools,
                 self._board,

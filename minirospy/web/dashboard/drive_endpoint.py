@@ -3,10 +3,9 @@
 A client of the sub-protocol sends ``{"topic", "twist": [x, y, z, roll, pitch, yaw]}`` (m/s, rad/s) or ``{"topic", "axes":
 [...], "buttons": [...]}`` repeatedly while a control is held, and ``{"leave": topic}`` when it no longer drives a topic.
 The server sends ``{"writes": bool}`` first, ``{"stopped": topic}`` after it has stopped a topic without commands, and
-``{"error": text, "topic"}``.
-The last message of each topic is zero, whether the control is released or the connection is lost. This process publishes
-it; for a client that stops sending, a separate thread does (:mod:`minirospy.runtime.stop_guard`), even if the event loop is
-blocked.
+``{"error": text, "topic"}``. The last message on each topic is a zero velocity, whether the control is released or the
+connection is lost. This process publishes it; if a client stops sending, a separate thread does
+(:mod:`minirospy.runtime.stop_guard`), even if the event loop is blocked.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ _log = logging.getLogger(__name__)
 
 _MAX_TOPICS = 20
 _MAX_VALUES = 100
-_MAX_COMMAND_LENGTH = 20_000  # characters in a command
+_MAX_COMMAND_LENGTH = 20_000  # characters
 
 _MAX_AXIS = 3.4028234663852886e38  # largest float32
 
@@ -75,7 +74,7 @@ class Velocity:
 
 @dataclass(frozen=True)
 class Joystick:
-    """A sensor_msgs/Joy: axes from -1 to 1, buttons that are 0 or 1."""
+    """A sensor_msgs/Joy: axes from -1 to 1, and buttons that are 0 or 1."""
 
     axes: tuple[float, ...]
     buttons: tuple[int, ...]
@@ -92,14 +91,14 @@ class Joystick:
 
 @dataclass(frozen=True)
 class Command:
-    """A client's command: a topic, and the message to publish; None: the client no longer drives the topic."""
+    """A client's command: a topic, and the message to publish, which is None if the client no longer drives the topic."""
 
     topic: str
     held: Velocity | Joystick | None
 
 
 def parse(text: str) -> Command:
-    """Parse a command. Raise ValueError."""
+    """Parse a command. Raise ValueError if it is invalid."""
     if len(text) > _MAX_COMMAND_LENGTH:
         raise ValueError(f"it has more than {_MAX_COMMAND_LENGTH} characters")
     try:
@@ -157,7 +156,7 @@ class DriveEndpoint:
         self._guard = StopGuard()
 
     def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError."""
+        """Return the sub-protocol to use. Raise LookupError if none of ``offered`` is supported."""
         if SUBPROTOCOL in offered:
             return SUBPROTOCOL
         raise LookupError(f"sub-protocol {SUBPROTOCOL} is required")
@@ -197,7 +196,7 @@ class DriveSession:
         self._send(error="binary messages have no meaning here")
 
     def ended(self) -> None:
-        """Stop and leave every topic that the client drives."""
+        """Stop and release every topic that the client drives."""
         for topic in list(self._driven):
             try:
                 self._driven.pop(topic).close()
@@ -228,7 +227,10 @@ class DriveSession:
 
 
 class _Driven:
-    """A topic that a client drives. Commands arrive on the loop; the guard's thread stops it if they stop arriving."""
+    """A topic that a client drives.
+
+    Commands arrive on the loop; the guard's thread stops the topic if commands stop arriving.
+    """
 
     def __init__(
         self,
@@ -238,7 +240,7 @@ class _Driven:
         held: Velocity | Joystick,
         stopped: Callable[[str], None],
     ) -> None:
-        """Raise BridgeError if clients may not publish the topic, or it has another type."""
+        """Raise BridgeError if clients may not publish the topic, or the topic has another type."""
         self.kind = type(held)
         self._graph = graph
         self._guard = guard
@@ -246,20 +248,23 @@ class _Driven:
         self._stopped = stopped
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
-        # The lock protects the following: commands on the loop and the guard's zero are published one after the
-        # other.
+        # The lock protects the following attributes, so that commands on the loop and the guard's zero velocity are
+        # published one after the other.
         self._last = held.zero()
         self._deadline = math.inf
         self._publication: Publication = graph.advertise(graph.node.resolve(topic), _type_of(held))
         self._joining: asyncio.Task[None] | None = None
 
     def hold(self, held: Velocity | Joystick) -> None:
-        """Publish a command, and zero if no other arrives in time. Raise BridgeError if it could not be stopped."""
+        """Publish a command, and a zero velocity if no further command arrives in time.
+
+        Raise BridgeError if the command could not be stopped.
+        """
         deadline = math.inf if held.is_zero else time.monotonic() + SILENT_SECONDS
         if held.is_zero:
             self._guard.disarm(self._silent)
         else:
-            # Arm the guard before publishing: never send a command that could not be stopped.
+            # Arm the guard before publishing, so that no command is sent that could not be stopped.
             self._guard.arm(self._silent, deadline)
         with self._lock:
             self._deadline = deadline
@@ -268,32 +273,35 @@ class _Driven:
             self._joining = self._graph.spawn(self._publish_joined())
 
     def close(self) -> None:
-        """Publish zero, and leave the topic."""
+        """Publish a zero velocity and release the topic."""
         self._guard.disarm(self._silent)
         with self._lock:
             self._deadline = math.inf
             if not self._last.is_zero:
                 self._publish(self._last.zero())
         if self._joining and not self._joining.done():
-            # That task publishes the zero; keep the topic open until then.
+            # That task publishes the zero velocity; keep the topic open until then.
             self._joining.add_done_callback(lambda _: self._publication.close())
         else:
             self._publication.close()
 
     def _silent(self) -> None:
-        """Publish zero because no command has arrived. Runs in the guard's thread."""
+        """Publish a zero velocity because no command has arrived. Runs in the guard's thread."""
         with self._lock:
             if self._deadline > time.monotonic():
-                return  # a command has arrived just now, or the topic was left
+                return  # a command has just arrived, or the topic was released
             self._deadline = math.inf
-            # If the node is shut down, the topic is closed, and nothing is published on it any more.
+            # If the node is shut down, the topic is closed, and no message can be published on it any more.
             with contextlib.suppress(ROSException):
                 self._publish(self._last.zero())
-        with contextlib.suppress(RuntimeError):  # the loop is closed
+        with contextlib.suppress(RuntimeError):  # the loop has been closed
             self._loop.call_soon_threadsafe(self._stopped, self._topic)
 
     def _publish(self, held: Velocity | Joystick) -> None:
-        """Publish now or, if subscribers are still connecting, the newest command after that. The caller holds the lock."""
+        """Publish now or, if subscribers are still connecting, publish the newest command once they are connected.
+
+        The caller must hold the lock.
+        """
         self._last = held
         if self._publication.has_joined:
             self._publication.publish(self._body())

@@ -1,7 +1,7 @@
-"""The files of the page, and their HTTP headers. Pure except for reading the folder once.
+"""The page's files and their HTTP headers. Pure except for reading the folder once.
 
-Paths are served from a table of the folder's files, so a request cannot name any other file.
-The page has no secrets, so it needs no token; its WebSocket does. Source: CSP level 3 (w3.org/TR/CSP3).
+Paths are served from a table of the folder's files, so that a request cannot name any other file. The page contains no
+secrets, so it needs no token, but its WebSocket does. Source: CSP level 3 (w3.org/TR/CSP3).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _TYPES = {
     ".svg": "image/svg+xml",
     ".txt": "text/plain; charset=utf-8",
 }
-"""Served file types; other files in the folder are not served."""
+"""Served file types. Other files in the folder are not served."""
 
 SECURITY = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; worker-src 'self'; connect-src 'self'; "
@@ -38,7 +38,7 @@ SECURITY = {
     # The browser caches the file but revalidates its ETag at each start, so that releases are never mixed.
     "Cache-Control": "no-cache",
 }
-"""The security headers of the page: no inline scripts, no content from other sites, no embedding in other pages."""
+"""The page's security headers: no inline scripts, no content from other sites, no embedding in other pages."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class PageFile:
 
 
 def read_folder(folder: Path = FOLDER) -> dict[str, PageFile]:
-    """Return the files by request path; ``/`` is index.html."""
+    """Return the files by request path; the path ``/`` is index.html."""
     found = {}
     for path in sorted(folder.rglob("*")):
         content_type = _TYPES.get(path.suffix)
@@ -67,7 +67,7 @@ def read_folder(folder: Path = FOLDER) -> dict[str, PageFile]:
 
 
 def handlers(files: Mapping[str, PageFile]) -> dict[str, HttpHandler]:
-    """Return the request handler of each file."""
+    """Return the request handler for each file."""
     return {path: partial(_serve, file) for path, file in files.items()}
 
 

@@ -1,10 +1,9 @@
-"""The joints of a robot for the page: joint_state_publisher_gui with its sliders in a browser, with JSON over WebSocket.
+"""A robot's joints for the page: joint_state_publisher_gui with its sliders in a browser, as JSON over WebSocket.
 
 A client sends ``{"op": NAME, ...}``: set {positions: {joint: number}}, center, randomize, publish {on}, reload. The
-server sends
-``{"writes"}``, ``{"joints": {"robot", "rows", "rate", ...} or null, "why"}``, ``{"state": {"positions", "publishing",
-"others"}}`` and ``{"error"}``. All clients set the same joints. Parameters and zeros: see
-minirospy/ros/robot_state_publisher/joint_parameters.py.
+server sends ``{"writes"}``, ``{"joints": {"robot", "rows", "rate", ...} or null, "why"}``, ``{"state": {"positions",
+"publishing", "others"}}`` and ``{"error"}``. All clients set the same joints. See
+minirospy/ros/robot_state_publisher/joint_parameters.py for parameters and zero positions.
 """
 
 from __future__ import annotations
@@ -55,7 +54,10 @@ _FARTHEST = 1e6
 
 
 class JointEndpoint(JsonEndpoint["JointSession"]):
-    """Serves the joints of robot_description. ``always_publishes``: publish as the node joint_state_publisher_gui does."""
+    """Serves the joints in robot_description.
+
+    ``always_publishes``: publish even without clients, as the node joint_state_publisher_gui does.
+    """
 
     def __init__(
         self, node: Node, graph: Callable[[], SharedGraph], *, always_publishes: bool = False
@@ -65,7 +67,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.always_publishes = always_publishes
         self.joints: JointStates | None = None
         self.parameters: JointParameters | None = None
-        self.why = ""  # reason why there are no joints
+        self.why = ""  # the reason why there are no joints
         self.warnings: list[str] = []
         self.kinds: dict[str, str] = {}
         self.robot = ""
@@ -89,7 +91,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return super().open(client)
 
     def left(self, session: JointSession) -> None:
-        """See :meth:`JsonEndpoint.left`: stop publishing when the last client has left."""
+        """See :meth:`JsonEndpoint.left`. Stops publishing when the last client has left."""
         if not self.sessions:
             self._graph().unwatch(self._graph_changed)
             self.publish(is_on=False)
@@ -137,7 +139,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             now = loop.time()
             if now >= next_load:
                 next_load = now + _RELOAD_SECONDS
-                with contextlib.suppress(MinirospyError):  # the master is unreachable: retry later
+                with contextlib.suppress(MinirospyError):  # the master cannot be reached: retry later
                     await self.load()
             end = next_load
             if self.parameters and self.is_publishing:
@@ -153,7 +155,10 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self._follow([])
 
     async def load(self, *, is_forced: bool = False) -> None:
-        """Read the parameters, and parse the description again if one has changed. Raise MinirospyError."""
+        """Read the parameters, and parse the description again if one has changed.
+
+        Raise MinirospyError if the master cannot be reached.
+        """
         private = await self.node.get_param("~", {})
         values: dict[str, object] = {}
         missing = object()
@@ -188,7 +193,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             if (why := why_illegal(topic))
         ]
 
-        # Clients are sent each generation once, so complete it before incrementing the counter.
+        # Clients receive each generation once, so complete its data before incrementing the counter.
         self._values, self.parameters, self.joints = values, parameters, joints
         self.robot, self.kinds, self.warnings, self.why = robot, kinds, warnings, missing_because
         self.generation += 1
@@ -250,7 +255,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.changed()
 
     def center(self) -> None:
-        """Set all joints to their zeros."""
+        """Set all joints to their zero positions."""
         for joint in self._free().values():
             joint.position = joint.zero
         self.changed()
@@ -286,9 +291,9 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return {"joints": found, "why": ""}
 
     def state(self) -> dict[str, object]:
-        """Return the positions of all joints, including mimic joints, and the other publishers of the topic."""
+        """Return the positions of all joints, including mimic joints, and the topic's other publishers."""
         values = self.joints.values() if self.joints else None
-        # A source may publish infinity or NaN, which JSON lacks.
+        # A source may publish infinity or NaN, which JSON cannot represent.
         pairs = zip(values.name, values.position, strict=False) if values else ()
         positions = {name: position if math.isfinite(position) else None for name, position in pairs}
         publishers = self._graph().snapshot.publishers.get(self.node.resolve(_TOPIC), ())
@@ -319,7 +324,7 @@ class JointSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: it sets no joints"
 
     async def follow(self) -> None:
-        """Send the joints, if they have been read again, and their positions."""
+        """Send the joints, if they were read again, and the joints' positions."""
         if self._generation != self._endpoint.generation:
             self._generation = self._endpoint.generation
             self.send(self._endpoint.description())
@@ -345,7 +350,7 @@ class JointSession(JsonSession):
 
 
 def _finite(value: float) -> float:
-    """Return a number that JSON can represent: limits may be infinite."""
+    """Return a number that JSON can represent, because limits may be infinite."""
     return min(max(value, -_FARTHEST), _FARTHEST) if not math.isnan(value) else 0.0
 
 
@@ -359,13 +364,16 @@ def _positions(fields: Fields) -> dict[str, float]:
 def _described(
     parameters: JointParameters, warn: Callable[[str], None]
 ) -> tuple[JointStates, str, dict[str, str]]:
-    """Return the description's joints, the robot's name and the joints' types. Raise UrdfError or JointError."""
+    """Return the description's joints, the robot's name and the joints' types.
+
+    Raise UrdfError or JointError if the description is invalid.
+    """
     joints = read_joints(parameters.description, parameters.options, warn)
     return (joints, *_kinds(parameters.description))
 
 
 def _kinds(description: str) -> tuple[str, dict[str, str]]:
-    """Return the robot's name and the types of its joints, which determine their units."""
+    """Return the robot's name and its joints' types, which determine the units."""
     root = parse_xml(description, "robot_description")
     kinds = {
         joint.attributes.get("name", ""): joint.attributes.get("type", "") for joint in root.all("joint")

@@ -1,8 +1,9 @@
-"""Sessions of the page's endpoints: clients send operations as JSON, and receive answers as JSON.
+"""Sessions of the page's endpoints: clients send operations and receive responses as JSON.
 
 An operation is an object with its name, ``{"op": NAME, ...}``. If the client lacks the permission, the string is too long
-or not an operation, or the operation fails, the answer is ``{"error": text}`` with one line. Operations run one after
-another in a task of the session. The state that a client is shown is read after changes, not at regular intervals.
+or not an operation, or the operation fails, the response is ``{"error": text}`` with one line of text. Operations run one
+after another in a task of the session. The state that is sent to a client is read after changes, not at regular
+intervals.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _log = logging.getLogger(__name__)
 
 _MAX_ERROR_LENGTH = 1000
 _VALUE_FACTOR = 4
-"""Memory of a parsed operation per byte of its string, as for objects and lists of numbers."""
+"""Memory that a parsed operation takes per byte of its string, as for objects and lists of numbers."""
 
 _INTERNAL_ERROR = 1011  # WebSocket close code, RFC 6455, section 7.4.1
 
@@ -48,13 +49,13 @@ class JsonSession:
     """One client's session. Subclasses provide the table of operations, and send changes in :meth:`follow`."""
 
     subject: ClassVar[str]
-    """The object of the operations, for error messages."""
+    """The subject of the operations, for error messages."""
 
     owners_only: ClassVar[str] = ""
     """The operations that require the token, for error messages; empty if other clients may use some of them."""
 
     longest: ClassVar[int] = 256_000
-    """Characters in an operation: parsing it delays all clients."""
+    """Maximum characters in an operation, because parsing it delays all clients."""
 
     most_waiting: ClassVar[int] = 100
     pace: ClassVar[float] = 0.05  # minimum seconds between calls of :meth:`follow`
@@ -65,9 +66,9 @@ class JsonSession:
         self.is_ended = False
         self._handlers = handlers
         self._operations: deque[tuple[str, Fields, int]] = deque()
-        """Name, fields and memory (bytes) of the queued operations."""
-        self._carried_out_size = 0  # memory of the running operations, in bytes
-        self._operation_size = 0  # memory of the last received operation, in bytes
+        """The name, fields and memory (bytes) of each queued operation."""
+        self._carried_out_size = 0  # memory used by the running operations, in bytes
+        self._operation_size = 0  # memory used by the last received operation, in bytes
         self._thread = ThreadPoolExecutor(1, type(self).__name__)
         self._loop = asyncio.get_running_loop()
         self._wake = asyncio.Event()
@@ -81,13 +82,13 @@ class JsonSession:
     # --- for subclasses
 
     def refusal(self) -> str:
-        """Return why this client may not execute operations, "" if it may."""
+        """Return the reason why this client may not execute operations, or "" if it may."""
         if self.owners_only and not self.client.is_owner:
             return self.client.why_not_owner(self.owners_only)
         return ""
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """Return an operation's name and fields. Raise ValueError, TypeError or LookupError."""
+        """Return an operation's name and fields. Raise ValueError, TypeError or LookupError if they are invalid."""
         return str(fields["op"]), fields
 
     async def started(self) -> None:
@@ -97,7 +98,7 @@ class JsonSession:
             self.send_error(why)
 
     async def follow(self) -> float | None:
-        """Send what has changed; return the seconds until it should be called again, None for after the next change."""
+        """Send the changes; return the seconds until the next call, or None to wait for the next change."""
         return None
 
     async def left(self) -> None:
@@ -113,23 +114,23 @@ class JsonSession:
         self._wake.set()
 
     def count(self) -> None:
-        """Add the memory used for this client to the server's account."""
+        """Add the memory used for this client to the server's total."""
         self.client.holds(self._carried_out_size + sum(size for _, _, size in self._operations))
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """Run a blocking function in the session's thread, after those submitted before."""
+        """Run a blocking function in the session's thread, after previously submitted functions."""
         return await self._loop.run_in_executor(self._thread, work)
 
     def send(self, fields: Fields) -> None:
-        """Send an answer."""
+        """Send a response."""
         self.client.send_text(json.dumps(fields))
 
     def send_error(self, text: str, fields: Fields | None = None) -> None:
-        """Send an error; ``fields`` are those of the operation."""
+        """Send an error; ``fields`` are the operation's fields."""
         self.send({"error": text[:_MAX_ERROR_LENGTH]})
 
     def send_answer(self, answer: object, fields: Fields) -> None:
-        """Send the result of an operation."""
+        """Send an operation's result."""
         self.client.send_text(json.dumps(answer))
 
     # --- from the connection
@@ -160,7 +161,7 @@ class JsonSession:
         self.send_error("binary messages have no meaning here")
 
     def ended(self) -> None:
-        """End the session. Idempotent: resources are released once, without interruption."""
+        """End the session. Idempotent: resources are released only once, without interruption."""
         if not self.is_ended:
             self.is_ended = True
             self._task.cancel()
@@ -168,15 +169,15 @@ class JsonSession:
     # --- changes
 
     def changed(self) -> None:
-        """Schedule a call of :meth:`follow`. Must be called on the loop."""
+        """Schedule a call to :meth:`follow`. Must be called on the loop."""
         self._next_look = min(self._next_look, self._looked + self.pace)
         self._wake.set()
 
     def post_change(self) -> None:
-        """Schedule a call of :meth:`follow` from any thread, at any rate."""
+        """Schedule a call to :meth:`follow`. May be called from any thread, at any rate."""
         if not self._is_change_posted:
             self._is_change_posted = True
-            with contextlib.suppress(RuntimeError):  # the loop is closed
+            with contextlib.suppress(RuntimeError):  # the loop has been closed
                 self._loop.call_soon_threadsafe(self.changed)
 
     # --- the session's task
@@ -218,8 +219,8 @@ class JsonSession:
             except Exception as error:  # noqa: BLE001 - it may succeed the next time; until then the page says so
                 self._reporter.report(error)
                 if not self._has_failed:
-                    # Other errors' messages are for the terminal only: they may contain details that clients must not
-                    # see.
+                    # Show other errors' messages only on the terminal, because they may contain details that clients
+                    # must not see.
                     why = (
                         _line(error) if isinstance(error, MinirospyError | OSError) else type(error).__name__
                     )
@@ -230,7 +231,7 @@ class JsonSession:
                 self._next_look = min(self._next_look, now + pause)
 
     async def carry_out(self, name: str, fields: Fields) -> None:
-        """Execute an operation, and send its answer or its error."""
+        """Execute an operation, and send its result or its error."""
         try:
             answer = await self._handlers[name](fields)
         except (MinirospyError, OSError) as error:
@@ -249,7 +250,7 @@ _S = TypeVar("_S", bound=JsonSession)
 
 
 class JsonEndpoint(Generic[_S]):
-    """Opens a session for each client of a sub-protocol; ``session`` creates it."""
+    """Opens a session for each client that uses a sub-protocol; ``session`` creates the session."""
 
     def __init__(self, subprotocol: str, session: Callable[[WebClient], _S]) -> None:
         self.sessions: set[_S] = set()
@@ -261,7 +262,7 @@ class JsonEndpoint(Generic[_S]):
         self._is_change_posted = False
 
     def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError."""
+        """Return the sub-protocol to use. Raise LookupError if none of ``offered`` is supported."""
         if self._subprotocol in offered:
             return self._subprotocol
         raise LookupError(f"sub-protocol {self._subprotocol} is required")
@@ -281,7 +282,7 @@ class JsonEndpoint(Generic[_S]):
         self.left(session)
 
     def left(self, session: _S) -> None:
-        """Handle the end of a session."""
+        """Handle a session that has ended."""
 
     def changed(self) -> None:
         """Notify all sessions of a change. Must be called on the loop."""
@@ -290,10 +291,10 @@ class JsonEndpoint(Generic[_S]):
             session.changed()
 
     def post_change(self) -> None:
-        """Notify all sessions of a change from any thread, at any rate."""
+        """Notify all sessions of a change. May be called from any thread, at any rate."""
         if self._loop and not self._is_change_posted:
             self._is_change_posted = True
-            with contextlib.suppress(RuntimeError):  # the loop is closed
+            with contextlib.suppress(RuntimeError):  # the loop has been closed
                 self._loop.call_soon_threadsafe(self.changed)
 
     def spawn(self, work: Coroutine[object, object, None]) -> asyncio.Task[None]:
@@ -305,7 +306,7 @@ class JsonEndpoint(Generic[_S]):
 
     def _spawned_ended(self, task: asyncio.Task[None]) -> None:
         self._tasks.discard(task)
-        # MinirospyErrors are reported to the client, if it is still connected.
+        # MinirospyErrors are reported to the client if the client is still connected.
         if not task.cancelled() and (error := task.exception()) and not isinstance(error, MinirospyError):
             _log.error("%s: %s", type(self).__name__, error, exc_info=error)
 
@@ -322,8 +323,8 @@ class JsonEndpoint(Generic[_S]):
 async def wait_until(event: asyncio.Event, end: float) -> None:
     """Wait for an event, at most until ``end`` on the loop's clock; after the timeout, the clock is past ``end``."""
     # Do not use asyncio.wait_for: before Python 3.12 it may lose a cancellation that coincides with the event. Add
-    # the clock's resolution: a loop runs timers that much early, and callers that compare times would spin until the
-    # clock advances.
+    # the clock's resolution, because a loop runs timers early by that much, and callers that compare times would spin
+    # until the clock advances.
     loop = asyncio.get_running_loop()
     timer = loop.call_at(end + _CLOCK_SECONDS, event.set) if end < math.inf else None
     try:
@@ -334,7 +335,7 @@ async def wait_until(event: asyncio.Event, end: float) -> None:
 
 
 def text_of(fields: Fields, name: str) -> str:
-    """Return a string field of an operation. Raise LookupError or TypeError."""
+    """Return a string field of an operation. Raise LookupError if it is missing, TypeError if it is not a string."""
     value = fields[name]
     if not isinstance(value, str):
         raise TypeError(f"{name} is a text")
@@ -342,7 +343,10 @@ def text_of(fields: Fields, name: str) -> str:
 
 
 def texts_of(fields: Fields, name: str) -> list[str]:
-    """Return a field of an operation that is a list of strings. Raise LookupError or TypeError."""
+    """Return an operation's field that is a list of strings.
+
+    Raise LookupError if it is missing, TypeError if it is not a list.
+    """
     value = fields[name]
     if not isinstance(value, list):
         raise TypeError(f"{name} is a list of texts")
@@ -350,7 +354,7 @@ def texts_of(fields: Fields, name: str) -> list[str]:
 
 
 def number(value: object) -> float:
-    """Return a field of an operation as a finite number. Raise TypeError or OverflowError."""
+    """Return an operation's field as a finite number. Raise TypeError or OverflowError if it is not one."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise TypeError(f"{value!r:.40} is not a number")
     return float(value)

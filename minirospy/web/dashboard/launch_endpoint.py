@@ -36,7 +36,7 @@ _LOG_SECONDS = 0.2
 _STOPPING_SECONDS = 0.2
 _MAX_RUNS = 50
 _MAX_ENDED = 20
-"""Ended launches that are kept, with their last lines."""
+"""Ended launches that are stored with their last lines."""
 
 _TAIL_BYTES = 64 * 1024
 
@@ -54,7 +54,7 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         self._restarting: set[int] = set()
 
     def start(self, file: LaunchFile, path: Path, args: Mapping[str, str]) -> None:
-        """Start a launch file. Raise UsageError."""
+        """Start a launch file. Raise UsageError if it cannot be started."""
         if self.is_closed:
             raise UsageError("the dashboard is shut down")
         if sum(not run.is_ended for run in self.runs.values()) >= _MAX_RUNS:
@@ -65,9 +65,9 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         self.changed()
 
     async def restart(self, run: LaunchRun) -> None:
-        """Stop a launch, and start its file again with the same arguments. Raise UsageError.
+        """Stop a launch, and start its file again with the same arguments.
 
-        Do nothing if another client is restarting or has restarted it.
+        Do nothing if another client is restarting or has restarted it. Raise UsageError if the file cannot be started.
         """
         if run.id in self._restarting or run.id not in self.runs:
             return
@@ -81,14 +81,14 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
             self._restarting.discard(run.id)
 
     def changed(self) -> None:
-        """See :meth:`JsonEndpoint.changed`; also discards all but the newest ended launches."""
+        """See :meth:`JsonEndpoint.changed`. Also discards all but the newest ended launches."""
         ended = [run.id for run in self.runs.values() if run.is_ended and run.id not in self._restarting]
         for number in ended[:-_MAX_ENDED]:
             del self.runs[number]
         super().changed()
 
     async def close(self) -> None:
-        """End all sessions and all launches, and wait for them."""
+        """End all sessions and all launches, and wait until they have ended."""
         self.is_closed = True
         runs = list(self.runs.values())
         for run in runs:
@@ -113,7 +113,7 @@ class _Tail:
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)
-        # Query this before reading: what the node wrote before it exited is in the file.
+        # Query this before reading, so that everything the node wrote before it exited is in the file.
         has_exited = self.run.has_exited(self.node)
         path = self.run.log_file(self.node)
         if path is None:
@@ -128,8 +128,8 @@ class _Tail:
                 data = file.read(_TAIL_BYTES)
         except OSError:
             return ""
-        # Return whole lines, because a character may be split. Exceptions: a very long line, and the last line after
-        # the exit.
+        # Return whole lines, because the end may be in the middle of a character. Exceptions: a very long line, and
+        # the last line after the exit.
         end = data.rfind(b"\n") + 1
         is_whole = not end if len(data) == _TAIL_BYTES else has_exited
         data = data if is_whole else data[:end]
@@ -162,7 +162,7 @@ class LaunchSession(JsonSession):
 
     async def follow(self) -> float | None:
         """Send the launches, if one has changed, and new lines of the log."""
-        # Check before sending: a change after this triggers another call.
+        # Check this before sending, because a change after the check triggers another call.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()
         is_growing = await self._send_log()
@@ -191,7 +191,7 @@ class LaunchSession(JsonSession):
         self._run_of(fields).stop()
 
     async def _restart(self, fields: Fields) -> None:
-        # The restart continues even if the page is closed; the session shows its progress meanwhile.
+        # The restart continues even if the page is closed; meanwhile, the session shows the progress.
         self._endpoint.spawn(self._report_restart(self._run_of(fields)))
 
     async def _report_restart(self, run: LaunchRun) -> None:
@@ -232,7 +232,7 @@ class LaunchSession(JsonSession):
             self.client.send_text_message("launches", text.encode(), newest_only=True)
 
     async def _send_log(self) -> bool:
-        """Send new lines; return whether more may come without a change of the launch."""
+        """Send new lines; return whether more lines may arrive without a change in the launch."""
         tail = self._tail
         if tail is None:
             return False
@@ -242,7 +242,7 @@ class LaunchSession(JsonSession):
             found = {"log": {"id": tail.run.id, "node": tail.node}, "text": text, "isFirst": tail.is_first}
             tail.is_first = False
             self.send(found)
-        # The file may have more than one read returns.
+        # The file may contain more than one read returns.
         return is_growing or bool(tail.node and text)
 
 

@@ -45,7 +45,10 @@ class LaunchFiles:
         return sorted(found)
 
     def path_of(self, file: LaunchFile) -> Path:
-        """Return the path of a launch file that was found. Raise NotFoundError: others are not started."""
+        """Return the path of a launch file that was found.
+
+        Raise NotFoundError if it was not found: such files are not started.
+        """
         if not self._found:
             self.scan()
         try:
@@ -57,7 +60,7 @@ class LaunchFiles:
 
 
 def _launch_files(folder: Path, packages: set[Path], depth: int) -> Iterator[Path]:
-    """Yield the launch files of a package, except for those of packages inside it."""
+    """Yield a package's launch files, except those of packages inside it."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:

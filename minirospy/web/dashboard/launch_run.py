@@ -43,7 +43,7 @@ class NodeState(NamedTuple):
 
 
 class RunState(NamedTuple):
-    """A launch: starting, running, stopping or ended; ``error`` of an ended one, "" for none."""
+    """A launch: starting, running, stopping or ended; ``error``: the error that ended the launch, "" if there was none."""
 
     id: int
     package: str
@@ -101,7 +101,10 @@ class _PageLauncher(Launcher):
 
 
 class LaunchRun:
-    """One launch file, run in a thread. ``on_change`` is called there when :meth:`state` or ``output`` has changed."""
+    """One launch file, run in a thread.
+
+    ``on_change`` is called in that thread when :meth:`state` or ``output`` has changed.
+    """
 
     _ids: ClassVar[Iterator[int]] = itertools.count(1)
 
@@ -129,19 +132,19 @@ class LaunchRun:
         self._exited: dict[str, Process] = {}
         self._known: dict[str, Process] = {}
         self._lock = threading.Lock()
-        # A daemon thread: if this process exits without stopping the launch, the launcher's guardian process ends the
-        # nodes.
+        # A daemon thread, because if this process exits without stopping the launch, the launcher's guardian process
+        # ends the nodes.
         self._thread = threading.Thread(target=self._run, name=f"launch-{self.id}", daemon=True)
         self._thread.start()
 
     @property
     def is_ended(self) -> bool:
-        """Return whether the launch with all its nodes has ended."""
+        """Return whether the launch and all its nodes have ended."""
         return self._state == "ended"
 
     @property
     def is_stopping(self) -> bool:
-        """Return whether its nodes are being stopped."""
+        """Return whether the launch's nodes are being stopped."""
         return self._state == "stopping"
 
     @property
@@ -149,7 +152,7 @@ class LaunchRun:
         return self._state in ("stopping", "ended")
 
     def has_exited(self, node: str) -> bool:
-        """Return whether a node was started and no longer runs."""
+        """Return whether a node was started and is no longer running."""
         process = self._known.get(node)
         return process is not None and not process.is_running
 
@@ -163,12 +166,12 @@ class LaunchRun:
         return RunState(self.id, self.package, self.file, self.args, self._state, self._error, nodes)
 
     def log_file(self, node: str) -> Path | None:
-        """Return the file with a node's output; None if it does not exist yet."""
+        """Return the file with a node's output; or None if it does not exist yet."""
         process = self._known.get(node)
         return process.stdout_file if process else None
 
     def stop(self) -> None:
-        """Start to stop all nodes; do not wait. May be called from any thread."""
+        """Start stopping all nodes, without waiting. May be called from any thread."""
         with self._lock:
             self._is_stopped = True
             if self._state in ("starting", "running"):
@@ -182,7 +185,7 @@ class LaunchRun:
         self._thread.join()
 
     def end_node(self, name: str, *, restarts: bool) -> None:
-        """Stop one node and, with ``restarts``, start it again. Raise UsageError if it does not run."""
+        """Stop one node and, with ``restarts``, start it again. Raise UsageError if it is not running."""
         launcher, process = self._launcher, self._known.get(name)
         if not launcher or not process or not process.is_running or self._state != "running":
             raise UsageError(f"node [{name[:200]}] does not run")
@@ -195,7 +198,7 @@ class LaunchRun:
         try:
             self._launch()
         except KeyboardInterrupt:
-            pass  # the launch was stopped during the start
+            pass  # the launch was stopped while the node was starting
         except MinirospyError as error:
             self._error = str(error)
         except Exception as error:  # noqa: BLE001 - the page shows it

@@ -1,4 +1,4 @@
-"""A recording for the page: `rosbag record` as a child process, which completes its file when this process exits."""
+"""A recording for the page: `rosbag record` as a child process, which completes the bag file if this process exits."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""Timeouts for the end; long, because after SIGINT the file is completed, possibly on a slow disk."""
+"""Timeouts for stopping; long, because after SIGINT the file is completed, possibly on a slow disk."""
 
 _TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
 """Short timeouts while no file is open: a starting interpreter may lose a SIGINT that arrives in a callback of importlib."""
@@ -29,11 +29,14 @@ _TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
 _MAX_LINES = 20
 COMPRESSIONS = {".bag": {"none": [], "lz4": ["--lz4"], "bz2": ["--bz2"]},
                 ".mcap": {"none": [], "lz4": ["--lz4"], "zstd": ["--zstd"]}}  # fmt: skip
-"""Arguments of `rosbag record` by file type and compression."""
+"""Arguments for `rosbag record` by file type and compression."""
 
 
 class RecordingState(NamedTuple):
-    """A recording: its file's name, topics, seconds, bytes; ``is_ended``, and the error of an ended one, "" for none."""
+    """A recording: its file's name, topics, seconds, bytes.
+
+    ``is_ended``, and the error of an ended recording, "" if there is none.
+    """
 
     name: str
     topics: tuple[str, ...]
@@ -44,7 +47,10 @@ class RecordingState(NamedTuple):
 
 
 class Recording:
-    """One run of `rosbag record` into ``path``, whose suffix is .bag or .mcap. Raise MinirospyError."""
+    """One run of `rosbag record` into ``path``, whose suffix is .bag or .mcap.
+
+    Raise MinirospyError if it cannot be started.
+    """
 
     def __init__(self, path: Path, topics: Sequence[str], compression: str, master_uri: str) -> None:
         words = COMPRESSIONS[path.suffix].get(compression)
@@ -96,7 +102,7 @@ class Recording:
             "rosbag record",
             command,
             environ={**os.environ, "PYTHONUNBUFFERED": "1", "ROS_MASTER_URI": self._master_uri},
-            # -m imports from the working folder first: avoid a folder with the user's own modules.
+            # -m imports from the working folder first, so avoid a folder that contains the user's own modules.
             folder=Path(minirospy.__file__).parents[2],
             stdout=subprocess.PIPE,
             log_errors=True,
@@ -114,7 +120,7 @@ class Recording:
 
     def state(self) -> RecordingState:
         """Return the current state."""
-        # Query this first: after the exit the sizes are final.
+        # Query this first, because the sizes are final only after the exit.
         status = self._process.exit_code
         size = 0
         for path in self._paths:
@@ -124,7 +130,7 @@ class Recording:
                 continue
         seconds = self._seconds if self._seconds is not None else time.monotonic() - self._started
         error = ""
-        # A starting interpreter that is stopped may also exit with status 0.
+        # An interpreter that is stopped while it starts may also exit with status 0.
         if status is not None and self._process.is_ending and not size:
             error = "it was stopped before it had started: nothing was recorded"
         elif status:

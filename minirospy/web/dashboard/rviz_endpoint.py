@@ -1,9 +1,9 @@
-"""Read and save .rviz files for the 3D view, with JSON over WebSocket: one answer per operation.
+"""Read and save .rviz files for the 3D view, with JSON over WebSocket: one response per operation.
 
 ``{"read": true}`` -> ``{"config": {...} | null, "name", "writes"}``: the command's file, null if it does not exist yet;
 ``{"save": config}`` -> ``{"name"}``: saved there, for clients with the read-write token; ``{"parse": text}`` ->
-``{"config"}`` and ``{"format": config}`` -> ``{"text"}`` for files of the browser. A failure is ``{"error": text}``.
-Operations cannot name a file.
+``{"config"}`` and ``{"format": config}`` -> ``{"text"}`` for files that the browser opens or saves. A failure is
+``{"error": text}``. Operations cannot name a file.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _T = TypeVar("_T")
 
 
 def read_file(path: Path) -> dict[str, object] | None:
-    """Return the contents of a .rviz file, None if there is none. Raise RvizFileError."""
+    """Return the contents of a .rviz file, or None if it does not exist. Raise RvizFileError if it is invalid."""
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
             text = file.read(MAX_CHARACTERS + 1)
@@ -46,12 +46,12 @@ def read_file(path: Path) -> dict[str, object] | None:
 
 
 def _write_file(path: Path, text: str) -> None:
-    """Replace a file atomically, so that it is never half written. Raise RvizFileError."""
-    # Write to a link's target: the link stays, and the target keeps its permissions.
+    """Replace a file atomically, so that it is never half written. Raise RvizFileError if that fails."""
+    # Write to a link's target, so that the link remains and the target keeps its permissions.
     file = path.resolve()
     part = file.with_name(f".{file.name}.part")
     try:
-        # The name is predictable: create_file() refuses a link that another user has put there.
+        # The file name is predictable: create_file() refuses a link that another user has created there.
         with os.fdopen(create_file(part, 0o666), "w", encoding="utf-8") as stream:
             stream.write(text)
         with contextlib.suppress(FileNotFoundError):
@@ -71,7 +71,7 @@ class RvizEndpoint(JsonEndpoint["RvizSession"]):
         super().__init__(SUBPROTOCOL, lambda client: RvizSession(self, client))
         self.file = file
         self.thread = ThreadPoolExecutor(1, "rviz-files")
-        """One thread for all sessions: parsing in parallel would delay the loop longer, and saves could conflict."""
+        """One thread for all sessions, because parsing in parallel would delay the loop longer, and saves could conflict."""
 
     async def close(self) -> None:
         """End all sessions after completing running saves."""
@@ -97,15 +97,15 @@ class RvizSession(JsonSession):
         super().__init__(client, handlers)
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """See :meth:`JsonSession.parse`: the name of an operation is its only field."""
+        """See :meth:`JsonSession.parse`. An operation's only field is named after the operation."""
         (name,) = fields
         return name, fields
 
     async def started(self) -> None:
-        """See :meth:`JsonSession.started`: sends nothing without a request."""
+        """See :meth:`JsonSession.started`. Sends nothing without a request."""
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """See :meth:`JsonSession.in_thread`: runs in the endpoint's thread."""
+        """See :meth:`JsonSession.in_thread`. Runs in the endpoint's thread."""
         return await asyncio.get_running_loop().run_in_executor(self._endpoint.thread, work)
 
     async def _read(self, _: Fields) -> Fields:
@@ -129,7 +129,7 @@ class RvizSession(JsonSession):
             parse_rviz(text)
             _write_file(file, text)
 
-        # Complete the save even if the page is closed meanwhile.
+        # Complete the save even if the page is closed in the meantime.
         await asyncio.shield(self._endpoint.spawn(self.in_thread(save)))
         return {"name": file.name}
 

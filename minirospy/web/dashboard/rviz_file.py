@@ -1,7 +1,7 @@
 """Parse and format the YAML of .rviz files: text -> plain values -> text that RViz reads. Pure.
 
-Both are implemented here in one pass, because PyYAML's loader and dumper take seconds for a file of 200 kB or, in their
-compiled form, hold the GIL for that time.
+Parsing and formatting are implemented here in one pass, because PyYAML's loader and dumper take seconds for a 200 kB file
+or, in their compiled form, hold the GIL for that time.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_CHARACTERS", "format_rviz", "parse_rviz"]
 
-MAX_CHARACTERS = 200_000  # RViz's own files have some 10,000
+MAX_CHARACTERS = 200_000  # RViz's own files have some 10,000 characters
 
 _MANAGER = "Visualization Manager"
 _MAX_DEPTH = 50
@@ -36,7 +36,7 @@ _SCALARS: tuple[tuple[re.Pattern[str], Callable[[str], object]], ...] = (
 """Values that are not strings; other YAML 1.1 types (dates, octal numbers) stay strings, as in RViz."""
 
 _PLAIN = re.compile(r"[A-Za-z0-9_/(](?:[A-Za-z0-9_/.;,()+=-]| (?=[^ #])|:(?=[^ ]))*")
-"""Strings that need no quotes, unless they look like a number to another parser."""
+"""Strings that need no quotes, unless another parser could read them as numbers."""
 
 
 def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
@@ -46,7 +46,7 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
     try:
         value = _built(yaml.parse(text, Loader=_LOADER), name)
     except yaml.MarkedYAMLError as error:
-        # For something that is missing at the end, the compiled parser reports the line after the last one.
+        # If something is missing at the end, the compiled parser reports the line after the last one.
         line = min(error.problem_mark.line, text.count("\n")) + 1 if error.problem_mark else 1
         raise RvizFileError(name, line, f"not YAML: {error.problem}") from None
     except (yaml.YAMLError, ValueError) as error:
@@ -58,7 +58,7 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
 
 
 def _built(events: Iterator[Event], name: str) -> object:
-    """Return the value of the document. Raise RvizFileError."""
+    """Return the document's value. Raise RvizFileError if it is invalid."""
     result: list[object] = []
     # The open collections, each with the key that has no value yet; the first one is the stream.
     stack: list[tuple[list[object] | dict[str, object], list[str]]] = [(result, [])]
@@ -111,14 +111,14 @@ def _scalar(event: yaml.ScalarEvent) -> object:
 def format_rviz(config: Mapping[str, object]) -> str:
     """Return the text of a .rviz file as RViz writes it: keys sorted, lists indented below their key.
 
-    Raise RvizFileError if it is nested more deeply than :func:`parse_rviz` accepts.
+    Raise RvizFileError if ``config`` is nested more deeply than :func:`parse_rviz` accepts.
     """
     return "".join(f"{line}\n" for line in _lines(config, 1)) or "{}\n"
 
 
 def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[str]:
     """Yield the lines of a nonempty map or list, nested in ``depth - 1`` others."""
-    # Limit the depth: each line passes through one generator per level, and is indented by each.
+    # Limit the depth, because each line passes through one generator per level and is indented once per level.
     if depth >= _MAX_DEPTH:
         raise RvizFileError("the file", 0, "nested too deeply")
     if isinstance(value, list):
@@ -130,7 +130,7 @@ def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[s
 
 
 def _after(start: str, value: object, separator: str, depth: int) -> Iterator[str]:
-    """Yield the lines for a value after a key or a dash."""
+    """Yield the lines for a value that follows a key or a dash."""
     if not isinstance(value, dict | list) or not value:
         yield f"{start} {_word(value)}"
         return

@@ -1,8 +1,8 @@
-"""Requests of the views that the Foxglove protocol lacks, about nodes, types and files, with JSON over WebSocket.
+"""Requests from the views about nodes, types and files, which the Foxglove protocol lacks, as JSON over WebSocket.
 
-A client sends ``{"id": 1, "do": NAME, ...}``; the server answers ``{"id": 1, "result": ...}`` or ``{"id": 1, "error":
-"..."}``. The requests are in ``ToolsSession.handlers``. After ``watch`` it sends ``{"report": ...}`` every few seconds
-until ``unwatch``: the graph and all nodes, as minirospy/introspect/survey.py describes them.
+A client sends ``{"id": 1, "do": NAME, ...}``; the server responds with ``{"id": 1, "result": ...}`` or ``{"id": 1,
+"error": "..."}``. The requests are in ``ToolsSession.handlers``. After ``watch``, the server sends ``{"report": ...}``
+every few seconds until ``unwatch``, with the graph and all nodes, as minirospy/introspect/survey.py describes them.
 """
 
 from __future__ import annotations
@@ -40,25 +40,25 @@ SUBPROTOCOL = "minirospy.tools.v1"
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
 
-# bool comes first, because it is a subclass of int.
+# bool must come first, because it is a subclass of int.
 _TYPE_NAMES: Mapping[type, str] = {
     bool: "bool", int: "int", float: "double", str: "string", bytes: "binary", list: "list", tuple: "list", dict: "dictionary",
 }  # fmt: skip
 _MAX_PREVIEW = 200
-"""Characters of a value shown while the user types it."""
+"""Maximum characters of a value shown while the user types it."""
 
 _REPORT_SECONDS = 2.0
 _MAX_CONCURRENT = 4
-"""Concurrent requests of one client: nodes that do not answer take seconds."""
+"""Concurrent requests from one client, because nodes that do not respond take seconds."""
 
 
 class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
-    """Serves the requests of pages. ``tool`` is the caller_id for calls to nodes."""
+    """Serves requests from pages. ``tool`` is the caller_id for calls to nodes."""
 
     def __init__(self, master_uri: str, tool: str = "minirospy_dashboard") -> None:
         super().__init__(SUBPROTOCOL, lambda client: ToolsSession(self, client))
         self.parser = ThreadPoolExecutor(1, "tools-parser")
-        """Parses files one after another: parsing several at the same time would delay the loop longer."""
+        """Parses files one after another, because parsing several at the same time would delay the loop longer."""
         self._master_uri = master_uri
         self._tool = tool
         self._watching: set[ToolsSession] = set()
@@ -82,7 +82,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         return Graph(MasterProxy(self._master_uri, f"/{self._tool}"), self._tool)
 
     def watch(self, session: ToolsSession) -> None:
-        """Send a session a report of the graph now, and then every few seconds."""
+        """Send a graph report to a session now, and then every few seconds."""
         self._watching.add(session)
         if self._reporting is None or self._reporting.done():
             self._last = None
@@ -92,7 +92,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             session.report(_report_of(describe(self._last)))
 
     def unwatch(self, session: ToolsSession) -> None:
-        """Stop sending reports to a session; without sessions, nodes are not queried."""
+        """Stop sending reports to a session. Without sessions, nodes are not queried."""
         self._watching.discard(session)
         if not self._watching and self._reporting:
             self._reporting.cancel()
@@ -102,7 +102,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         while True:
             started = time.monotonic()
             try:
-                # Use one thread: if a survey is cancelled, the next one waits for its end.
+                # Use one thread, so that if a survey is cancelled, the next survey waits until it has ended.
                 now = await asyncio.get_running_loop().run_in_executor(self._surveyor, self._survey)
             except (MinirospyError, OSError) as error:
                 fields: Mapping[str, object] = {"trouble": str(error)}
@@ -112,7 +112,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             data = _report_of(fields)
             for session in tuple(self._watching):
                 session.report(data)
-            # If nodes answer slowly, pause for longer.
+            # If nodes respond slowly, pause for longer.
             await asyncio.sleep(max(_REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
     def topic_types(self) -> Mapping[str, str]:
@@ -126,7 +126,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
 
 
 class ToolsSession(JsonSession):
-    """One client's session. Each request is answered when it is done, with its ``id``."""
+    """One client's session. A response with the request's ``id`` is sent when each request is done."""
 
     subject: ClassVar[str] = "the graph"
     longest: ClassVar[int] = 100_000
@@ -157,7 +157,7 @@ class ToolsSession(JsonSession):
         return text_of(fields, "do"), fields
 
     async def started(self) -> None:
-        """See :meth:`JsonSession.started`: sends nothing without a request."""
+        """See :meth:`JsonSession.started`. Sends nothing without a request."""
 
     def dispatch(self, name: str, fields: Fields) -> None:
         """See :meth:`JsonSession.dispatch`."""
@@ -186,7 +186,7 @@ class ToolsSession(JsonSession):
         self.send({**({"id": fields["id"]} if fields else {}), "error": text[:500]})
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
-        """See :meth:`JsonSession.in_thread`: runs in one of several threads."""
+        """See :meth:`JsonSession.in_thread`. Runs in one of several threads."""
         return await asyncio.get_running_loop().run_in_executor(self._threads, work)
 
     def ended(self) -> None:
@@ -198,7 +198,7 @@ class ToolsSession(JsonSession):
         self._threads.shutdown(wait=False, cancel_futures=True)
 
     def report(self, data: bytes) -> None:
-        """Send a report; it replaces an older one that is still queued."""
+        """Send a report; replace an older report that is still queued."""
         self.client.send_text_message("report", data, newest_only=True)
 
     async def _watch(self, _: Fields) -> Fields:
@@ -210,7 +210,7 @@ class ToolsSession(JsonSession):
         return {}
 
     async def _ping(self, fields: Fields) -> Fields:
-        """Return the duration of a call to ``node`` in seconds."""
+        """Return how long a call to ``node`` takes, in seconds."""
 
         name = text_of(fields, "node")
 
@@ -228,14 +228,14 @@ class ToolsSession(JsonSession):
         def kill() -> None:
             with self._endpoint.graph() as graph:
                 node = find_node(graph, name)
-                ping_node(graph, node)  # reports the reason if the node has already exited
+                ping_node(graph, node)  # raises the reason if the node has already exited
                 kill_node(graph, node, "requested in the dashboard")
 
         await self.in_thread(kill)
         return {}
 
     async def _cleanup(self, fields: Fields) -> list[str]:
-        """Unregister those of ``nodes`` that still do not answer, as `rosnode cleanup` does; return their names."""
+        """Unregister those of ``nodes`` that still do not respond, as `rosnode cleanup` does; return their names."""
         self._require_writing("unregisters no node")
         wanted = texts_of(fields, "nodes")
 
@@ -251,7 +251,8 @@ class ToolsSession(JsonSession):
     async def _type(self, fields: Fields) -> Fields:
         """Return the full definition of the message type ``name`` from the installed packages.
 
-        With ``topic`` instead of ``name``, return that of the topic's type at the master, even if it has only subscribers.
+        With ``topic`` instead of ``name``, return the definition of the type that the master has for the topic, even if
+        the topic has only subscribers.
         """
         if "topic" in fields:
             topic = text_of(fields, "topic")
@@ -281,12 +282,12 @@ class ToolsSession(JsonSession):
         }
 
     async def _value(self, fields: Fields) -> Fields:
-        """Return the type and text of the value to which `rosparam set` converts ``text``."""
+        """Return the type and text of the value that `rosparam set` would store for ``text``."""
         value = await self._parsed(fields)
         return {"type": _type_name(value), "text": format_value(value)[:_MAX_PREVIEW]}
 
     async def _set(self, fields: Fields) -> Fields:
-        """Set the parameter ``name`` to the value of ``text``, as `rosparam set` does."""
+        """Set the parameter ``name`` to the value in ``text``, as `rosparam set` does."""
         self._require_writing("sets no parameter")
         name = text_of(fields, "name")
         why = why_illegal(name)
@@ -305,7 +306,7 @@ class ToolsSession(JsonSession):
         text = text_of(fields, "text")
 
         def parse() -> object:
-            # An empty string is a value, as on the command line; in YAML it would be null.
+            # An empty string is a value, as on the command line, although it would be null in YAML.
             value = parse_value(text) if text.strip() else ""
             check_parameter(value, "the value")
             return value

@@ -1,6 +1,6 @@
 """The views of the page, and links to them. Pure.
 
-A view and its settings are in the link's fragment, which browsers do not send, so the token there is not logged.
+A view and its settings are in the link's fragment, which browsers do not send, so that the token in it is not logged.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ VIEWS = (
     "panels",
     "layout",
 )
-"""The names of the views in links, in the order of their tabs; the page has one module for each."""
+"""The views' names in links, in the order of their tabs; the page has one module for each view."""
 
 LAYOUTS = ("workshop", "console", "rviz", "teleop", "classroom")
 """The page's built-in layouts: several views next to each other."""
@@ -53,7 +53,7 @@ def link(
     code: str = "",
     encrypted: bool = False,
 ) -> str:
-    """Return the URL of a view; ``fields`` are its settings, which may have several values. ``code``: see codes.py."""
+    """Return a view's URL; ``fields`` are the view's settings, which may have several values. ``code``: see codes.py."""
     words = [(name, value) for name, values in (fields or {}).items() for value in values]
     words += [(name, value) for name, value in (("token", token), ("code", code)) if value]
     query = f"?{urlencode(words, quote_via=quote, safe='/[]:')}" if words else ""
@@ -65,7 +65,7 @@ def link(
 def plotted_fields(words: Iterable[str]) -> list[str]:
     """Return the paths for rqt_plot's arguments: ``/a/x,/b/y`` are two, ``/pose/x:y`` is /pose/x and /pose/y.
 
-    Raise UsageError if one is not a path.
+    Raise UsageError if an argument is not a path.
     """
     found: list[str] = []
     for word in (part for each in words for part in each.split(",") if part):

@@ -1,1 +1,1 @@
-"""The Foxglove WebSocket protocol: a pure half (``protocol.py``), and the sessions of its clients."""
+"""The Foxglove WebSocket protocol: a pure part (``protocol.py``), and the clients' sessions."""

@@ -1,4 +1,4 @@
-"""The channels and services offered to all clients of the Foxglove protocol: ids for the topics and services of the graph."""
+"""The channels and services offered to all clients of the Foxglove protocol, with ids for the graph's topics and services."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from minirospy.web.graph import SharedGraph
 __all__ = ["Channels", "Services"]
 
 _SECONDS = 3.0
-"""Timeout for the types of topics that are not installed; short, because all clients wait for the list of channels."""
+"""Timeout for querying topic types that are not installed. It is short because all clients wait for the list of channels."""
 
 
 class Channels:
@@ -38,7 +38,7 @@ class Channels:
         return self._types[channel_id]
 
     async def update(self, graph: SharedGraph) -> tuple[list[Channel], list[int]]:
-        """Update from the graph; return the new channels and the ids of removed ones."""
+        """Update the channels from the graph; return the new channels and the ids of the removed ones."""
         snapshot = graph.snapshot
         wanted = {
             topic: snapshot.types[topic]
@@ -64,7 +64,7 @@ class Channels:
             else:
                 others[topic] = snapshot.publishers.get(topic, ())
 
-        # If no publisher answers in time, the type is taken from the first message.
+        # If no publisher responds in time, the type is taken from the first message.
         found = await graph.texts.of_publishers(others, _SECONDS)
         new += [
             self._add(topic, wanted[topic], found.get(topic) or InterfaceType(wanted[topic], ANY))
@@ -73,9 +73,10 @@ class Channels:
         return new, removed
 
     def redefine(self, channel: Channel, header: Header) -> Channel | None:
-        """Return a replacement for a channel whose publisher sends messages of another definition.
+        """Return a replacement for a channel whose publisher sends messages with another definition.
 
-        Return None if the channel has been removed, or was replaced before: then its publishers contradict each other.
+        Return None if the channel has been removed, or was replaced before, because then its publishers contradict each
+        other.
         """
         md5sum = header.get("md5sum", ANY)
         if self.by_id.get(channel.id) is not channel or md5sum in self._definitions[channel.topic]:
@@ -104,7 +105,7 @@ class Channels:
 
 
 class Services:
-    """Services with ids; a service whose type changes gets a new id."""
+    """Services with ids. A service whose type changes gets a new id."""
 
     def __init__(self) -> None:
         self.by_id: dict[int, ServiceOffer] = {}
@@ -117,7 +118,7 @@ class Services:
         self.infos.clear()
 
     def update(self, graph: SharedGraph) -> tuple[list[ServiceOffer], list[int]]:
-        """Update from the graph; return the new services and the ids of removed ones."""
+        """Update the services from the graph; return the new services and the ids of the removed ones."""
         infos = (graph.service_info(name) for name in graph.snapshot.services)
         wanted: Mapping[str, ServiceInfo] = {info.name: info for info in infos if info}
         removed = [id_ for id_, info in self.infos.items() if wanted.get(info.name) != info]

@@ -1,4 +1,4 @@
-"""The server of the Foxglove protocol: what is offered to all clients, and its changes."""
+"""The server for the Foxglove protocol: the offers to all clients, and their changes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["CAPABILITIES", "FoxgloveEndpoint", "FoxgloveOptions", "Playback"]
 _log = logging.getLogger(__name__)
 
 CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "services", "connectionGraph", "assets")
-"""The default capabilities of clients."""
+"""The capabilities that clients have by default."""
 
 _FOR_WRITERS = {"clientPublish", "services", "playbackControl"}
 _DROP_REPORT_SECONDS = 2.0
@@ -51,7 +51,7 @@ class Playback(Protocol):
 
 @dataclass(frozen=True)
 class FoxgloveOptions:
-    """``name`` is the server's name for clients; ``session_id`` differs for each start of the bridge."""
+    """``name`` is the server name that clients see; ``session_id`` differs for each start of the bridge."""
 
     name: str = "minirospy bridge"
     capabilities: Sequence[str] = CAPABILITIES
@@ -78,7 +78,7 @@ class FoxgloveEndpoint:
 
         self.sessions: set[FoxgloveSession] = set()
         self._options = options or FoxgloveOptions()
-        self._waiting: set[FoxgloveSession] = set()  # clients that have not been sent the channels yet
+        self._waiting: set[FoxgloveSession] = set()  # clients to which the channels have not been sent yet
         self._is_known = False
         self._updating: asyncio.Task[None] | None = None
         self._is_outdated = False
@@ -87,7 +87,7 @@ class FoxgloveEndpoint:
     # --- Endpoint
 
     def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError."""
+        """Return the sub-protocol to use. Raise LookupError if none of ``offered`` is supported."""
         for name in protocol.SUBPROTOCOLS:
             if name in offered:
                 return name
@@ -128,7 +128,7 @@ class FoxgloveEndpoint:
     # --- for sessions
 
     def capabilities_of(self, client: WebClient) -> list[str]:
-        """Return the capabilities of a client."""
+        """Return a client's capabilities."""
         found = list(self._options.capabilities)
         if self.graph.node.simulated or self.playback:
             found.append("time")
@@ -143,7 +143,7 @@ class FoxgloveEndpoint:
         session.send(serializing.connection_graph_update(tables, (), ()))
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
-        """Replace a channel whose publisher sends messages of another definition than the installed one."""
+        """Replace a channel whose publisher's messages have another definition than the installed type."""
         replaced = self.channels.redefine(channel, header)
         if replaced:
             _log.info(

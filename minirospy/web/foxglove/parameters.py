@@ -1,4 +1,4 @@
-"""Parameters for clients of the Foxglove protocol: read, set, and report changes."""
+"""Parameters for clients of the Foxglove protocol: read and set them, and report changes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class ParameterListener(Protocol):
 
 
 class Parameters:
-    """The parameters of the graph. One subscription at the master, to the root, serves all clients."""
+    """The graph's parameters. One subscription to the root, at the master, serves all clients."""
 
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
@@ -32,7 +32,10 @@ class Parameters:
         self._at_master = asyncio.Lock()
 
     async def read(self, names: tuple[str, ...]) -> list[Parameter]:
-        """Return parameters, or all if ``names`` is empty. Raise MasterUnreachableError or RpcError."""
+        """Return parameters, or all if ``names`` is empty.
+
+        Raise MasterUnreachableError or RpcError if the master's call fails.
+        """
         master = self._graph.node.call_master
         allowed = self._graph.filters.parameters
         if not names:
@@ -69,7 +72,7 @@ class Parameters:
         return failed
 
     def subscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
-        """Report changes of these parameters to a client, or of all if ``names`` is empty."""
+        """Report changes to these parameters, or to all if ``names`` is empty, to a client."""
         before = self._wanted.get(listener, set())
         self._wanted[listener] = None if not names or before is None else before | set(names)
         if not self._is_watching:
@@ -91,7 +94,7 @@ class Parameters:
             self.forget(listener)
 
     def forget(self, listener: ParameterListener) -> None:
-        """Remove all subscriptions of a client."""
+        """Remove all of a client's subscriptions."""
         self._wanted.pop(listener, None)
         if not self._wanted and self._is_watching:
             self._is_watching = False
@@ -99,7 +102,10 @@ class Parameters:
             self._graph.spawn(self._in_order(self._graph.node.parameters.remove))
 
     async def _in_order(self, request: Callable[[str], Awaitable[object]]) -> None:
-        """Subscribe or unsubscribe at the master after earlier requests are done: each may use its own connection."""
+        """Subscribe or unsubscribe at the master after earlier requests are done.
+
+        Otherwise requests could overtake each other, because each may use its own connection.
+        """
         async with self._at_master:
             await request(_ROOT)
 
@@ -108,7 +114,7 @@ class Parameters:
         allowed = self._graph.filters.parameters
         is_empty = value == {}
         leaves = [] if is_empty else [leaf for leaf in _leaves(name.rstrip("/"), value) if allowed(leaf[0])]
-        # The master's notification does not distinguish deleted from empty, so read the value.
+        # The master's notification does not distinguish a deleted namespace from an empty one, so read the value.
         emptied = name if is_empty and name != _ROOT and allowed(name) else ""
         again = {emptied} - {""}
         for listener, names in list(self._wanted.items()):

@@ -44,7 +44,10 @@ _MAX_ITEMS = 100_000  # entries in one array of a client's message
 
 _MAX_VALUES = 1_000_000
 _MAX_COLLECTIONS = 100_000
-"""Brackets in a JSON message, including those in strings: limits parsing to 50 ms; messages that clients publish are binary."""
+"""Brackets in a JSON message, including those in strings: the limit keeps parsing below 50 ms.
+
+Messages that clients publish are binary and not affected.
+"""
 
 _UINT32 = (1 << 32) - 1
 _SERVICE_HEAD = struct.Struct("<BIII")
@@ -53,7 +56,7 @@ _CHANNEL_ID = struct.Struct("<BI")
 
 
 def parse_text(text: str | bytes) -> Event:
-    """Parse a JSON message. Raise BridgeProtocolError."""
+    """Parse a JSON message. Raise BridgeProtocolError if it is invalid."""
     try:
         fields = load_json(text, max_values=_MAX_VALUES, max_collections=_MAX_COLLECTIONS)
     except (ValueError, RecursionError) as error:
@@ -71,7 +74,7 @@ def parse_text(text: str | bytes) -> Event:
 
 
 def parse_binary(data: bytes | bytearray | memoryview) -> Event:
-    """Parse a binary message. Raise BridgeProtocolError."""
+    """Parse a binary message. Raise BridgeProtocolError if it is invalid."""
     view = memoryview(data)
     if not view:
         raise BridgeProtocolError("Received an empty binary message")

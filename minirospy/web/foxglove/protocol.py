@@ -58,14 +58,14 @@ class StatusLevel(IntEnum):
 
 
 class PlaybackCommand(IntEnum):
-    """A client's request to a player."""
+    """A client's command to a player."""
 
     PLAY = 0
     PAUSE = 1
 
 
 class PlaybackStatus(IntEnum):
-    """The status of a player."""
+    """A player's status."""
 
     PLAYING = 0
     PAUSED = 1
@@ -99,7 +99,7 @@ class ServiceOffer(NamedTuple):
 
 
 class Parameter(NamedTuple):
-    """A parameter; ``is_set`` is False if it is not set, or to be deleted."""
+    """A parameter. ``is_set`` is False if the parameter is not set or is to be deleted."""
 
     name: str
     value: object = None
@@ -115,7 +115,7 @@ class GraphTables(NamedTuple):
 
 
 class PlaybackState(NamedTuple):
-    """A player's status, position (nanoseconds) and speed; ``request_id``: the request that it answers."""
+    """A player's status, position (nanoseconds) and speed; ``request_id``: the request to which this state responds."""
 
     status: PlaybackStatus
     now: int
@@ -133,7 +133,7 @@ class Subscribe:
 
 @dataclass(frozen=True)
 class Unsubscribe:
-    """End subscriptions."""
+    """Cancel subscriptions."""
 
     ids: tuple[int, ...]
 

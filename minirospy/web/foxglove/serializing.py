@@ -54,7 +54,7 @@ def server_info(
     session_id: str,
     data_range: tuple[int, int] | None = None,
 ) -> str:
-    """Return the first message; ``data_range``: start and end of a player's recording, in nanoseconds."""
+    """Return the first message to a client; ``data_range``: start and end of a player's recording, in nanoseconds."""
     fields: dict[str, object] = {
         "op": "serverInfo",
         "name": name,
@@ -72,7 +72,7 @@ def server_info(
 
 
 def status(level: StatusLevel, message: str, id_: str | None = None) -> str:
-    """Return a status message; a later one with the same id replaces it."""
+    """Return a status message; a later message with the same id replaces it."""
     fields: dict[str, object] = {"op": "status", "level": int(level), "message": message}
     if id_ is not None:
         fields["id"] = id_
@@ -106,7 +106,7 @@ def unadvertise(ids: Iterable[int]) -> str:
 
 
 def advertise_services(services: Iterable[ServiceOffer]) -> str:
-    """Return the message that advertises services, including the fields that old clients need."""
+    """Return the message that advertises services, including fields that only old clients need."""
 
     def described(schema: Schema) -> dict[str, str]:
         return {
@@ -137,7 +137,7 @@ def unadvertise_services(ids: Iterable[int]) -> str:
 
 
 def parameter_values(parameters: Iterable[Parameter], id_: str | None = None) -> str:
-    """Return the message with values of parameters."""
+    """Return the message with parameter values."""
     fields: dict[str, object] = {
         "op": "parameterValues",
         "parameters": [_parameter_fields(parameter) for parameter in parameters],
@@ -155,7 +155,7 @@ def service_call_failure(service_id: int, call_id: int, message: str) -> str:
 def connection_graph_update(
     changed: GraphTables, removed_topics: Iterable[str], removed_services: Iterable[str]
 ) -> str:
-    """Return the message with the changed entries of the tables, each complete, and the removed names."""
+    """Return the message with the changed entries of the tables, each in full, and the removed names."""
 
     def listed(table: Mapping[str, Sequence[str]], key: str) -> list[dict[str, object]]:
         return [{"name": name, key: list(nodes)} for name, nodes in table.items()]
@@ -178,7 +178,7 @@ def message_head(subscription_id: int, nanoseconds: int) -> bytes:
 
 
 def time_frame(nanoseconds: int) -> bytes:
-    """Return the frame with the time."""
+    """Return the frame with the current time."""
     return _TIME.pack(2, nanoseconds)
 
 
@@ -189,7 +189,7 @@ def service_response_head(service_id: int, call_id: int, encoding: str = MESSAGE
 
 
 def asset_head(request_id: int) -> bytes:
-    """Return the header that precedes the bytes of a file."""
+    """Return the header that precedes a file's bytes."""
     return _ASSET_HEAD.pack(4, request_id, 0, 0)
 
 

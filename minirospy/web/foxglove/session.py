@@ -31,23 +31,23 @@ __all__ = ["FoxgloveSession"]
 _log = logging.getLogger(__name__)
 
 _MAX_CALLS = 200
-"""Concurrent calls and requests of one client."""
+"""Limit for one client's concurrent calls and requests."""
 
 _MAX_CHANNELS = 1000
-"""Topics that one client may publish, and subscriptions that it may have: each receives every message."""
+"""Limit for the topics that one client may publish, and for its subscriptions, each of which receives every message."""
 
 _MAX_PARAMETERS = 10_000
 """Parameter names to whose changes one client may subscribe."""
 
-_MAX_STATUSES = 100  # per message of a client, which may name thousands of nonexistent channels
+_MAX_STATUSES = 100  # per client message, which may name thousands of nonexistent channels
 _VALUE_FACTOR = 4
 """Memory of a parsed operation per byte of its string, as for objects and lists of numbers."""
 
-_TIME = "time"  # key of the time in a slow client's queue, of which the newest is kept
+_TIME = "time"  # key for the time in a slow client's queue, which keeps only the newest message per key
 
 
 class FoxgloveSession:
-    """The state of one client; its connection calls it on the loop."""
+    """One client's state. The client's connection calls it on the loop."""
 
     def __init__(self, endpoint: FoxgloveEndpoint, client: WebClient) -> None:
         self.client = client
@@ -62,7 +62,7 @@ class FoxgloveSession:
         self._dropped = 0
         self._are_drops_shown = False
         self._statuses = 0
-        # _statuses counts those about the current message.
+        # _statuses counts the status messages about the current message.
 
         self._handlers: Mapping[type[Event], Callable[[Any], None]] = {
             protocol.Subscribe: self._subscribe,
@@ -113,7 +113,7 @@ class FoxgloveSession:
         self.client.send_text(text)
 
     def send_time(self, frame: bytes) -> None:
-        """Send the time; a slow client's queue keeps only the newest."""
+        """Send the time; a slow client's queue keeps only the newest time."""
         self.client.send_message(_TIME, frame, b"", newest_only=True)
 
     def channels_removed(self, ids: list[int]) -> None:
@@ -125,7 +125,7 @@ class FoxgloveSession:
         self.send(serializing.unadvertise(ids))
 
     def report_drops(self) -> None:
-        """Notify the client that messages are being dropped, or no longer are; called at intervals."""
+        """Notify the client that messages are being dropped, or no longer are. Called at regular intervals."""
         dropped = self.client.queue.dropped
         if dropped > self._dropped:
             counts = self.client.queue.dropped_of.most_common(3)
@@ -222,7 +222,7 @@ class FoxgloveSession:
         if (arrival.header["md5sum"] != md5sum and md5sum != ANY) or (
             not channel.schema.text and md5sum == ANY
         ):
-            # The definition that the client decodes with does not match this publisher's.
+            # The client decodes with a definition that does not match this publisher's.
             self._endpoint.definition_differs(channel, arrival.header)
             return
         head = serializing.message_head(subscription_id, arrival.nanoseconds)
@@ -374,7 +374,7 @@ class FoxgloveSession:
         except (ServiceException, BridgeError) as error:
             self._call_failed(event, str(error))
         except Exception:
-            # The task logs the error; the client still needs an answer.
+            # The task logs the error; the client still needs a response.
             self._call_failed(event, "the bridge failed on this call")
             raise
         else:

@@ -1,1 +1,1 @@
-"""Topics' images over HTTP, with the URLs of web_video_server: streams, snapshots, and a list of topics."""
+"""Topics' images over HTTP, with web_video_server's URLs: streams, snapshots, and a list of topics."""

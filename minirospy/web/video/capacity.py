@@ -11,16 +11,16 @@ __all__ = ["Capacity"]
 
 
 class Capacity:
-    """A limit of ``units`` of concurrent work. Runs on the loop."""
+    """A limit of ``units`` for concurrent work. Runs on the loop."""
 
     def __init__(self, units: int) -> None:
         self.units = units
-        self.taken_units = 0  # units of the running work
+        self.taken_units = 0  # units that running work has acquired
         self._waiting: deque[tuple[int, asyncio.Future[None]]] = deque()
 
     @asynccontextmanager
     async def taken(self, units: int) -> AsyncIterator[None]:
-        """Acquire ``units`` for the block, and wait until they are free. Work that exceeds the limit runs alone."""
+        """Acquire ``units`` for the block, after waiting until they are free. Work that exceeds the limit runs alone."""
         units = min(units, self.units)
         if self._waiting or self.taken_units + units > self.units:
             turn = asyncio.get_running_loop().create_future()

@@ -1,4 +1,7 @@
-"""`rosrun web_video_server web_video_server`: images as a launch file node. Source: http://wiki.ros.org/web_video_server."""
+"""`rosrun web_video_server web_video_server`: serves images, as a node for launch files.
+
+Source: http://wiki.ros.org/web_video_server.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ async def _start(node: Node) -> Bridge:
 
 
 def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
-    """Return the options for a node's private parameters. Raise BridgeError."""
+    """Return the options for a node's private parameters. Raise BridgeError if one is invalid."""
     return BridgeOptions(
         address=address_of(private),
         foxglove_port=None,

@@ -1,4 +1,4 @@
-"""Parse the URLs of web_video_server, and format the parts of its streams. Pure.
+"""Parse web_video_server's URLs, and format the parts of its streams. Pure.
 
 Source: http://wiki.ros.org/web_video_server.
 """
@@ -26,7 +26,10 @@ _MAX_PIXELS = 10_000
 
 @dataclass(frozen=True)
 class Picture:
-    """The encoding of an image: ``format`` jpeg or png, "" to pass a compressed image unchanged; None: keep the size."""
+    """How to encode an image.
+
+    ``format``: jpeg or png, or "" to pass a compressed image unchanged; a None size keeps the size.
+    """
 
     format: str = "jpeg"
     quality: int = 95
@@ -37,7 +40,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class VideoRequest:
-    """A request for a topic's images in an encoding."""
+    """A request for a topic's images in one encoding."""
 
     topic: str
     picture: Picture
@@ -92,11 +95,11 @@ def part(data: bytes, content_type: str, nanoseconds: int) -> bytes:
 
 
 END = b"\r\n" + START
-"""The end of an image with the next boundary: a browser shows an image only after the boundary."""
+"""The end of an image, including the next boundary, because a browser shows an image only after that boundary."""
 
 
 def topics_page(topics: Mapping[str, str], token: str) -> bytes:
-    """Return the page with the image topics and their types; ``token`` is that of the request."""
+    """Return the page with the image topics and their types; ``token`` is the request's token."""
     rows = []
     for topic, type_ in sorted(topics.items()):
         links = " ".join(

@@ -1,4 +1,4 @@
-"""The pages of web_video_server: each image is encoded once for all clients that request the same encoding."""
+"""The pages of web_video_server. Each image is encoded once for all clients that request the same encoding."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ __all__ = ["VideoPages"]
 
 _SNAPSHOT_SECONDS = 10.0
 _MAX_FEEDS = 32
-"""Concurrent feeds (a topic in one encoding): each image is encoded for each of them."""
+"""Limit for concurrent feeds (a topic in one encoding), because each image is encoded once per feed."""
 _MAX_KEPT = 32_000_000
-"""Bytes of encoded images stored for new clients, of all feeds together; larger ones are not stored."""
+"""Limit in bytes for the encoded images that all feeds together store for new clients; further ones are not stored."""
 _HTML = "text/html; charset=utf-8"
 
 
@@ -40,12 +40,12 @@ Listener = Callable[[File | BridgeError], None]
 
 
 class _Feed:
-    """The images of a topic in one encoding: a worker encodes the newest image, as often as it can."""
+    """The images of a topic in one encoding: a worker encodes the newest image, as often as possible."""
 
     def __init__(self, graph: SharedGraph, request: VideoRequest, shared: _Shared) -> None:
         self.listeners: list[Listener] = []
         self.last: File | BridgeError | None = None
-        """The last encoded image, so that a new client need not wait for the next one of a slow or latched topic."""
+        """The last encoded image, so that a new client need not wait for the next image from a slow or latched topic."""
 
         self._graph = graph
         self._request = request
@@ -110,7 +110,7 @@ class _Shared:
 
 
 class VideoPages:
-    """Serves images of topics. Runs on the loop."""
+    """Serves topics' images. Runs on the loop."""
 
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
@@ -213,7 +213,7 @@ class VideoPages:
         self, exchange: Exchange, request: VideoRequest, start: Callable[[], None]
     ) -> None:
         graph = await self._look(exchange)
-        # If the client has disconnected meanwhile, do not start: nothing would end its stream.
+        # If the client has disconnected in the meantime, do not start, because nothing would end the stream.
         if graph is None or not exchange.is_open:
             return
         topic = self._graph.node.resolve(request.topic)
@@ -230,7 +230,10 @@ class VideoPages:
             start()
 
     def _join(self, exchange: Exchange, request: VideoRequest, listener: Listener) -> Callable[[], None]:
-        """Send the images to a client; return a function that stops it, which is also called when the client disconnects."""
+        """Send the images to a client.
+
+        Return a function that stops sending, which is also called when the client disconnects.
+        """
         feed = self._feeds.get(request)
         is_new = feed is None
         if feed is None:

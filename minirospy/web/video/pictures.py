@@ -21,17 +21,20 @@ IMAGE = "sensor_msgs/Image"
 COMPRESSED = "sensor_msgs/CompressedImage"
 
 _FASTEST_PNG = 1
-MAX_PIXELS = 16_000_000  # in a compressed image, and in an enlarged one
+MAX_PIXELS = 16_000_000  # in a compressed or an enlarged image
 _LENGTH = struct.Struct("<I")
 _STAMPED = 12  # bytes of a header's seq and stamp, before the length of its frame_id
-# of a file to search for the image's size; other data, such as a preview, may precede it
+# Bytes of a file to search for the image's size: other data, such as a preview, may precede it.
 _HEAD_BYTES = 100_000
-_ROWS = 256  # of a numeric image to scale at a time: as 64-bit numbers they take eight times the memory
+_ROWS = 256  # rows of a numeric image scaled at a time: as 64-bit numbers they take eight times the memory
 _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/webp"}
 
 
 def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
-    """Return the image of a serialized message as an encoded file, and its content type. Raise BridgeError."""
+    """Return the image of a serialized message as an encoded file, and its content type.
+
+    Raise BridgeError if it cannot be converted.
+    """
     from sensor_msgs.msg import CompressedImage, Image
 
     try:
@@ -52,10 +55,11 @@ def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
         return _file(image, picture), f"image/{picture.format or 'jpeg'}"
     except BridgeError:
         raise
-    except Exception as error:  # image libraries raise errors of many types for invalid data
+    except Exception as error:  # image libraries raise many types of errors for invalid data
         why: object = error
         if isinstance(error, ImportError) or isinstance(error.__cause__, ImportError):
-            # Do not include the install command with the server's interpreter path: this text is sent to clients.
+            # Do not include the install command, which contains the server's interpreter path: clients receive this
+            # text.
             why = "it needs OpenCV or Pillow: install minirospy[images] on the server"
         raise BridgeError(f"the image cannot be shown: {why}") from error
 
@@ -88,7 +92,7 @@ def _colors(image: Pixels, encoding: str) -> Pixels:
 
 
 def _scaled(image: Pixels) -> Pixels:
-    """Return a numeric image as gray: the largest value is white; negative values, infinities and NaN are black."""
+    """Return a numeric image in gray: the largest value is white; negative values, infinities and NaN are black."""
     import numpy as np
 
     def values(start: int) -> Pixels:
@@ -132,7 +136,7 @@ def _by_opencv(image: Pixels, encoding: str) -> Pixels:
 
 
 def _debayered(image: Pixels, encoding: str) -> Pixels:
-    """Return the colors of a Bayer pattern, with each cell of four pixels as one pixel."""
+    """Return the colors of a Bayer pattern; each cell of four pixels becomes one pixel."""
     import numpy as np
 
     eight = converted(image, "mono16", "mono8") if encoding.endswith("16") else image
@@ -149,7 +153,7 @@ def _debayered(image: Pixels, encoding: str) -> Pixels:
 def _changed(image: Pixels, picture: Picture) -> Pixels:
     """Return an image in the requested size, rotated by 180 degrees if requested."""
     if image.dtype != "uint8":
-        # A compressed image may have 16 bits.
+        # A compressed image may have 16 bits per channel.
         image = (image >> 8).astype("uint8")
     if picture.is_inverted:
         image = image[::-1, ::-1]
