@@ -28,6 +28,7 @@ from minirospy.base.errors import BridgeProtocolError
 from minirospy.base.times import Time
 from minirospy.web.rosbridge import conversion, png, protocol
 from minirospy.web.rosbridge.cbor import encode_cbor
+from minirospy.web.rosbridge.endpoint import RosbridgeEndpoint
 from minirospy.web.rosbridge.protocol import OperationError, StatusLevel, Subscribe
 from minirospy.web.rosbridge.subscription import Budget, Fragments, Merged, Pacer, merge
 from tests.web.rosbridge_messages import MESSAGES
@@ -618,3 +619,21 @@ def test_id_that_is_a_long_list_is_refused() -> None:
     with pytest.raises(OperationError, match="an id has 1000 characters at most"):
         protocol.parse({"op": "unsubscribe", "topic": "/a", "id": [1] * 500})
     assert protocol.parse({"op": "unsubscribe", "topic": "/a", "id": [1, {"a": 2}]}).id == "[1, {'a': 2}]"
+
+
+@pytest.mark.parametrize(
+    ("size", "compression", "type_", "quick"),
+    [
+        (65_536, "none", "", True),
+        (65_537, "none", "sensor_msgs/LaserScan", False),
+        (921_700, "none", "sensor_msgs/Image", True),
+        (921_700, "cbor", "sensor_msgs/Image", True),
+        (921_700, "png", "sensor_msgs/Image", False),
+        (2_000_000, "cbor", "sensor_msgs/Image", False),
+        (2_000_000, "cbor-raw", "sensor_msgs/LaserScan", True),
+    ],
+)
+def test_only_messages_that_take_long_to_encode_are_large(
+    size: int, compression: str, type_: str, quick: bool
+) -> None:
+    assert RosbridgeEndpoint.is_quick(bytes(size), compression, type_) is quick

@@ -30,6 +30,11 @@ _SUBPROTOCOL = "rosbridge_v2"
 _LOG_LINES = 20
 
 _MAX_QUICK_BODY = 64 * 1024  # bytes of a message that is encoded immediately: 8,000 numbers take 8 ms
+_MAX_QUICK_IMAGE = 1024 * 1024  # bytes of an image that is encoded immediately: in base64 it takes 3 ms
+_IMAGES = {
+    "sensor_msgs/Image",
+    "sensor_msgs/CompressedImage",
+}  # their only array is the data, in base64 or typed
 
 _T = TypeVar("_T")
 
@@ -151,8 +156,10 @@ class RosbridgeEndpoint:
         return self._types.of(arrival.header)
 
     @staticmethod
-    def is_quick(body: bytes | memoryview, compression: str = "none") -> bool:
+    def is_quick(body: bytes | memoryview, compression: str = "none", type_: str = "") -> bool:
         """Return whether a message is encoded in a few milliseconds."""
+        if type_ in _IMAGES and compression != "png":
+            return len(body) <= _MAX_QUICK_IMAGE
         return len(body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
 
     def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:

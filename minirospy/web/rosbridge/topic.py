@@ -109,7 +109,7 @@ class ClientTopic:
         compression = self._merged.compression
         try:
             class_ = None if compression == "cbor-raw" else self._endpoint.class_of(arrival)
-            if not self._endpoint.is_quick(arrival.body, compression):
+            if not self._endpoint.is_quick(arrival.body, compression, class_._type if class_ else ""):
                 self._session.client.hold_work(is_held=True)
                 self._session.spawn(self._send_large(arrival, class_, self._merged))
                 return
