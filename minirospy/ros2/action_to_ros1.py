@@ -21,16 +21,16 @@ from minirospy.ros2.action_messages import (
     parse_status_and_body,
     parse_statuses,
 )
-from minirospy.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED, GoalOfRos1
+from minirospy.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.aio.topics import Publisher
     from minirospy.core.idl.protocols import Message
+    from minirospy.ros2.action_codecs import ActionCodec
     from minirospy.ros2.action_links import ActionLink
-    from minirospy.ros2.actions import ActionCodec
-    from minirospy.ros2.interface import Ros2Handle, Ros2Side
+    from minirospy.ros2.interface import GoalOfRos1, Ros2Handle, Ros2Side
 
 __all__ = ["MAX_GOALS", "GoalsToRos1"]
 

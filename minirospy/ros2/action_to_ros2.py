@@ -21,7 +21,7 @@ from minirospy.ros2.action_messages import (
     status_and_body,
     statuses_message,
 )
-from minirospy.ros2.rclpy_actions import CANCELED, SUCCEEDED, Ros2Goal
+from minirospy.ros2.rclpy_actions import CANCELED, SUCCEEDED
 from minirospy.ros2.reach import Reach
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.aio.topics import Publisher
     from minirospy.core.idl.protocols import Message
+    from minirospy.ros2.action_codecs import ActionCodec
     from minirospy.ros2.action_links import ActionLink
-    from minirospy.ros2.actions import ActionCodec
-    from minirospy.ros2.interface import Ros2Side
+    from minirospy.ros2.interface import Ros2Goal, Ros2Side
 
 __all__ = ["MAX_GOALS", "GoalsToRos2"]
 

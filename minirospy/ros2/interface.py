@@ -12,15 +12,17 @@ from typing import TYPE_CHECKING, Protocol
 
 from minirospy.ros2.links import Ros2Topic
 from minirospy.ros2.parameter_values import Value
-from minirospy.ros2.reach import Reachable
 
 if TYPE_CHECKING:
-    from minirospy.ros2.rclpy_actions import Accept, Ros2Goal
     from minirospy.ros2.rclpy_parameters import ParameterStore
 
 __all__ = [
+    "Accept",
+    "GoalOfRos1",
+    "Reachable",
     "Ros2ActionClient",
     "Ros2Client",
+    "Ros2Goal",
     "Ros2Handle",
     "Ros2Parameters",
     "Ros2Probe",
@@ -60,6 +62,21 @@ class Ros2Probe(Protocol):
     def close(self) -> None: ...
 
 
+class Reachable(Protocol):
+    """A client of a service or an action. Methods may be called from any thread."""
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether a server is connected."""
+
+    @property
+    def servers(self) -> frozenset[bytes] | None:
+        """Return the ids of the existing servers, or None if no response can be lost."""
+
+    def probe(self) -> Ros2Probe | None:
+        """Return a probe of the servers, or None if they have no request without effect."""
+
+
 class Ros2Client(Reachable, Protocol):
     """A client of a service. Methods may be called from any thread."""
 
@@ -67,6 +84,15 @@ class Ros2Client(Reachable, Protocol):
         """Send a request and return the future of the response, both as CDR. The future fails with BridgeError."""
 
     def close(self) -> None: ...
+
+
+class Ros2Goal(Protocol):
+    """A goal that a ROS 2 server has accepted. Methods may be called from any thread."""
+
+    def cancel(self) -> None: ...
+
+    def result(self) -> Future[tuple[int, bytes]]:
+        """Return the future of the status (see action_msgs/GoalStatus) and the result."""
 
 
 class Ros2ActionClient(Reachable, Protocol):
@@ -79,6 +105,21 @@ class Ros2ActionClient(Reachable, Protocol):
         """
 
     def close(self) -> None: ...
+
+
+class GoalOfRos1(Protocol):
+    """A goal that a ROS 1 server has accepted."""
+
+    @property
+    def ended(self) -> Future[tuple[int, bytes | None]]:
+        """Return the future of the final status (see action_msgs/GoalStatus) and the result, which is None if it is empty."""
+
+    def cancel(self) -> None:
+        """Request the server to cancel the goal. May be called from any thread."""
+
+
+Accept = Callable[[bytes, Callable[[bytes], None]], Future[GoalOfRos1 | None]]
+"""Accepts a goal, given the function for its feedback; returns the accepted goal, or None if the goal is refused."""
 
 
 class Ros2Parameters(Protocol):

@@ -18,10 +18,10 @@ from minirospy.base.errors import BridgeError, MinirospyError
 from minirospy.ros2.action_links import send_goal_service
 from minirospy.ros2.rclpy_calls import Calls, Message, MessageClass, RclpyFuture
 
-__all__ = ["ActionClass", "ActionClient", "ActionServer", "Feedback", "GoalOfRos1", "GoalOfRos2", "Ros2Goal"]
+__all__ = ["ActionClass", "ActionClient", "ActionServer", "Feedback", "GoalOfRos2"]
 
 if TYPE_CHECKING:
-    from minirospy.ros2.interface import Ros2Probe
+    from minirospy.ros2.interface import Accept, GoalOfRos1, Ros2Goal, Ros2Probe
 
 _T = TypeVar("_T")
 
@@ -80,15 +80,6 @@ class _RclpyActionClient(Protocol):
     def server_is_ready(self) -> bool: ...
 
     def destroy(self) -> None: ...
-
-
-class Ros2Goal(Protocol):
-    """A goal that a ROS 2 server has accepted. Methods may be called from any thread."""
-
-    def cancel(self) -> None: ...
-
-    def result(self) -> Future[tuple[int, bytes]]:
-        """Return the future of the status (see action_msgs/GoalStatus) and the result."""
 
 
 class _Closable(Protocol):
@@ -283,17 +274,6 @@ def _client_class() -> Callable[..., _RclpyActionClient]:
 # --- goals of ROS 2 in ROS 1
 
 
-class GoalOfRos1(Protocol):
-    """A goal that a ROS 1 server has accepted."""
-
-    @property
-    def ended(self) -> Future[tuple[int, bytes | None]]:
-        """Return the future of the final status (see above) and the result, which is None if it is empty."""
-
-    def cancel(self) -> None:
-        """Request the server to cancel the goal. May be called from any thread."""
-
-
 class Feedback:
     """A goal's feedback: buffered until the goal's handle exists, then published. May be called from any thread."""
 
@@ -318,10 +298,6 @@ class Feedback:
             self._kept.append(data)
         else:
             self._handle.publish_feedback(self._calls.deserialize(data, self._class))
-
-
-Accept = Callable[[bytes, Callable[[bytes], None]], "Future[GoalOfRos1 | None]"]
-"""Accepts a goal, given the function for its feedback; returns the accepted goal, or None if the goal is refused."""
 
 
 class ActionServer:

@@ -12,35 +12,20 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from minirospy.base.errors import BridgeError
 
 if TYPE_CHECKING:
-    from minirospy.ros2.interface import Ros2Probe
+    from minirospy.ros2.interface import Reachable, Ros2Probe
 
-__all__ = ["Reach", "Reachable"]
+__all__ = ["Reach"]
 
 _LOOK_SECONDS = 0.02
 _AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
 _NO_PROBE_SECONDS = 1.0  # seconds to wait for servers that cannot be probed
 _MAX_SECONDS = 10.0
 """Maximum wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
-
-
-class Reachable(Protocol):
-    """A client of a service or an action. Methods may be called from any thread."""
-
-    @property
-    def is_ready(self) -> bool:
-        """Return whether a server is connected."""
-
-    @property
-    def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the existing servers, or None if no response can be lost."""
-
-    def probe(self) -> Ros2Probe | None:
-        """Return a probe of the servers, or None if they have no request without effect."""
 
 
 class Reach:

@@ -21,10 +21,17 @@ from typing import Protocol, cast
 
 from minirospy.base.errors import BridgeError
 from minirospy.ros2.action_links import send_goal_service
-from minirospy.ros2.interface import Ros2ActionClient, Ros2Client, Ros2Handle, Ros2Parameters, Ros2Publisher
+from minirospy.ros2.interface import (
+    Accept,
+    Ros2ActionClient,
+    Ros2Client,
+    Ros2Handle,
+    Ros2Parameters,
+    Ros2Publisher,
+)
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.links import BRIDGE_PREFIX, Ros2End, Ros2Topic, parse_domain
-from minirospy.ros2.rclpy_actions import Accept, ActionClass, ActionClient, ActionServer
+from minirospy.ros2.rclpy_actions import ActionClass, ActionClient, ActionServer
 from minirospy.ros2.rclpy_calls import Calls, MessageClass, NotAnsweredError, RclpySubscription, ServiceClass
 from minirospy.ros2.rclpy_parameters import NodeParameters, ParameterServer, ParameterStore
 

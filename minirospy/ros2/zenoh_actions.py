@@ -27,7 +27,7 @@ from minirospy.ros2.zenoh_keys import Kind
 from minirospy.ros2.zenoh_topics import ZenohPublisher, subscribe
 
 if TYPE_CHECKING:
-    from minirospy.ros2.rclpy_actions import Accept, GoalOfRos1, Ros2Goal
+    from minirospy.ros2.interface import Accept, GoalOfRos1, Ros2Goal
     from minirospy.ros2.zenoh_keys import Entity
     from minirospy.ros2.zenoh_node import ZenohNode
 

@@ -12,7 +12,14 @@ from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
 from minirospy.ros2.definitions import NO_HASH, Definitions
-from minirospy.ros2.interface import Ros2ActionClient, Ros2Client, Ros2Handle, Ros2Parameters, Ros2Publisher
+from minirospy.ros2.interface import (
+    Accept,
+    Ros2ActionClient,
+    Ros2Client,
+    Ros2Handle,
+    Ros2Parameters,
+    Ros2Publisher,
+)
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.links import Ros2End, Ros2Topic, is_bridge
 from minirospy.ros2.zenoh_actions import ActionEnds, ActionType, ZenohActionClient, ZenohActionServer
@@ -24,7 +31,6 @@ from minirospy.ros2.zenoh_topics import ZenohPublisher, subscribe
 from minirospy.zenoh.library import NetworkOptions
 
 if TYPE_CHECKING:
-    from minirospy.ros2.rclpy_actions import Accept
     from minirospy.ros2.rclpy_parameters import ParameterStore
 
 __all__ = ["ZenohSide"]

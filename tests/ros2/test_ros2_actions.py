@@ -23,6 +23,7 @@ from minirospy.base.errors import BridgeError, DeserializationError
 from minirospy.core.graph.goals import GoalState
 from minirospy.introspect.snapshot import Snapshot
 from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, GoalError
+from minirospy.ros2.action_codecs import empty_message
 from minirospy.ros2.action_links import ActionLink, action_links
 from minirospy.ros2.action_messages import (
     GoalId,
@@ -34,7 +35,6 @@ from minirospy.ros2.action_messages import (
     status_and_body,
     statuses_message,
 )
-from minirospy.ros2.actions import empty_message
 from minirospy.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.links import BRIDGE_PREFIX, Direction

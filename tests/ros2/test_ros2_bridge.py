@@ -26,11 +26,11 @@ from minirospy.core.tf2.statics import StaticTransforms
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.ros2.bridge import Ros2Bridge, Ros2Options, _Passing
+from minirospy.ros2.interface import Accept, Ros2Goal
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.link_table import Pair
 from minirospy.ros2.links import BRIDGE_PREFIX, Direction, Link, Ros2End, Ros2Topic, links, marker
 from minirospy.ros2.parameter_values import Value
-from minirospy.ros2.rclpy_actions import Accept, Ros2Goal
 from minirospy.ros2.rclpy_parameters import ParameterStore
 from minirospy.ros2.rules import BUILT_IN, Rules, parse_rules, snake_case
 from minirospy.ros2.side import large_message_settings

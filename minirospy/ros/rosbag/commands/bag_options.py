@@ -92,7 +92,7 @@ class EchoOptions(NamedTuple):
 
 def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
     """Print the messages of topic ``name`` in a bag, or one field of them if ``name`` ends in a field; if None, of all topics."""
-    from minirospy.introspect.streams import Received
+    from minirospy.introspect.messages import Received
     from minirospy.introspect.topics import TopicField
 
     with _opened(path, "ERROR: ") as reader:

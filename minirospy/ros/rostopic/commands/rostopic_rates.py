@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from minirospy.base.names import Arguments
-    from minirospy.introspect.streams import Received, ToolNode
+    from minirospy.introspect.messages import Received
+    from minirospy.introspect.streams import ToolNode
 
 __all__ = ["BW", "DELAY", "HZ"]
 
