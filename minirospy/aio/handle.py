@@ -42,11 +42,11 @@ class Handle:
         await self.close()
 
     async def wait_until_registered(self) -> None:
-        """Wait until the registration has ended, even if it failed or was cancelled: ``await handle`` would raise."""
+        """Wait until the registration has ended. Does not raise if it failed or was cancelled, unlike ``await handle``."""
         await asyncio.wait([self._registration])
 
     async def close(self) -> None:
-        """Close the handle."""
+        """Close the handle and unregister it."""
         raise NotImplementedError
 
 

@@ -51,14 +51,15 @@ _Request = TypeVar("_Request", bound=Message)
 _Response = TypeVar("_Response", bound=Message)
 _POLL_SECONDS = 0.1
 _PROBE_SECONDS = 5.0
-MAX_REGISTRATION_FAULTS = 5  # log lines in ten seconds: a bridge may have thousands of topics
+# maximum log lines in ten seconds, because a bridge may have thousands of topics
+MAX_REGISTRATION_FAULTS = 5
 _BILLION = 1_000_000_000
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
 """The message that the Slave API logs when `shutdown` is called."""
 
 
 class _Unspecified:
-    """The type of ``default`` if the caller passes none; None would not do, since a caller may want None returned."""
+    """The type of ``default`` if the caller passes none. It is not None, because a caller may want None to be returned."""
 
 
 _UNSPECIFIED = _Unspecified()
@@ -67,12 +68,12 @@ _UNSPECIFIED = _Unspecified()
 class Node:
     """A node in the computation graph, which exists inside ``async with Node("name") as node:``.
 
-    ``name`` has no namespace; ``anonymous`` appends a number to it. ``argv`` contains remappings, private
-    parameters and special names as on a command line (pass ``sys.argv`` in a program that roslaunch starts; the
-    default is empty, since a process may have several nodes). ``master_uri``, ``host`` and ``namespace`` replace
-    ROS_MASTER_URI, ROS_HOSTNAME and ROS_NAMESPACE. ``rosout``: whether log lines are published to /rosout.
-    ``simulated_time``: whether the node follows /clock if /use_sim_time is set. ``registration_fault_lines``: the most
-    log lines in ten seconds about registrations that the master refused.
+    ``name`` has no namespace; ``anonymous`` appends a number to it. ``argv`` contains remappings, private parameters
+    and special names as on a command line (pass ``sys.argv`` in a program that roslaunch starts; the default is empty,
+    because a process may have several nodes). ``master_uri``, ``host`` and ``namespace`` replace ROS_MASTER_URI,
+    ROS_HOSTNAME and ROS_NAMESPACE. With ``rosout``, log lines are published to /rosout. With ``simulated_time``, the
+    node follows /clock if /use_sim_time is set. ``registration_fault_lines``: maximum number of log lines in ten
+    seconds about registrations that the master refused.
 
     Entering the block waits for a master. Call all methods except :meth:`shutdown` in the event loop that entered it.
     Source: http://wiki.ros.org/Nodes.
@@ -112,7 +113,8 @@ class Node:
         # Logs registrations that the master refused
         self.registration_faults = RateLimitedLogger(self.log, registration_fault_lines)
 
-        # The reason that another process gave for the shutdown, such as the master if a new node has the same name
+        # The reason for the shutdown that another process requested, such as the master if a new node has the same
+        # name
         self.shutdown_request = ""
 
         self._remappings = self._arguments.resolved_remappings(self.name)
@@ -215,7 +217,7 @@ class Node:
                     await server.cancel()
 
     def shutdown(self, reason: object = "") -> None:
-        """Request the node to shut down: :meth:`spin` and loops over messages return, sleeps are interrupted. Thread-safe.
+        """Request the node to shut down: :meth:`spin` and loops over messages return, and sleeps are interrupted. Thread-safe.
 
         The node leaves the graph at the end of its ``async with`` block. `rosnode kill` calls this too.
         """
@@ -228,7 +230,7 @@ class Node:
 
     @property
     def is_started(self) -> bool:
-        """Return whether the node has connected to a master, and so is in the graph."""
+        """Return whether the node has connected to a master, and therefore is in the graph."""
         return self._is_started
 
     @property
@@ -280,11 +282,11 @@ class Node:
         type_: InterfaceType | None = None,
         on_change: Callable[[], object] | None = None,
     ) -> RawSubscription:
-        """Subscribe to ``topic``, of any type unless ``type_`` is given: ``deliver(bytes, publisher's connection header)``.
+        """Subscribe to ``topic``, of any type unless ``type_`` is given, and receive its messages as bytes.
 
-        ``deliver`` is called on the loop and must return quickly, and so must ``on_change``, which is called when a publisher
-        has connected. ``deliver`` may keep the bytes. ``await node.subscribe_raw(...)`` waits until the subscription is
-        registered with the master.
+        ``deliver(data, publisher's connection header)`` is called on the loop and must return quickly, and so must
+        ``on_change``, which is called when a publisher has connected. ``deliver`` may keep the data. ``await
+        node.subscribe_raw(...)`` waits until the subscription is registered with the master.
         """
         resolved = self.resolve(topic)
         state = self._subscribed.get(resolved)
@@ -314,10 +316,11 @@ class Node:
     ) -> Publisher[_M]:
         """Return a publisher for ``topic``; ``await node.advertise(...)`` waits until it is registered with the master.
 
-        ``queue_size``: how many messages may be queued for a slow subscriber before the oldest is dropped (0: no
-        limit; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later receives the
-        last message. ``headers``: fields for the connection header. ``on_change`` is called on the loop when a subscriber
-        has connected or disconnected. Raise ValueError if this node publishes the topic with another type.
+        ``queue_size``: maximum number of messages queued for a slow subscriber; beyond that the oldest is dropped (0:
+        no limit; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later
+        receives the last message. ``headers``: fields for the connection header. ``on_change`` is called on the loop
+        when a subscriber has connected or disconnected. Raise ValueError if this node already publishes the topic with
+        another type.
         """
         resolved = self.resolve(topic)
         state = self._published.get(resolved)
@@ -350,7 +353,7 @@ class Node:
             publisher: Publisher[Message] = self.advertise(resolved, type(message))
             kept = self._kept[resolved] = (publisher, self._spawn(publisher.wait_for_expected()))
         publisher, expected = kept
-        # Concurrent calls that publish on the topic wait too.
+        # Concurrent calls that publish on the topic wait here too.
         await asyncio.wait([expected])
         await publisher.publish(message)
 
@@ -398,7 +401,7 @@ class Node:
     async def wait_for_service(self, service: str, timeout: float | None = None) -> None:
         """Wait until a service is registered and responds.
 
-        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the node shuts down meanwhile.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the node shuts down first.
         """
         name = self.resolve(service)
         try:
@@ -457,13 +460,13 @@ class Node:
     async def call_master(self, method: str, *arguments: object) -> Any:
         """Call a method of the Master API as this node and return the value of the response.
 
-        Raise MasterUnreachableError, RpcRefused with the master's text, or another RpcError.
-        Source: http://wiki.ros.org/ROS/Master_API.
+        Raise MasterUnreachableError if the master does not respond, RpcRefused with its message if it refuses the call,
+        or another RpcError if the call fails. Source: http://wiki.ros.org/ROS/Master_API.
         """
         return await self._node.master(method, *arguments)
 
     def run_threadsafe(self, work: Coroutine[object, object, _T]) -> concurrent.futures.Future[_T]:
-        """Start a coroutine on the node's loop, from any other thread; return its future.
+        """Start a coroutine on the node's loop from another thread; return its future.
 
         Raise ROSInitException before the node has been started.
         """
@@ -495,7 +498,7 @@ class Node:
             raise ROSInterruptException("ROS shutdown request")
 
     def rate(self, hz: float) -> Rate:
-        """Return a rate: ``async for _ in node.rate(10): ...`` iterates ten times per second, until the node shuts down."""
+        """Return a rate. ``async for _ in node.rate(10): ...`` iterates ten times per second, until the node shuts down."""
         return Rate(self, hz)
 
     # --- internals
@@ -537,7 +540,7 @@ class Node:
                     is_reported = True
                 await self.sleep(0.25)
             except RpcFault:
-                return  # a master without this call, such as @foxglove/ros1
+                return  # the master does not support this call, for example that of @foxglove/ros1
             else:
                 return
 

@@ -1,4 +1,4 @@
-"""Changes of parameters that the master reports."""
+"""Subscriptions to parameters, whose changes the master reports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["ParameterWatch"]
 
 
 class ParameterWatch:
-    """The parameters that a node has subscribed to; ``listeners(name, value)`` are called on the loop.
+    """The parameters that a node has subscribed to. ``listeners(name, value)`` are called on the loop when a value changes.
 
     A deleted parameter has the value ``{}``, as the master sends it. After a restart of the master the parameters are
     subscribed to again. Source: http://wiki.ros.org/ROS/Parameter%20Server%20API (subscribeParam).
@@ -28,7 +28,7 @@ class ParameterWatch:
         self._loop = loop
 
     async def add(self, name: str) -> object:
-        """Subscribe to a parameter (global name) and return its value, or ``{}`` if it is not set.
+        """Subscribe to a parameter by its global name; return its value, or ``{}`` if it is not set.
 
         Raise MasterUnreachableError if the master does not respond, RpcError if the call fails.
         """
@@ -56,7 +56,7 @@ class ParameterWatch:
         self._node._later(self._add_again)
 
     def _changed(self, name: str, value: object) -> None:
-        # The master appends a slash to a name that is below the one subscribed to.
+        # The master appends a slash to a name that is below the subscribed one.
         for listener in list(self.listeners):
             listener(name.rstrip("/") or "/", value)
 

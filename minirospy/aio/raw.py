@@ -34,7 +34,7 @@ PROBE_SECONDS = 5.0
 
 
 class RawSubscription(Handle):
-    """A topic's messages as bytes, delivered as they arrive; created by :meth:`Node.subscribe_raw`, closed by :meth:`close`."""
+    """A subscription that delivers messages as bytes. Created by :meth:`Node.subscribe_raw`, closed by :meth:`close`."""
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class RawSubscription(Handle):
 
     @property
     def headers(self) -> list[Header]:
-        """The connected publishers' connection headers, which are the same objects that are passed to ``deliver``."""
+        """The connection headers of the connected publishers; the same objects are passed to ``deliver``."""
         return [link.header for link in self._state.subscription.links]
 
     async def close(self) -> None:
@@ -66,11 +66,11 @@ class RawSubscription(Handle):
         self._deliver(frame, header)
 
     def _end(self) -> None:
-        """Do nothing, because no task waits for messages."""
+        """Do nothing, because no task waits for messages here."""
 
 
 class RawService(Handle):
-    """A service that works on bytes: ``handler(request, client's connection header)`` returns the response's bytes.
+    """A service that works on bytes: ``handler(request_bytes, connection_header)`` returns the response bytes.
 
     If the handler raises ServiceException, the client's call fails with its message. ``await`` waits until the service is
     registered with the master.
@@ -101,7 +101,7 @@ class RawService(Handle):
 
 
 def raw_class(type_: InterfaceType) -> type[Message]:
-    """Return a message class without fields that gives a topic its type, for ``advertise`` and ``Publisher.publish_raw``."""
+    """Return a message class without fields that specifies a topic's type, for ``advertise`` and ``publish_raw``."""
     fields = {
         "_type": type_.name,
         "_md5sum": type_.md5sum,
@@ -131,7 +131,10 @@ async def call_raw(node: Node, service: str, md5sum: str, request: bytes) -> byt
 
 
 async def service_header(node: Node, service: str) -> Header:
-    """Return a service's connection header, which includes its type. Raise ServiceException if the service is not available."""
+    """Return a service's connection header, which includes its type.
+
+    Raise ServiceException if the service cannot be reached.
+    """
     client = await _connect(node, service, ANY, probe=True)
     client.close()
     return client.header

@@ -37,7 +37,7 @@ _Response_co = TypeVar("_Response_co", bound=Message, covariant=True)
 
 
 class ServiceClass(Protocol[_Request_co, _Response_co]):
-    """The members of a service class, such as ``std_srvs.srv.SetBool``: the classes of its request and response."""
+    """The interface of a service class, such as ``std_srvs.srv.SetBool``: the classes of its request and response."""
 
     @property
     def _md5sum(self) -> str: ...
@@ -103,7 +103,7 @@ class ServiceProxy(Generic[_Response_co]):
     def close(self) -> None:
         """Close a persistent connection; if another task is calling through it, that call fails. Idempotent."""
         if self._lock.locked() and self._client:
-            # Let the call in progress close the socket: closing it here would not wake the call.
+            # Let the call in progress close the socket, because closing it here would not wake that call.
             self._client.hang_up()
         else:
             self._disconnect()
@@ -149,7 +149,7 @@ class ServiceProxy(Generic[_Response_co]):
         response = self._service_class._response_class()
         try:
             response.deserialize(body)
-        except Exception as error:  # any error of a third-party message class on invalid bytes
+        except Exception as error:  # any error that a third-party message class raises on invalid bytes
             raise ServiceException(f"transport error completing service call: {error}") from error
         response._connection_header = client.header
         return response

@@ -1,4 +1,4 @@
-"""Long-running tasks: an unexpected error is reported in one line, and the work continues.
+"""Long-running tasks that survive unexpected errors: each error is reported in one line, and the task continues.
 
 asyncio reports a task's exception only when the task is garbage-collected, which never happens while its owner refers to it.
 """
@@ -20,10 +20,10 @@ _MAX_CHARACTERS = 500
 
 
 class ErrorReporter:
-    """Reports unexpected errors in some work: one line every ten seconds, with a count of the suppressed ones."""
+    """Reports unexpected errors in a long-running task: one line every ten seconds, with a count of the suppressed errors."""
 
     def __init__(self, log: logging.Logger, work: str) -> None:
-        """Report errors under the name ``work``, such as "the watch of the graph"."""
+        """Create a reporter for the task described by ``work``, such as "the watch of the graph"."""
         self._log = log
         self._lines = RateLimitedLogger(log)
         self._work = work

@@ -1,4 +1,4 @@
-"""The time of a node in an event loop: simulated time, and rates."""
+"""Simulated time and rates, for a node in an event loop."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Rate:
     async def sleep(self) -> None:
         """Sleep for the rest of the period. Raise the same exceptions as :meth:`Node.sleep`."""
         now = self._node.now().to_nsec()
-        # Time jumped back, or the work took several periods: start a new period now, so that the sleep is not very
-        # long and the missed periods are not made up for.
+        # Time jumped back, or the loop body took several periods: start a new period now, so that the sleep is not
+        # very long and the missed periods are not made up for.
         if not self._last <= now <= self._last + 2 * self._period:
             self._last = now
         self._last += self._period

@@ -101,7 +101,7 @@ class Subscription(Handle, Generic[_M_co]):
             callbacks.remove(connected.set)
 
     async def close(self) -> None:
-        """Unsubscribe. Messages that have arrived can still be read. Idempotent."""
+        """Unsubscribe. Messages that have already arrived can still be read. Idempotent."""
         self._end()
         await self._state.leave(self)
 
@@ -186,7 +186,7 @@ class Publisher(Handle, Generic[_M_co]):
 
     @property
     def on_change(self) -> list[Callable[[], object]]:
-        """Return the functions that are called on the loop when a subscriber has connected or disconnected."""
+        """The functions to call on the loop when a subscriber has connected or disconnected."""
         return self._state.on_change if self._state else []
 
     @property
@@ -211,11 +211,11 @@ class Publisher(Handle, Generic[_M_co]):
             raise TimeoutError(text) from None
 
     async def wait_for_expected(self) -> None:
-        """Wait up to a second until the subscribers that the master knew at the registration are connected."""
+        """Wait up to a second for the subscribers that the master reported at the registration to connect."""
         await self
         state = self._state
         if state is None:
-            return  # closed while registering
+            return  # the topic was closed while registering
         with contextlib.suppress(asyncio.TimeoutError, ROSInterruptException):
             await asyncio.wait_for(self._wait_for(state.publication.expected), _JOIN_SECONDS)
 
@@ -251,7 +251,8 @@ class SubscribedTopic:
 
     def join(self, handle: Subscription[Message] | RawSubscription) -> asyncio.Task[None]:
         self._handles.add(handle)
-        # `async for ... break` discards the subscription without closing it.
+        # `async for ... break` discards the subscription without closing it, so leave the topic when it is
+        # garbage-collected.
         weakref.finalize(handle, self._node._later, self._leave_if_empty).atexit = False
         return self._registration
 

@@ -1,4 +1,4 @@
-"""Terminate child processes with this process, even if it is killed: on Windows with a job object, which the system closes.
+"""Terminate child processes with this process, even if it is killed. On Windows a job object does this: the system closes it.
 
 On other systems a launcher's guardian process terminates them (`ros/roslaunch/launcher/guardian.py`), and this module
 has no effect. Source: https://learn.microsoft.com/en-us/windows/win32/procthread/job-objects
@@ -46,7 +46,7 @@ class ProcessJob:
         self._guards = 0
 
     def guard(self) -> bool:
-        """Let the system terminate the children together with this process; return whether it will."""
+        """Let the system terminate the children together with this process; return whether the system does so."""
         with self._lock:
             try:
                 if self._job is None:
@@ -64,7 +64,7 @@ class ProcessJob:
             return True
 
     def release(self) -> None:
-        """Undo one :meth:`guard`: after the last one, children may outlive this process again."""
+        """Undo one :meth:`guard`. When all are undone, children may outlive this process again."""
         with self._lock:
             self._guards -= 1
             if self._guards == 0 and self._job is not None:
@@ -75,7 +75,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """A context manager: until :meth:`close`, child processes are terminated with this process if ``is_guarded`` is true."""
+    """A context manager. If ``is_guarded`` is true, child processes are terminated with this process until :meth:`close`."""
 
     def __init__(self, job: ProcessJob | None) -> None:
         self._job = job if job is not None and job.guard() else None
@@ -156,7 +156,7 @@ if sys.platform == "win32":
         ]
 
     class _Windows:
-        """The implementation of JobSystem with kernel32."""
+        """The implementation of JobSystem for Windows, which uses kernel32."""
 
         def __init__(self) -> None:
             self._kernel = ctypes.WinDLL("kernel32", use_last_error=True)

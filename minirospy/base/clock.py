@@ -1,6 +1,6 @@
 """Clocks: the current time, and waiting until a given time.
 
-There are a wall clock, and a simulated clock that other code sets (http://wiki.ros.org/Clock). Times are
+There is a wall clock, and a simulated clock that other code sets (http://wiki.ros.org/Clock). Times are
 nanoseconds since the epoch.
 """
 
@@ -26,7 +26,7 @@ __all__ = [
 
 _CLOCK = struct.Struct("<II")
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
-"""Seconds. The main thread, which receives signals, waits in slices: on Windows Ctrl-C does not interrupt a wait, and on
+"""Seconds per slice when the main thread, which receives signals, waits: on Windows Ctrl-C does not interrupt a wait, and on
 other systems a Ctrl-C just before the start of a wait takes effect only after it.
 """
 
@@ -45,7 +45,7 @@ class SignalSafeEvent(threading.Event):
         super().__init__()
         self._is_set = False
         self._waiting: list[threading.Lock] = []
-        """One lock per waiting thread, acquired until the event is set."""
+        """One lock per waiting thread, held until the event is set."""
 
     def is_set(self) -> bool:
         """Return whether the event is set."""
@@ -80,7 +80,7 @@ class SignalSafeEvent(threading.Event):
 
 
 def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
-    """Do the same as ``event.wait(timeout)``, so that a signal can interrupt it on every OS."""
+    """Wait as ``event.wait(timeout)`` does, but so that a signal can interrupt the wait on every OS."""
     if threading.current_thread() is not threading.main_thread():
         return event.wait(timeout)
     end = None if timeout is None else time.monotonic() + timeout
@@ -105,10 +105,10 @@ class Clock(Protocol):
     """The interface to the time that the sleeping functions use."""
 
     def now(self) -> int:
-        """Return the time in nanoseconds."""
+        """Return the current time in nanoseconds."""
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
-        """Wait for ``nanoseconds``; return False if ``stop`` was set meanwhile."""
+        """Wait for ``nanoseconds``; return False if ``stop`` was set in the meantime."""
 
 
 class WallClock:
@@ -118,18 +118,18 @@ class WallClock:
     """Return the nanoseconds since the epoch."""
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
-        """Wait for ``nanoseconds``; return False if ``stop`` was set meanwhile."""
+        """Wait for ``nanoseconds``; return False if ``stop`` was set in the meantime."""
         return not wait_for_event(stop, max(0.0, nanoseconds / 1e9))
 
 
 class SimulatedClock:
-    """A clock that a simulator sets through /clock, or a test."""
+    """A clock that is set by a simulator through /clock, or by a test."""
 
     def __init__(self, now: int = 0, changed: threading.Condition | None = None) -> None:
         """Start at ``now``; ``changed`` is notified each time the clock is set."""
         self._now = now
         self._changed = changed or threading.Condition()
-        # Do not use the condition: a signal handler may wait for a thread that sets the clock or sleeps.
+        # Do not use the condition, because a signal handler may wait for a thread that sets the clock or sleeps.
         self._sleepers: list[SignalSafeEvent] = []
 
     def now(self) -> int:
@@ -145,7 +145,7 @@ class SimulatedClock:
             sleeper.set()
 
     def sleep(self, nanoseconds: int, stop: threading.Event) -> bool:
-        """Wait until the clock has advanced by ``nanoseconds``; return False if ``stop`` was set meanwhile.
+        """Wait until the clock has advanced by ``nanoseconds``; return False if ``stop`` was set in the meantime.
 
         A time of 0 means that the clock has not been set yet: the sleep then starts at the first time that is set.
         Raise ROSTimeMovedBackwardsException if the clock is set to a time before the sleep started.

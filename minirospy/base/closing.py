@@ -24,7 +24,10 @@ def close_each(functions: Iterable[CloseFunction]) -> None:
 
 
 async def close_all(functions: Iterable[AsyncCloseFunction]) -> None:
-    """Do the same as :func:`close_each`, also for coroutine functions. A cancellation stops it."""
+    """Call each function in order as :func:`close_each` does, and await the results of coroutine functions.
+
+    A cancellation stops it.
+    """
     for function in functions:
         try:
             closing = function()

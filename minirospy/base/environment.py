@@ -37,7 +37,7 @@ DEFAULT_MASTER_PORT = 11311
 _SWITCH = {"": False, "0": False, "off": False, "false": False, "1": True, "on": True, "true": True}
 
 DISTRO = "noetic\n"
-"""The value of /rosdistro: the ROS 1 distribution that minirospy behaves like, with a newline, as ROS sets it."""
+"""The value of /rosdistro: the ROS 1 distribution that minirospy behaves like. ROS's value ends in a newline, too."""
 
 ROS_VERSION = "1.17.0\n"  # the value of /rosversion
 
@@ -54,10 +54,11 @@ connect if the kernel has net.ipv4.route_localnet set, as on container hosts.
 class Environment(NamedTuple):
     """The master's URI, this process's address, and the folders for its files.
 
-    ``host`` is the name advertised to peers; ``bind_host`` the address that servers listen on (loopback if ``host`` is,
-    else every interface; with ``ipv6`` the IPv6 addresses). ``ports`` are the ports that a node's servers may use (None:
-    any), such as those that a firewall or a container allows; ``allow`` are the networks that may connect ("": all).
-    ``transport`` "tcp" disables Unix sockets. ``local``: nothing leaves this machine, see :meth:`on_this_machine`.
+    ``host`` is the name advertised to peers; ``bind_host`` is the address that servers listen on (loopback if ``host``
+    is, else every interface; with ``ipv6`` the IPv6 addresses). ``ports`` are the ports that a node's servers may use
+    (None: any), such as those that a firewall or a container allows; ``allow`` are the networks that may connect ("":
+    all). ``transport`` "tcp" disables Unix sockets. ``local`` restricts the process to this machine, see
+    :meth:`on_this_machine`.
     """
 
     master_uri: str
@@ -76,9 +77,9 @@ class Environment(NamedTuple):
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
         """Return the record for ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
 
-        Raise UsageError if ROS_MASTER_URI is not http://host:port, ROS_HOSTNAME or ROS_IP is more than a name or address,
-        MINIROSPY_PORTS is not like 40000-40100, MINIROSPY_TRANSPORT or MINIROSPY_LOCAL is unknown, or the master is on another
-        machine although MINIROSPY_LOCAL is 1.
+        Raise UsageError if ROS_MASTER_URI is not http://host:port, ROS_HOSTNAME or ROS_IP is not just a name or
+        address, MINIROSPY_PORTS is not a range such as 40000-40100, MINIROSPY_TRANSPORT or MINIROSPY_LOCAL is unknown,
+        or the master is on another machine although MINIROSPY_LOCAL is 1.
         """
         from pathlib import Path
 
@@ -131,7 +132,7 @@ class Environment(NamedTuple):
 
     @property
     def master_is_local(self) -> bool:
-        """Return whether the master's host is this machine, so that a tool may start a master."""
+        """Return whether the master's host is this machine. If it is, a tool may start a master."""
         return is_own_host(self.master_address[0], self.host)
 
 
@@ -208,7 +209,7 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
 
 
 def wrong_address(environment: Environment) -> str:
-    """Return a description of the fault in ROS_IP or ROS_HOSTNAME, which peers use to reach this process, or "".
+    """Return a description of the error in ROS_IP or ROS_HOSTNAME, which peers use to reach this process, or "".
 
     Names are not checked, because an unreachable name server would delay every program.
     """
@@ -226,7 +227,7 @@ def wrong_address(environment: Environment) -> str:
 def run_folder(log_dir: Path, run_id: object) -> Path | None:
     """Return the folder for a run's log files, or None if the /run_id is not valid as a folder name.
 
-    Any node may set that parameter, even to a path that leads outside of ``log_dir``.
+    Any node may set /run_id, even to a path that leads outside of ``log_dir``.
     """
     if not isinstance(run_id, str) or not _RUN_ID.fullmatch(run_id):
         return None

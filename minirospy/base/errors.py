@@ -154,7 +154,10 @@ class NotFoundError(MinirospyError):
 
 
 class MasterUnreachableError(MinirospyError):
-    """No master responds at ``uri``. ``why``: the reason why this process cannot call it; ``cause``: why it does not respond."""
+    """No master responds at ``uri``.
+
+    ``why``: why this process cannot call the master; ``cause``: why the master does not respond.
+    """
 
     def __init__(self, uri: str, why: str = "", cause: str = "") -> None:
         super().__init__(uri, why, cause)
@@ -194,7 +197,7 @@ class NodeUnreachableError(MinirospyError):
 SUSPENDED = (
     "it takes connections, so it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
 )
-"""The explanation if a process accepts connections but does not respond."""
+"""The explanation for a process that accepts connections but does not respond."""
 
 
 class RpcError(MinirospyError):
@@ -227,7 +230,7 @@ class RpcRefused(RpcError):
 
 
 class RpcProtocolError(RpcError):
-    """A peer's bytes are not HTTP, or not XML-RPC; ``status`` is the HTTP status with which a server responds."""
+    """A peer sent data that is not valid HTTP or XML-RPC; ``status`` is the HTTP status that a server responds with."""
 
     def __init__(self, text: str, *, status: int = 400) -> None:
         super().__init__(text)
@@ -277,7 +280,7 @@ class CallFailed(WireError):
 
 
 class SourceError(MinirospyError):
-    """A text written by a person has a fault: ``file`` (or another name for it), ``line`` (from 1; 0: the whole text)."""
+    """A fault in a text written by a person: ``file`` (its path or another name), ``line`` (from 1; 0 means the whole text)."""
 
     def __init__(self, file: str, line: int, text: str) -> None:
         super().__init__(file, line, text)
@@ -290,7 +293,7 @@ class SourceError(MinirospyError):
 
 
 class DefinitionError(SourceError):
-    """An interface definition cannot be parsed; if it is not in a file, ``file`` is its type."""
+    """An interface definition cannot be parsed. If the definition is not in a file, ``file`` is the name of its type."""
 
 
 class ManifestError(SourceError):
@@ -318,7 +321,7 @@ class UrdfError(SourceError):
 
 
 class BagError(MinirospyError):
-    """A bag cannot be read or written; ``str()`` does not contain the file name, because the caller has it."""
+    """A bag cannot be read or written. ``str()`` does not contain the file name, because the caller has it."""
 
 
 class BagFormatError(BagError):
@@ -350,7 +353,7 @@ class BagVersionError(BagError):
 
 
 class BagUnindexedError(BagError):
-    """The bag was not closed, or its index is damaged; ``why`` is the fault, if one was found."""
+    """The bag was not closed, or its index is damaged; ``why`` describes the fault, if one was found."""
 
     def __init__(self, why: str = "") -> None:
         super().__init__(why)
@@ -361,7 +364,7 @@ class BagUnindexedError(BagError):
 
 
 class McapUnindexedError(BagUnindexedError):
-    """The MCAP file was not completed, or its summary is damaged; ``why`` is the fault."""
+    """The MCAP file was not completed, or its summary is damaged; ``why`` describes the fault."""
 
     def __str__(self) -> str:
         return f"the MCAP file is not complete: {self.why}"
@@ -407,7 +410,10 @@ class BridgeProtocolError(BridgeError):
 
 
 class ValueTextError(MinirospyError):
-    """A value typed by a person (``text``, or the name of its file or parameter) cannot be used; ``why`` is the reason."""
+    """A value typed by a person cannot be used.
+
+    ``text`` is the value, or the name of its file or parameter; ``why`` is the reason.
+    """
 
     def __init__(self, text: str, why: str) -> None:
         super().__init__(text, why)
@@ -444,7 +450,7 @@ class ThreadLimitError(ROSException):
 
 
 class NoThreadsAtEndError(ThreadLimitError):
-    """Python 3.12.0 to 3.12.2 start no more threads once the main thread has exited (CPython issue 113964)."""
+    """A thread cannot be started: Python 3.12.0 to 3.12.2 start none once the main thread has exited (CPython issue 113964)."""
 
     def __init__(self) -> None:
         super().__init__(0, [])
@@ -537,7 +543,10 @@ class SerializationError(MessageException):
 
 
 class SerializationOverflowError(SerializationError, OverflowError):
-    """A number exceeds a float32's range. Programs for genpy expect an OverflowError, minirospy's code a SerializationError."""
+    """A number exceeds a float32's range.
+
+    Programs written for genpy expect an OverflowError, minirospy's code a SerializationError.
+    """
 
 
 class DeserializationError(MessageException):

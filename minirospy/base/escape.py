@@ -15,12 +15,12 @@ from typing import TextIO
 __all__ = ["SafeTerminal", "escaped", "has_controls", "own_output"]
 
 _CONTROLS = r"\x00-\x1f\x7f-\x9f\u2028\u2029"
-# Direction marks reverse the text that follows, so that a name could look like another one.
+# Direction marks are included because they reverse the text that follows, so that a name could look like another one.
 _CONTROL = re.compile(f"[{_CONTROLS}\u202a-\u202e\u2066-\u2069]")
 _NAME_CONTROL = re.compile(f"[{_CONTROLS}]")
 
 _OWN_SEQUENCE = re.compile(r"\033\[[0-9;]*m|\r?\033\[K|\033\[2J\033\[;H|\033\]2;[^\x00-\x1f\x7f-\x9f]*\007")
-"""The sequences that the commands themselves send to a terminal: colours, clearing a line or screen, the window title."""
+"""The control sequences that the commands themselves send to a terminal: colours, clearing a line or screen, the window title."""
 
 
 def escaped(text: str, keep: str = "") -> str:
@@ -33,12 +33,12 @@ def escaped(text: str, keep: str = "") -> str:
 
 
 def has_controls(text: str) -> bool:
-    """Return whether ``text`` contains a control character or a line separator, and therefore is not a name or a URI."""
+    """Return whether ``text`` contains a control character or a line separator, and therefore is neither a name nor a URI."""
     return _NAME_CONTROL.search(text) is not None
 
 
 def own_output() -> TextIO:
-    """Return the standard output for drawings that move the cursor; :class:`SafeTerminal` would escape these sequences.
+    """Return a standard output for drawings that move the cursor, because :class:`SafeTerminal` would escape those sequences.
 
     The caller must escape untrusted text in the drawing.
     """
@@ -71,7 +71,7 @@ class SafeTerminal(io.TextIOWrapper):
         return super().write(text)
 
     def write_own(self, text: str) -> int:
-        """Write a command's own text, such as a status line, with its control characters unchanged."""
+        """Write a command's own text, such as a status line, without escaping its control characters."""
         return super().write(text)
 
     def close(self) -> None:
@@ -82,5 +82,6 @@ class SafeTerminal(io.TextIOWrapper):
             self.detach()
 
     def __del__(self) -> None:
-        # Do nothing: TextIOWrapper.__del__ would close the buffer, which sys.__stdout__ shares.
+        # Do not close the stream as TextIOWrapper.__del__ does, because that would close the buffer, which
+        # sys.__stdout__ shares.
         pass

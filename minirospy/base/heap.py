@@ -23,13 +23,13 @@ def return_large_blocks(least: int = _LARGE) -> None:
         return
     import ctypes
 
-    # musl has no such function, and a Python without libffi has no ctypes.
+    # musl does not have this function, and a Python without libffi has no ctypes.
     with contextlib.suppress(OSError, AttributeError):
         library = ctypes.CDLL(None)
         library.mallopt(_M_MMAP_THRESHOLD, least)
         if least > _LARGE:
-            # Use the same ratio as glibc's default; otherwise each block above 128 KiB grows and shrinks the heap's
-            # end.
+            # Use the same ratio as glibc does by default; otherwise each block above 128 KiB would grow and shrink
+            # the heap at its end.
             library.mallopt(_M_TRIM_THRESHOLD, 2 * least)
 
 

@@ -1,7 +1,7 @@
 """Build the command line with which the user adds a library to minirospy's own environment.
 
-Environments made by pipx or uv have no `python -m pip`, but their own commands. Sources: https://pipx.pypa.io and
-https://docs.astral.sh/uv/concepts/tools.
+Environments created by pipx or uv have no `python -m pip`; pipx and uv have commands for this. Sources:
+https://pipx.pypa.io and https://docs.astral.sh/uv/concepts/tools.
 """
 
 from __future__ import annotations
@@ -24,10 +24,9 @@ _SHELLS_OWN = re.compile(r"[^\w./\\:~+-]")
 def install_command(*requirements: str, upgrade: bool = False) -> str:
     """Return the command line that installs requirements (``minirospy[web]``, ``lz4``) into minirospy's own environment.
 
-    It works in sh, cmd.exe and PowerShell. ``upgrade``: replace a version that is too old.
+    The command line works in sh, cmd.exe and PowerShell. ``upgrade``: replace an installed version that is too old.
     """
-    # Imported here, only to describe an error, so that commands whose libraries are all installed do not load these
-    # modules.
+    # Imported here, only to describe an error: if all libraries are installed, commands do not load these modules.
     import importlib.util
     import sysconfig
 
@@ -42,7 +41,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
     if importlib.util.find_spec("pip") is None:
         return f"uv pip install --python {_quoted_path(sys.executable)}{option} {words}"
 
-    # PEP 668: pip requires this option, which the user also needed to install minirospy.
+    # Under PEP 668 pip requires this option, which the user also needed to install minirospy.
     marker = Path(sysconfig.get_path("stdlib")) / "EXTERNALLY-MANAGED"
     if sys.prefix == sys.base_prefix and marker.is_file():
         option += " --break-system-packages"
@@ -50,7 +49,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
 
 
 def _uv_tool_command(receipt: Path, requirements: tuple[str, ...], option: str) -> str:
-    """Return uv's command with all earlier requirements, because uv removes those that a new command does not include."""
+    """Return uv's command including all earlier requirements, because uv removes those that a new command omits."""
     try:
         text = receipt.read_text(encoding="utf-8").partition("entrypoints")[0]
     except OSError:
@@ -88,19 +87,19 @@ def _python() -> str:
 
     for name in ("python", "python3"):
         found = shutil.which(name)
-        # Do not use os.path.samefile, because a venv's interpreter may be a link to the system's.
+        # Do not use os.path.samefile, because a venv's interpreter may be a link to the system's interpreter.
         if found is not None and os.path.normcase(found) == os.path.normcase(sys.executable):
             return name
     return _quoted_path(sys.executable)
 
 
 def _quoted(word: str) -> str:
-    """Return a word quoted for any shell, with double quotes, because cmd.exe treats single quotes as part of the word."""
+    """Return a word quoted for any shell, with double quotes, because cmd.exe does not treat single quotes as quotes."""
     return f'"{word}"' if _SHELLS_OWN.search(word) else word
 
 
 def _quoted_path(path: str) -> str:
-    """Return a program's path for the system's shells.
+    """Return a program's path, quoted for the system's shells.
 
     On Windows only the parts that need it are quoted: cmd.exe and PowerShell both run ``C:\\"Program Files"\\python.exe``,
     but PowerShell parses a line that starts with a quote as an expression.

@@ -36,7 +36,7 @@ PYTHON_LEVELS = {
 
 
 SEVERITIES = {python: LEVEL_NAMES[ros] for ros, python in PYTHON_LEVELS.items()}
-"""Python's level -> ROS's name for it."""
+"""Dict from Python's level to ROS's name for it."""
 
 
 def ros_level(python_level: int) -> int:
@@ -45,7 +45,7 @@ def ros_level(python_level: int) -> int:
 
 
 def logger_levels(names: Iterable[str]) -> dict[str, str]:
-    """Return the name of each logger's effective level."""
+    """Return a dict from logger name to the name of the logger's effective level."""
     return {name: LEVEL_NAMES[ros_level(logging.getLogger(name).getEffectiveLevel())] for name in names}
 
 

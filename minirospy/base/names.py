@@ -59,7 +59,7 @@ def canonicalize(name: str) -> str:
 
 
 def namespace_of(name: str) -> str:
-    """Return the namespace that contains ``name``, with a trailing slash: ``/a/b`` -> ``/a/``."""
+    """Return the namespace that contains ``name``, with a trailing slash: ``/a/`` for ``/a/b``."""
     if not name:
         return "/"
     stem = name.removesuffix("/")
@@ -120,8 +120,8 @@ class Arguments(NamedTuple):
 def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
     """Extract ``from:=to``, ``_param:=value`` and ``__special:=value`` from a command line.
 
-    An argument that does not start with a name, such as ``--flag:=x``, remains for the program; an argument without a value
-    has no effect.
+    An argument that does not start with a name, such as ``--flag:=x``, remains for the program; an assignment without a
+    value has no effect.
     """
     parsed = Arguments([], {}, {}, {}, [])
     for argument in argv:
@@ -144,9 +144,9 @@ def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
 
 
 def parse_launch_arguments(words: Iterable[str]) -> dict[str, str]:
-    """Return name -> value for the launch-file arguments ``name:=value`` among ``words``.
+    """Return a dict of the launch-file arguments ``name:=value`` among ``words``.
 
-    As in roslaunch, spaces around a value are stripped, and an argument with an empty value has its default;
+    As in roslaunch, spaces around a value are stripped, and an argument with an empty value keeps its default;
     special names (``__ns``) and private parameters (``_name``) are not arguments.
     """
     pairs = (word.partition(":=") for word in words)

@@ -18,7 +18,7 @@ from typing import IO
 __all__ = ["create_file", "open_file", "open_text", "read_file", "remove_file", "replace_file"]
 
 OPEN_ELSEWHERE_PATIENCE = 1.0
-"""Seconds to wait on Windows while another process, such as a virus scanner, has the file open."""
+"""Seconds to retry on Windows while another process, such as a virus scanner, has the file open."""
 
 _REFUSES_OPEN_FILES = sys.platform == "win32"
 
@@ -37,7 +37,7 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
     single hard link. With O_TRUNC the file is truncated only after these checks.
     """
     if os.path.islink(path):
-        # Check this because Windows has no O_NOFOLLOW. On other systems it only results in a clearer error.
+        # Check this because Windows has no O_NOFOLLOW; on other systems it only makes the error clearer.
         raise _refusal(path, "it is a symbolic link, which is not followed")
 
     file = os.open(path, (flags & ~os.O_TRUNC) | _FLAGS, mode)
@@ -101,7 +101,7 @@ def _until_closed(action: Callable[[], None]) -> None:
             action()
             return
         except PermissionError:
-            # On other systems the folder's permissions are the cause, which waiting does not change.
+            # On other systems the cause is the folder's permissions, which waiting does not change.
             if not _REFUSES_OPEN_FILES or time.monotonic() >= end:
                 raise
         time.sleep(pause)

@@ -1,4 +1,4 @@
-"""Let ROS 1's Python packages be imported if ROS 2 is sourced, whose std_msgs, tf2_ros, ... are first on PYTHONPATH.
+"""Make ROS 1's Python packages importable if ROS 2 is sourced, whose std_msgs, tf2_ros, ... are first on PYTHONPATH.
 
 `import rospy` and the commands call :func:`prefer_ros1` before the process imports ROS 1 messages. The bridge to
 ROS 2 does not call it, because its process needs ROS 2's packages.
@@ -36,17 +36,18 @@ _SUITABLE = frozenset(
     }
 )
 """Packages that need neither a client library nor messages, so that ROS 1 programs can use ROS 2's version of them."""
-_SUFFIXES = ("_msgs", "_srvs")  # of packages in workspaces, which are not in the overlay
+_SUFFIXES = ("_msgs", "_srvs")  # suffixes of packages in workspaces, which are not in the overlay
 _GENERATED = re.compile(rb"^from [\w.]+\.(?:msg|srv|action)\._\w+ import ", re.MULTILINE)
 """Matches msg/__init__.py as rosidl generates it; ROS 1 generates `from ._Name import *`."""
 _INDEX = os.path.join("share", "ament_index", "resource_index", "packages")
 _MAX_PARENTS = (
-    5  # folders from a package up to the prefix: prefix/local/lib/python3.12/dist-packages/std_msgs
+    # number of folders from a package up to the prefix: prefix/local/lib/python3.12/dist-packages/std_msgs
+    5
 )
 
 
 def prefer_ros1() -> None:
-    """Let imports such as `import std_msgs` skip ROS 2's packages. Idempotent; no effect without ROS 2.
+    """Make imports such as `import std_msgs` skip ROS 2's packages. Idempotent; no effect without ROS 2.
 
     Raise ImportError if ROS 2 messages are already imported, because a process can have only one package with each name.
     """
@@ -86,7 +87,7 @@ class _Finder:
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return the spec of the first package on ``sys.path`` that is not ROS 2's; None defers to the other finders."""
+        """Return the spec of the first package on ``sys.path`` that is not ROS 2's, or None to leave it to the other finders."""
         if path is not None or not (fullname in self.names or fullname.endswith(_SUFFIXES)):
             return None
         found = PathFinder.find_spec(fullname)

@@ -14,7 +14,7 @@ _this_thread = threading.local()
 
 @contextlib.contextmanager
 def dispatching_signal() -> Iterator[None]:
-    """Make :func:`is_dispatching_signal` true in this thread during the block, which handles a signal."""
+    """Make :func:`is_dispatching_signal` return True in this thread during the block, which handles a signal."""
     _this_thread.is_dispatching = True
     try:
         yield
@@ -28,6 +28,9 @@ def is_dispatching_signal() -> bool:
 
 
 def interrupt_signals() -> list[signal.Signals]:
-    """Return the signals that Ctrl-C sends: SIGINT, and on Windows SIGBREAK, which alone reaches a separate process group."""
+    """Return the signals that Ctrl-C sends: SIGINT, and on Windows SIGBREAK.
+
+    Only SIGBREAK reaches a separate process group.
+    """
     found = (getattr(signal, name, None) for name in ("SIGINT", "SIGBREAK"))
     return [number for number in found if number is not None]

@@ -25,10 +25,12 @@ ALONE, PAUSE = Need
 
 Steps = Generator[Need | None, None, _T]  # work that yields between its steps and returns its result
 
-SMALL_ITEMS = 2000  # items; a value with this many takes a few milliseconds to serialize
+SMALL_ITEMS = 2000  # number of items; a value with this many takes a few milliseconds to serialize
 
 SHORT_ITEMS = 300
-"""Items; a value with this many takes some 0.1 ms to serialize, which is short even if a thousand clients request it together."""
+"""Number of items; a value with this many takes some 0.1 ms to serialize, short even if a thousand clients request it
+together.
+"""
 
 _LETTERS_PER_ITEM = 16
 

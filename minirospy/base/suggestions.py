@@ -14,7 +14,7 @@ __all__ = ["did_you_mean", "nearest"]
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return up to three of the ``known`` names that are similar to ``name``."""
     if not isinstance(name, str):
-        # A program passed a value that is not a string, for which nothing is found either.
+        # A program passed a value that is not a string, to which no name is similar.
         return []
     names = sorted(set(known))
     # The most common mistake is to omit the package or namespace.
@@ -23,13 +23,13 @@ def nearest(name: str, known: Iterable[str]) -> list[str]:
 
 
 _SLIP = 0.85
-"""Minimum similarity (difflib's ratio) of two names that differ in only one or two missing, wrong or extra letters."""
+"""Minimum similarity (difflib's ratio) for two names that differ in only one or two missing, wrong or extra letters."""
 
 _STEM = 4  # minimum length, in letters, of a prefix for which completions are suggested
 
 
 def did_you_mean(word: str, known: Iterable[str], most: int = 2, *, only_slips: bool = False) -> str:
-    """Return a suggestion of up to ``most`` of the ``known`` words that are similar to an unknown word, or "".
+    """Return text that suggests up to ``most`` of the ``known`` words that are similar to an unknown word, or "".
 
     ``only_slips``: suggest only words with one or two missing, wrong or extra letters.
     """
@@ -54,10 +54,10 @@ def _similar(word: str, known: Iterable[str], cutoff: float) -> list[str]:
         for (meant, matcher), part in zip(wanted, reversed(parts), strict=False):
             matcher.set_seq1(part)
             ratios.append(1.0 if part == meant else _ratio(part, meant, matcher, cutoff))
-        # Also suggest the same name in another package or namespace.
+        # Also suggest a name whose last part is the same, in another package or namespace.
         if ratios and (min(ratios) >= cutoff or (ratios[0] == 1 and cutoff < _SLIP)):
             found.append((-sum(ratios) / len(ratios), len(parts) != len(wanted), name))
-    # If the name exists in another letter case or without an extension, suggest only that.
+    # If the name exists in other letter case or without an extension, suggest only that.
     exact = [entry for entry in found if entry[0] == -1]
     return [name for *_, name in sorted(exact or found)]
 
@@ -72,7 +72,7 @@ def _ratio(part: str, meant: str, matcher: SequenceMatcher[str], cutoff: float) 
     shorter, longer = sorted((part, meant), key=len)
     if cutoff < _SLIP and len(shorter) >= _STEM and longer.startswith(shorter):
         return max(cutoff, matcher.quick_ratio())
-    # Both are cheap upper bounds of ratio().
+    # Both methods are cheap upper bounds of ratio().
     if matcher.real_quick_ratio() < cutoff or matcher.quick_ratio() < cutoff:
         return 0.0
     return matcher.ratio()

@@ -1,4 +1,4 @@
-"""Times and durations as ROS messages contain them: seconds and nanoseconds, normalized.
+"""Times and durations as in ROS messages: seconds and nanoseconds, normalized.
 
 Source: http://wiki.ros.org/genpy, http://docs.ros.org/api/genpy/html/.
 """
@@ -38,7 +38,7 @@ class TVal:
 
     @classmethod
     def from_sec(cls: type[_V], float_secs: float) -> _V:
-        """Convert seconds, as a float, to a value."""
+        """Convert seconds, as a float, to a time or duration."""
         return cls(*_split(float_secs))
 
     def is_zero(self) -> bool:
@@ -51,7 +51,7 @@ class TVal:
         self.nsecs = nsecs
 
     def canon(self) -> None:
-        """Normalize, so that 0 <= nsecs < 1e9."""
+        """Normalize the value, so that 0 <= nsecs < 1e9."""
         if not 0 <= self.nsecs < _BILLION:
             carry, self.nsecs = divmod(self.nsecs, _BILLION)
             self.secs += carry
@@ -65,7 +65,7 @@ class TVal:
         secs, nsecs = self.secs, self.nsecs
         if type(secs) is int and type(nsecs) is int:
             return secs * _BILLION + nsecs
-        # A program may have assigned fractions, or numpy values, which overflow.
+        # The program may have assigned fractions, or numpy values, which overflow.
         whole, rest = _split(secs)
         return whole * _BILLION + rest + int(nsecs)
 
@@ -246,12 +246,12 @@ class Duration(TVal):
     __hash__ = TVal.__hash__
 
 
-# Set the slots that genpy's classes have; the attributes themselves belong to TVal.
+# Define the same slots as genpy's classes do; the attributes themselves belong to TVal.
 Time.__slots__ = Duration.__slots__ = TVal.__slots__
 
 
 def _split(seconds: float) -> tuple[int, int]:
-    """Return whole seconds, and the remaining nanoseconds, truncated and not rounded, as in genpy."""
+    """Return whole seconds, and the remaining nanoseconds, which are truncated and not rounded, as in genpy."""
     whole = int(seconds)
     return whole, int(float(seconds - whole) * 1e9)
 

@@ -16,12 +16,13 @@ from minirospy.base.errors import MinirospyError
 
 __all__ = ["MAX_LEVELS", "XmlElement", "XmlError", "XmlSyntaxError", "check_xml", "new_parser", "parse_xml"]
 
-MAX_LEVELS = 100  # nested tags; parsers and libraries recurse once or more per level
-_MAX_ELEMENTS = 1_000_000  # tags per document; a tag of 4 characters already uses about 500 bytes of memory
+MAX_LEVELS = 100  # maximum depth of nested tags; parsers and libraries recurse at least once per level
+# maximum tags per document; a tag of 4 characters already uses about 500 bytes of memory
+_MAX_ELEMENTS = 1_000_000
 
 
 class XmlError(MinirospyError):
-    """The text is rejected: ``line`` is the location, 0 if unknown, and ``why`` the reason."""
+    """The text is rejected; ``line`` is where the error is, or 0 if unknown, and ``why`` is the reason."""
 
     def __init__(self, line: int, why: str) -> None:
         super().__init__(line, why)
@@ -38,7 +39,7 @@ class XmlSyntaxError(XmlError):
 
 @dataclass
 class XmlElement:
-    """A tag at ``line``; ``text`` is its text without its children's text."""
+    """A tag at ``line``. ``text`` is its own text, without the text of its children."""
 
     tag: str
     attributes: dict[str, str]
@@ -56,7 +57,7 @@ class XmlElement:
 
 
 def new_parser() -> expat.XMLParserType:
-    """Return a parser that rejects expanding declarations (Parse raises XmlError), and delivers text in large pieces."""
+    """Return a parser that rejects declarations that may expand (Parse raises XmlError), and delivers text in large pieces."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
 

@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 
 __all__ = ["check_yaml", "fast_loader", "guarded", "load", "load_all", "one_line", "safe_load"]
 
-_MAX_LEVELS = 200  # nested lists and dictionaries; PyYAML recurses several times per level
-_MAX_VALUES = 1_000_000  # values in a text with its aliases expanded
-_MAX_NUMBER = 1_000  # characters; parsing takes quadratic time, and a double has at most 309 digits
+_MAX_LEVELS = 200  # maximum depth of nested lists and dictionaries; PyYAML recurses several times per level
+_MAX_VALUES = 1_000_000  # maximum values in a text with its aliases expanded
+# maximum characters in a number; parsing takes quadratic time, and a double has at most 309 digits
+_MAX_NUMBER = 1_000
 _INDENT = re.compile(r"^[ \t?:-]+", re.MULTILINE)
 _NUMBERS = frozenset({"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"})
 
@@ -78,7 +79,7 @@ def _require_text(text: object) -> None:
 
 
 def fast_loader() -> type[yaml.SafeLoader]:
-    """Return PyYAML's compiled safe loader, or if it is missing the pure Python one, which takes ten times as long."""
+    """Return PyYAML's compiled safe loader. If that is missing, return the pure Python one, which takes ten times as long."""
     import yaml
 
     fastest: type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -87,7 +88,7 @@ def fast_loader() -> type[yaml.SafeLoader]:
 
 @lru_cache(maxsize=32)
 def guarded(loader: Loader) -> Loader:
-    """Return a loader that rejects long numbers. Constructors that are added to ``loader`` later also apply."""
+    """Return a loader that rejects long numbers. It also uses constructors added to ``loader`` later."""
     import yaml
 
     class Guarded(loader):  # type: ignore[valid-type,misc]
@@ -104,10 +105,11 @@ def guarded(loader: Loader) -> Loader:
 def check_yaml(text: str) -> None:
     """Raise ValueError if a YAML text is nested too deeply, or expands too much through its aliases.
 
-    YAML libraries accept both: nesting may crash Python, and a value with aliases is small only until it is sent or
+    YAML libraries accept such text: nesting may crash Python, and a value with aliases is small only until it is sent or
     printed. Raise yaml.YAMLError if the text is not YAML.
     """
-    # Compute an upper bound for the depth from brackets and indentation. Nearly all texts are accepted here.
+    # Compute an upper bound for the depth from brackets and indentation, which is within the limit for nearly all
+    # texts.
     indent = max(map(len, _INDENT.findall(text)), default=0)
     has_aliases = "*" in text and "&" in text
     if text.count("[") + text.count("{") + 2 * indent < _MAX_LEVELS and not has_aliases:
@@ -116,7 +118,7 @@ def check_yaml(text: str) -> None:
 
     counts = [0]  # number of values in each open collection, outermost first
     anchors: list[str | None] = []
-    # anchor -> number of values in its node, or None while the node is open
+    # dict from anchor to the number of values in its node, or None while the node is open
     sizes: dict[str, int | None] = {}
     for event in yaml.parse(text, Loader=fast_loader()):
         match event:
@@ -153,7 +155,9 @@ def one_line(error: Exception) -> str:
 
 
 _RAISED = (ValueError, ArithmeticError, LookupError, AttributeError, TypeError, RecursionError)
-"""Exceptions in check_yaml and PyYAML, for example for an invalid date, or for a tag such as !!bool on other text."""
+"""Exceptions that check_yaml and PyYAML raise, for example for an invalid date, or for !!bool before text that is not a
+boolean.
+"""
 
 
 def _reason(error: Exception) -> str:

@@ -1,4 +1,4 @@
-"""The virtual board, for programs that simulate its surroundings: press buttons, read lights, move a person.
+"""The virtual board, for programs that simulate its surroundings: press buttons, read LEDs, move a person.
 
 ::
 
@@ -45,7 +45,7 @@ class BoardState:
 
 
 class Board:
-    """The board ``name`` (default: MINIROSPY_BOARD, else "default"); started if it is not running.
+    """The board ``name`` (default: MINIROSPY_BOARD, else "default"); its server is started if it is not running.
 
     Thread-safe. Pins are BCM numbers, 0 to 53. Every method raises BoardError if a pin does not exist or the board does
     not respond.
@@ -70,13 +70,13 @@ class Board:
     def press(self, pin: int) -> None:
         """Press the button at ``pin``, until :meth:`release`.
 
-        The wired buttons (11, 12) then read 1. A button at any other pin reads 1 too, unless the pin's pull-up is
-        enabled: then the button connects it to ground, and it reads 0.
+        The pins of the wired buttons (11, 12) then read 1. Any other pin reads 1 too, unless its pull-up is enabled: then
+        the button connects the pin to ground, and it reads 0.
         """
         self._link.call(Press(pin))
 
     def release(self, pin: int) -> None:
-        """Release the button at ``pin``; also undoes :meth:`set` on an input."""
+        """Release the button at ``pin``. On an input, this also undoes :meth:`set`."""
         self._link.call(Release(pin))
 
     def set(self, pin: int, level: int) -> None:
@@ -105,7 +105,7 @@ class Board:
         return self._link.levels[_checked(pin)]
 
     def levels(self) -> dict[int, int]:
-        """Return BCM pin -> level, for all pins."""
+        """Return a dict from BCM pin to level, for all pins."""
         return dict(enumerate(self._link.levels))
 
     def state(self) -> BoardState:

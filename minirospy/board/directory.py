@@ -20,7 +20,7 @@ from minirospy.base.errors import BoardError
 __all__ = ["BoardDirectory"]
 
 _NAME = re.compile(r"[A-Za-z0-9_.-]{1,60}")
-_SOCKET_PATH_LIMIT = 100  # bytes in a Unix socket's path; macOS allows 103, Linux 107
+_SOCKET_PATH_LIMIT = 100  # maximum bytes in a Unix socket's path; macOS allows 103, Linux 107
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,10 @@ class BoardDirectory:
 
     @property
     def uses_unix_socket(self) -> bool:
-        """Return whether the server listens on ``socket_path``; otherwise it uses loopback TCP, at ``address_path``."""
+        """Return whether the server listens on the Unix socket ``socket_path``.
+
+        Otherwise it uses loopback TCP, see ``address_path``.
+        """
         has_unix = sys.platform != "win32" and hasattr(socket, "AF_UNIX")
         return has_unix and len(os.fsencode(self.socket_path)) <= _SOCKET_PATH_LIMIT
 
@@ -90,7 +93,7 @@ class BoardDirectory:
 
     @property
     def log_path(self) -> Path:
-        """The path of the log in which a failing server writes its error."""
+        """The path of the log to which a failing server writes its error."""
         return self.folder / f"{self.name}.log"
 
 

@@ -18,7 +18,7 @@ Callback = Callable[[int], object]
 
 
 class Slope(IntEnum):
-    """The direction of the edges to detect, with RPi.GPIO's numbers."""
+    """The direction of the edges to detect; the numbers are RPi.GPIO's."""
 
     RISING = 31
     FALLING = 32
@@ -26,7 +26,7 @@ class Slope(IntEnum):
 
 
 class Detector:
-    """Watches one channel: decides which edges count, and records that one occurred.
+    """Watches one channel: decides which edges count, and records that one has occurred.
 
     ``bouncetime`` is in seconds, or None for no debouncing.
     """

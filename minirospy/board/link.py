@@ -1,4 +1,4 @@
-"""A process's connection to a board: operations in, the mirrored pins and edges out.
+"""A process's connection to a board: operations in, mirrored pins and edges out.
 
 Blocking and thread-safe; one reader thread updates the mirror. If no server responds, one is started; if the server
 dies, another one is started, and unacknowledged requests are sent again, so that the caller sees no error.
@@ -44,13 +44,14 @@ if TYPE_CHECKING:
 __all__ = ["Edge", "Link"]
 
 START_PATIENCE = 30.0
-"""Seconds for a server to start; a loaded small machine needs two or three, a machine with blocked I/O up to fifteen."""
+"""Seconds to wait for a server to start; a loaded small machine needs two or three, a machine with blocked I/O up to fifteen."""
 
 ANSWER_PATIENCE = 40.0  # seconds to wait for a response; longer than it takes to replace a dead server
 
 CLOSE_PATIENCE = 0.5  # seconds that close() waits for the last outputs to arrive
 
-MAX_UNACKNOWLEDGED = 10_000  # requests in progress; beyond that, an output waits for the server
+# maximum number of requests in progress; beyond that, an output waits for the server
+MAX_UNACKNOWLEDGED = 10_000
 
 _SERVE = """\
 import sys
@@ -58,7 +59,7 @@ sys.path.append(sys.argv[1])
 from minirospy.board.server import main
 sys.exit(main(sys.argv[2:]))
 """
-"""Does the same as `python -m minirospy.board.server`, and also finds a package imported from the current folder."""
+"""Code that does the same as `python -m minirospy.board.server`, and also finds a package imported from the current folder."""
 
 
 class Edge(NamedTuple):
@@ -100,9 +101,10 @@ class Link:
         self._reader.start()
 
     def call(self, operation: Operation | MovePerson | None, timeout: float = ANSWER_PATIENCE) -> None:
-        """Perform ``operation``, and return when the mirror shows its effect; None only waits for the operations sent before.
+        """Perform ``operation``, and return when the mirror shows its effect.
 
-        Raise BoardError if the board refuses or does not respond within ``timeout`` seconds.
+        None only waits for the operations sent before. Raise BoardError if the board refuses or does not respond within
+        ``timeout`` seconds.
         """
         with self._news:
             number = self._send(operation)
@@ -277,8 +279,8 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
-            # Status 0 although no server responds: the new server found another one that was just exiting. Negative:
-            # a Ctrl-C for this process killed the new server before it had left the terminal.
+            # Status 0 without a responding server: the new server found another one that was just exiting. Negative
+            # status: a Ctrl-C for this process killed the new server before it had detached from the terminal.
             process = _start_server(directory)
         time.sleep(pause)
         pause = min(pause * 1.3, 0.05)
@@ -325,7 +327,7 @@ def _connect(directory: BoardDirectory) -> _Connection | None:
 
 
 def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
-    """Start and return a server process in a new session, which outlives this process if the board still has clients."""
+    """Start and return a server process in a new session. It outlives this process if the board still has clients."""
     import subprocess
 
     if not sys.executable:
@@ -342,13 +344,13 @@ def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
             [sys.executable, "-c", _SERVE, root, str(directory.folder), directory.name],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            # On Windows the server writes its log itself; server.py gives the reason.
+            # On Windows the server writes the log itself; server.py explains why.
             stderr=log,
             cwd=directory.folder,
             start_new_session=True,
             creationflags=flags,
         )
-    # Wait for its exit status, or a long-lived client would have a zombie process.
+    # Wait for the server's exit status, because otherwise it would remain as a zombie of a long-lived client.
     threading.Thread(target=process.wait, name="gpio-server-wait", daemon=True).start()
     return process
 

@@ -1,8 +1,8 @@
 """A board's behaviour: operations in, changed pins out. Pure.
 
-A pin is an input or an output. An output's level is its latch; an input's level is the one driven from outside
-(a pressed button, a jumper wire), else its pull resistor, else 0. As on a Raspberry Pi, the latch does not change with the
-direction, or when the process that wrote it exits. In front of the board is a scanner, and perhaps a person.
+A pin is an input or an output. An output's level is its latch; an input's level is the one driven from outside (a
+pressed button, a jumper wire), else its pull resistor, else 0. As on a Raspberry Pi, the latch does not change if the
+direction changes, or if the process that wrote it exits. In front of the board is a scanner, and perhaps a person.
 """
 
 from __future__ import annotations
@@ -33,21 +33,22 @@ __all__ = [
 
 PINS = 54  # number of pins on the chip, in BCM numbering: 0 to 53
 
-LEDS = {2: "green", 3: "green", 4: "yellow", 5: "yellow", 6: "red", 7: "red"}  # BCM pin -> colour of its LED
+# dict from BCM pin to the colour of its LED
+LEDS = {2: "green", 3: "green", 4: "yellow", 5: "yellow", 6: "red", 7: "red"}
 
 BUTTONS = (11, 12)
 """BCM pins of the wired buttons: a resistor pulls them to 0, pressing a button drives its pin to 1."""
 
 
 class Function(IntEnum):
-    """A pin's function, with RPi.GPIO's numbers."""
+    """A pin's function; the numbers are RPi.GPIO's."""
 
     OUT = 0
     IN = 1
 
 
 class Pull(IntEnum):
-    """The resistor inside the chip, with RPi.GPIO's numbers."""
+    """The resistor inside the chip; the numbers are RPi.GPIO's."""
 
     OFF = 20
     DOWN = 21
@@ -55,7 +56,7 @@ class Pull(IntEnum):
 
 
 class Pin(NamedTuple):
-    """One pin; ``world`` is the level to which it is driven from outside, or None if it is not driven."""
+    """One pin; ``world`` is the level to which the pin is driven from outside, or None if it is not driven."""
 
     function: Function = Function.IN
     pull: Pull = Pull.OFF

@@ -1,6 +1,6 @@
-"""Messages between a board's server and its clients <-> bytes (msgpack). Pure.
+"""Convert messages between a board's server and its clients to bytes (msgpack) and back. Pure.
 
-Each message is an array: the number of its kind, then its fields. A client first sends Hello and then
+Each message is an array: the number that identifies its kind, then its fields. A client first sends Hello and then
 Requests with increasing numbers. The server first sends Welcome (the whole board), and then, on each change, Changed or
 PersonMoved to all clients. It sends Done to a client for its finished requests, after the changes that they caused.
 """
@@ -66,7 +66,7 @@ class MovePerson(NamedTuple):
 
 
 class Request(NamedTuple):
-    """Perform ``operation``; None only requests the Done message."""
+    """A request to perform ``operation``; with None, the only effect is a Done message."""
 
     number: int
     operation: Operation | MovePerson | None
@@ -102,7 +102,7 @@ class Done(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """Request ``number`` changed nothing, because of ``why``."""
+    """Request ``number`` was refused and changed nothing; ``why`` is the reason."""
 
     number: int
     why: str

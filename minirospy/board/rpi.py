@@ -1,4 +1,4 @@
-"""RPi.GPIO on the virtual board; importing it warns on a Raspberry Pi that the real library is missing."""
+"""RPi.GPIO on the virtual board; importing it on a Raspberry Pi issues a warning that the real library is missing."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The module for `import RPi.GPIO as GPIO`: the API of RPi.GPIO 0.7.1 on the virtual board.
 
-Names, defaults, error messages and warnings are RPi.GPIO's
-(https://sourceforge.net/p/raspberry-gpio-python/wiki/). The first call that needs the board connects to it, not the
-import. As on hardware, the pins keep their state when the process exits; only cleanup() resets them.
+Names, defaults, error messages and warnings are RPi.GPIO's (https://sourceforge.net/p/raspberry-gpio-python/wiki/). The
+import does not connect to the board; the first call that needs the board does. As on hardware, the pins keep their
+state when the process exits; only cleanup() resets them.
 """
 
 from __future__ import annotations
@@ -105,11 +105,11 @@ HEADER = {
     38: 20,
     40: 21,
 }
-"""Pin on the 40-pin header (BOARD numbering) -> BCM pin."""
+"""Dict from pin on the 40-pin header (BOARD numbering) to BCM pin."""
 
 
 class Gpio:
-    """The board as one program sees it: its numbering mode, the pins that it set up, its events."""
+    """The board as one program sees it: its numbering mode, the pins that it has set up, and its events."""
 
     def __init__(self, board: str | None = None) -> None:
         self._board = board
@@ -119,7 +119,7 @@ class Gpio:
         self._link: Link | None = None
         self._levels: list[int] = []
         self._directions: dict[int, int] = {}
-        # Channel -> BCM pin for the channels that are set up, for the two calls that must be fast.
+        # Dict from channel to BCM pin, for the channels that are set up; used by the two calls that must be fast.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
         # The same for channels that cleanup() has released in a signal handler, so that the interrupted call still
@@ -131,7 +131,7 @@ class Gpio:
         self._waves: dict[int, weakref.ref[Wave]] = {}
 
     def setmode(self, mode: int) -> None:
-        """Choose the numbering: BCM (chip) or BOARD (header)."""
+        """Choose the pin numbering: BCM (chip) or BOARD (header)."""
         mode = operator.index(mode)
         if self._mode is not None and mode != self._mode:
             raise ValueError("A different mode has already been set!")
@@ -141,7 +141,7 @@ class Gpio:
         self._interrupted.clear()
 
     def getmode(self) -> int | None:
-        """Return BCM, BOARD or None."""
+        """Return the numbering mode: BCM, BOARD, or None if it is not set."""
         return self._mode
 
     def setwarnings(self, flag: bool) -> None:
@@ -192,7 +192,7 @@ class Gpio:
         return int(self._linked().states[pin].function)
 
     def cleanup(self, channel: int | Sequence[int] | None = None) -> None:
-        """Make the channels that this program set up inputs again; without an argument also reset the numbering mode."""
+        """Reset the channels that this program set up to inputs; without an argument, also reset the numbering mode."""
         with self._lock:
             everything = channel is None
             wanted = (
@@ -201,7 +201,8 @@ class Gpio:
             mine = wanted & set(self._directions)
             if is_dispatching_signal():
                 # If this runs in a shutdown hook, the interrupted program may already have checked its flag and be
-                # about to use its pin. That must not fail: RPi.GPIO is written in C and finishes its calls first.
+                # about to use a pin. That must not fail, because RPi.GPIO, which is written in C, would finish the
+                # program's call first.
                 self._interrupted.update((one, pin) for one, pin in self._readable.items() if pin in mine)
 
             for pin in sorted(mine):
@@ -214,8 +215,8 @@ class Gpio:
                     del table[one]
 
             if everything and self._link is not None:
-                # Do this even if no channel was set up, because RPi.GPIO only checks whether it has accessed a pin
-                # yet.
+                # Do this even if no channel was set up, because RPi.GPIO only checks whether any pin has been
+                # accessed.
                 self._mode = None
 
         if not mine:
@@ -234,7 +235,7 @@ class Gpio:
         *,
         channel: int | None = None,
     ) -> None:
-        """Detect edges on an input; ``callback(channel)`` runs for each. ``bouncetime`` is in ms."""
+        """Detect edges on an input; ``callback(channel)`` is called for each. ``bouncetime`` is in ms."""
         number = gpio if gpio is not None else channel
         if number is None or edge is None:
             raise TypeError("add_event_detect() needs a channel and an edge")
@@ -309,7 +310,7 @@ class Gpio:
         atexit.unregister(self.close)
 
     def output_pin(self, channel: int) -> int:
-        """Return a channel's BCM pin, for a PWM. Raise the same exceptions as PWM()."""
+        """Return a channel's BCM pin for a PWM. Raise the same exceptions as PWM()."""
         pin = self._pin(channel)
         if pin in self._waves:
             raise RuntimeError("A PWM object already exists for this GPIO channel")

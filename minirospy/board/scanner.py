@@ -26,7 +26,7 @@ _DARK_EDGE = 0.35  # minimum brightness, from 0 to 1, of a surface seen from the
 
 
 class Wall(NamedTuple):
-    """A straight wall between two points; a reflector reflects all light."""
+    """A straight wall between two points; with ``is_reflector`` set, it reflects all light."""
 
     x1: float
     y1: float
@@ -49,7 +49,7 @@ class Circle(NamedTuple):
 
 
 class Scan(NamedTuple):
-    """One rotation: a range and an intensity for each beam (``inf``: nothing hit), and which beams hit a reflector."""
+    """One rotation: a range (``inf`` if nothing was hit) and an intensity for each beam, and which beams hit a reflector."""
 
     ranges: list[float]
     intensities: list[float]
@@ -107,7 +107,7 @@ class Room:
         return Scan(ranges, intensities, reflectors)
 
     def _person_ranges(self) -> dict[int, float]:
-        """Return beam -> distance, for the beams that hit the person."""
+        """Return a dict from beam to distance, for the beams that hit the person."""
         person = self.person
         if person is None:
             return {}

@@ -39,12 +39,12 @@ from minirospy.board.protocol import (
 
 __all__ = ["main"]
 
-LINGER = 1.5  # seconds that a board without clients waits for the next client
+LINGER = 1.5  # seconds for which a board without clients waits for the next client
 
 SAVE_AFTER = 0.05
-"""Seconds from a change to saving it, so that a fast-blinking LED causes at most 20 writes a second."""
+"""Delay in seconds before a change is saved, so that a fast-blinking LED causes at most 20 writes a second."""
 
-# Maximum unsent bytes for a client; beyond that it is disconnected, and reconnects when it reads again
+# Maximum unsent bytes for a client; beyond that the client is disconnected, and reconnects when it reads again
 MAX_UNSENT = 1 << 20
 
 LOCK_PATIENCE = 5.0  # seconds to wait for the lock if another server is about to exit
@@ -54,7 +54,8 @@ def main(argv: list[str]) -> int:
     """Serve the board NAME in FOLDER until it has no clients; return 0, also if another server is running."""
     directory = BoardDirectory(argv[1], Path(argv[0]))
     if sys.platform == "win32":
-        # Do not use an open file as on other systems: Windows could remove neither the file nor its folder.
+        # Do not keep a file open as on other systems, because Windows could then remove neither the file nor its
+        # folder.
         sys.stderr = _LogOnDemand(directory.log_path)
     # A board that already has saved state is not temporary, even if another process starts it again.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not directory.state_path.exists()
@@ -157,7 +158,7 @@ class _Server:
         if self._saving is not None:
             self._saving.cancel()
             self._saving = None
-        # If the folder was removed (by a test, or by cleaning /tmp), the clients must not fail.
+        # Ignore errors, because clients must not fail if the folder was removed (by a test, or by cleaning /tmp).
         with contextlib.suppress(OSError):
             _write_private(self._directory.state_path, encode_board(self._model.pins, self._model.person))
 

@@ -1,1 +1,1 @@
-"""The commands. A command is a typed function and a `main(argv) -> int`; the logic is in the modules that they call."""
+"""The commands. A command is a typed function and a `main(argv) -> int`; its logic is in the modules that it calls."""

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 __all__ = ["FAMILY", "Picture", "main", "render"]
 
 _STEP = 0.05
-"""The person's step per key in metres; also the width of a map cell, and half its height."""
+"""The person's step per key press in metres; it is also the width of a map cell, and half a cell's height."""
 
-_MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # metres that the map shows, ahead and to each side
+_MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # range of the map in metres, ahead and to each side
 
-_START: Position = (0.6, 0.0)  # where the person first appears
+_START: Position = (0.6, 0.0)  # initial position of the person
 
 _STEPS = {"up": (_STEP, 0.0), "down": (-_STEP, 0.0), "left": (0.0, _STEP), "right": (0.0, -_STEP)}
 
@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if words[:1] in (["-b"], ["--board"]):
         if len(words) == 1:
             return run(FAMILY.name, _missing_name)
-        # Set the variable, which nodes read as well, so that the verbs open the same board.
+        # Set the variable, because nodes read it as well, so that they and the verbs open the same board.
         os.environ["MINIROSPY_BOARD"] = words[1]
         words = words[2:]
     if not words:
@@ -55,7 +55,7 @@ def _missing_name() -> int:
 
 
 class Picture:
-    """A picture of a board for rich: its lights, its buttons, the person, and other pins in use."""
+    """A picture of a board for rich: its LEDs, its buttons, the person, and other pins in use."""
 
     def __init__(self, state: BoardState) -> None:
         self.state = state
@@ -166,7 +166,7 @@ def _show() -> int:
 
 @contextlib.contextmanager
 def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
-    """Yield a function that draws over the last drawing, or below it if the cursor cannot move back (TERM=dumb)."""
+    """Yield a function that draws over the previous drawing, or below it if the cursor cannot move back (TERM=dumb)."""
     from rich.live import Live
 
     if console.is_dumb_terminal:
@@ -177,7 +177,7 @@ def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
 
 
 def _act(board: Board, key: str) -> None:
-    """Apply a key press to the board."""
+    """Perform the action of a key on the board."""
     if key.isdecimal() and 1 <= int(key) <= len(BUTTONS):
         pin = BUTTONS[int(key) - 1]
         (board.release if board.get(pin) else board.press)(pin)
@@ -204,7 +204,7 @@ def _press(pin: Sequence[int]) -> None:
         for each in pin:
             board.press(each)
             used = board.state().pins[each]
-            # An input with a pull resistor may have a button that the user has wired.
+            # An input with a pull resistor may have a button that the user has connected.
             if each not in BUTTONS and (used.function is Function.OUT or used.pull == Pull.OFF):
                 part = f"it is wired to a {LEDS[each]} LED" if each in LEDS else "nothing is wired to it"
                 warn(

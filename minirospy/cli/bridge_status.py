@@ -17,7 +17,7 @@ _Json = Any
 
 
 class _Token(NamedTuple):
-    """A token. ``is_kept``: the token is from ROS_HOME, where this user's bridges store their tokens."""
+    """A token. ``is_kept``: the token was read from ROS_HOME, where this user's bridges store their tokens."""
 
     text: str
     is_kept: bool

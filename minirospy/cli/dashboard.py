@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard"]
 
-Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the view's link
+Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the link to the view
 
 
 def dashboard(argv: Sequence[str] | None = None) -> int:
@@ -36,7 +36,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _main(command: Command, argv: Sequence[str] | None = None) -> int:
-    """Run a command. Its arguments may contain remappings, because launch files start it as a node."""
+    """Run a command. Its arguments may contain remappings, because launch files may start it as a node."""
     words = list(sys.argv[1:] if argv is None else argv)
     remappings = [word for word in words if ":=" in word]
     body = partial(command.body, arguments=remappings)
@@ -72,7 +72,7 @@ def _parser(name: str, what: str) -> Parser:
 
 
 def _add_ignored(parser: Parser, *words: str, takes_value: bool = False) -> None:
-    """Accept an rqt option that has no effect on the page."""
+    """Accept an rqt option that has no effect on the dashboard's page."""
     if takes_value:
         parser.add_argument(
             *words, dest="ignored", metavar="X", help="accepted, without effect", completer="nothing"
@@ -147,8 +147,8 @@ def _window(
 ) -> Command:
     """Return the command that opens an rqt window.
 
-    ``what`` is the description; ``add_arguments`` adds the command's arguments, and ``chosen`` converts these to the view
-    and its settings.
+    ``what`` describes the window; ``add_arguments`` adds the command's arguments, and ``chosen`` converts these to the
+    view and its settings.
     """
 
     def make_parser() -> Parser:
@@ -292,7 +292,7 @@ def _serve(
 ) -> int:
     """Serve the page until Ctrl-C, SIGTERM or `rosnode kill`; return the exit status.
 
-    ``node_name``: set by joint_state_publisher_gui, which publishes joints; the default is the dashboard's own name.
+    ``node_name`` is set by joint_state_publisher_gui, which publishes joints; the default is the dashboard's usual name.
     """
     from minirospy.web.serve import require_libraries
 
@@ -379,7 +379,7 @@ def _serve(
 
 
 def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
-    """Return this user's tokens, or new ones if they cannot be stored in ROS_HOME, unless ``must_be_kept``.
+    """Return this user's tokens. If they cannot be stored in ROS_HOME, return new ones, unless ``must_be_kept`` is set.
 
     Even on loopback, the page needs the token to start programs and open files, because other users of the machine can
     connect.
@@ -414,7 +414,7 @@ def _announce(
     is_any = address in ("0.0.0.0", "::")
     # Do not use localhost: a browser may try ::1 first, and another user's program may listen on this port at ::1.
     host = ("127.0.0.1" if address != "::" else "::1") if is_any or address == "localhost" else address
-    # A local user's link gets the same rights as the user's own programs.
+    # A local user's link has the same rights as the user's own programs.
     own = tokens.read if read_only else tokens.write
     here = link(host, port, view, fields, token=own)
     is_opened = not no_browser and _open_browser(partial(link, host, port, view, fields), own, codes)
@@ -443,7 +443,7 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
         codes.redeem(code)
         return False
     codes.when_ended(code, remove)
-    # Check after the code has expired according to its own clock.
+    # Check after the code has expired according to the clock of Codes.
     asyncio.get_running_loop().call_later(LIFETIME + 1, codes.forget_expired)
     return True
 
@@ -458,9 +458,9 @@ _ARGUMENTS: Mapping[str, tuple[Callable[[Parser], None] | None, Callable[..., tu
     "rqt_reconfigure": (_add_nodes, _nodes),
     "rqt_top": (None, _top),
 }
-"""Commands with arguments:
+"""Commands that have arguments, each with two functions.
 
-the function that adds the arguments, and the function that converts them to a view and its settings.
+One function adds the arguments; the other converts them to a view and its settings.
 """
 
 COMMANDS = {

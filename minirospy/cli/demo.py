@@ -29,13 +29,13 @@ __all__ = ["COMMAND", "main"]
 
 BUTTON, LED = 11, 7
 _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
-"""Seconds for which the button is pressed and released.
+"""Seconds for which the button is pressed and then released.
 
 Each is between two of the node's ten polls per second, so that the LED reacts after its typical delay.
 """
 _FOLLOW_SECONDS = 10.0
 _START_SECONDS = 180.0
-"""Timeout, long enough for Windows with a virus scanner or for a Raspberry Pi. A failed launch ends the wait early."""
+"""Timeout in seconds, long enough for Windows with a virus scanner or for a Raspberry Pi. A failed launch ends the wait early."""
 _WAY = (
     "button_publisher.py --- /button_state (std_msgs/Bool) ---> led_actuator.py",
     "  reads GPIO 11, ten times a second                          sets GPIO 7",
@@ -93,7 +93,7 @@ def _is_dumb() -> bool:
 
 @contextlib.contextmanager
 def _own_world() -> Iterator[Path]:
-    """Set up a separate master port and board, so that the demo affects nothing else; yield a folder for its files."""
+    """Set up a separate master port and board, so that the demo affects no other programs; yield a folder for its files."""
     with tempfile.TemporaryDirectory(prefix="minirospy-demo-", ignore_cleanup_errors=True) as folder:
         os.environ["MINIROSPY_LOCAL"] = "1"
         os.environ["ROS_MASTER_URI"] = f"http://localhost:{_free_port()}"
@@ -107,8 +107,8 @@ def _own_world() -> Iterator[Path]:
 def _free_port() -> int:
     """Return a free port for the master, which starts later.
 
-    Do not let the system choose: it returns an ephemeral port (32768 or 49152 and up), which another program's connection
-    may use before the master starts.
+    The system must not choose the port, because it returns an ephemeral port (32768 or 49152 and up), which another
+    program's connection may use before the master starts.
     """
     for port in random.sample(range(20_000, 32_000), 100):
         with socket.socket() as probe, contextlib.suppress(OSError):
@@ -199,7 +199,7 @@ def _rest(board: Board, launch: subprocess.Popen[bytes], show: _Lines | _Picture
 
 
 class _Lines:
-    """Prints the demo as one line per press, for outputs that are not a terminal or cannot be redrawn."""
+    """Prints one line per press, for outputs that are not a terminal or cannot be redrawn."""
 
     def __enter__(self) -> None:
         print("\n".join(_WAY), flush=True)
@@ -219,7 +219,7 @@ class _Lines:
 
 
 class _Picture:
-    """Shows the demo on a terminal: the board and the current step."""
+    """Shows the demo on a terminal, as a picture of the board and the current step."""
 
     def __init__(self, board: Board) -> None:
         from rich.console import Console

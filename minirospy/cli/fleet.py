@@ -342,7 +342,7 @@ def _takeover(robot: str, machine: str, any: bool) -> int:
 
 
 def _network(connect: Sequence[str], listen: Sequence[str], config: str, scouts: bool) -> NetworkOptions:
-    """Return the endpoints to connect to and to listen on.
+    """Return the network endpoints to connect to and to listen on.
 
     Raise BridgeError if the library is missing, Misuse if an endpoint is invalid.
     """

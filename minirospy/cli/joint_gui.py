@@ -19,9 +19,9 @@ _NAME = "joint_state_publisher_gui"
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the node; return its exit status.
 
-    The sliders are shown on a page if a browser can be opened. They are also on a page, whose link is printed, if there
-    is neither a display nor a terminal. ``--page`` and ``--terminal`` override this. If the page's libraries are missing,
-    the terminal is used.
+    The sliders are shown on a web page if a browser can be opened. If there is neither a display nor a terminal, they are on a
+    page too, whose link is printed. In all other cases, and if the page's libraries are missing, they are in the terminal.
+    ``--page`` and ``--terminal`` override this.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if "--terminal" in words or not (_uses_page(words) and _has_libraries()):

@@ -1,7 +1,7 @@
 """`minirospy python FILE`: run a program with the Python in which minirospy is installed.
 
-Needed for a separate installation (`pipx install minirospy`, `uv tool install minirospy`), because `python` is then
-another Python.
+This is needed if minirospy has a separate environment (`pipx install minirospy`, `uv tool install minirospy`), because
+`python` is then a different Python.
 """
 
 from __future__ import annotations

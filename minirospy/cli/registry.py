@@ -1,6 +1,6 @@
 """A table of all commands, from which the console scripts, `minirospy VERB` and completion are generated.
 
-The build makes the console scripts (hatch_build.py); `python tools/commands.py` writes the lists for the shells and for the
+The build creates the console scripts (hatch_build.py); `python tools/commands.py` writes the lists for the shells and for the
 conda recipe.
 
 A command's module is imported when the command is started or completed.
@@ -23,8 +23,8 @@ __all__ = ["COMMANDS", "SHELL_FUNCTIONS", "Entry", "console_scripts", "find_scri
 class Entry(NamedTuple):
     """A command: its module and its names.
 
-    ``script`` is the console script, ``verb`` the word after `minirospy`; either may be empty. A verb without a summary
-    is not shown in the help. ``grammar`` is the name of the Command or Family in ``module``; a command that parses its
+    ``script`` is the console script, ``verb`` the word after `minirospy`; either may be empty. The help does not show a
+    verb without a summary. ``grammar`` is the name of the Command or Family in ``module``; a command that parses its
     arguments itself has none, and names a function of minirospy.cli.completion.completers in ``completer`` instead.
     """
 
@@ -38,7 +38,7 @@ class Entry(NamedTuple):
 
     @property
     def target(self) -> str:
-        """Return the console script's function in the syntax of an entry point."""
+        """The console script's function in the syntax of an entry point."""
         return f"minirospy.{self.module}:{self.function}"
 
     def load_main(self) -> Callable[[Sequence[str] | None], int]:
@@ -137,10 +137,10 @@ def console_scripts() -> dict[str, str]:
 
 
 def find_script(name: str) -> Entry | None:
-    """Return the command whose console script is ``name``."""
+    """Return the command whose console script is ``name``, or None if there is none."""
     return next((entry for entry in COMMANDS if entry.script == name), None)
 
 
 def find_verb(name: str) -> Entry | None:
-    """Return the command for `minirospy NAME`."""
+    """Return the command for `minirospy NAME`, or None if there is none."""
     return next((entry for entry in COMMANDS if entry.verb == name), None)

@@ -147,7 +147,7 @@ def _ros2_bridge(
         return _Listing(bridge, node) if list else bridge
 
     name = f"{BRIDGE_PREFIX}_list" if list else BRIDGE_PREFIX
-    # ROS 1 message classes cannot be imported if ROS 2 packages with the same names are.
+    # ROS 1 message classes cannot be imported after ROS 2 packages with the same names.
     return run(name, (), start, lambda _: None, imports_messages=False)
 
 

@@ -76,11 +76,11 @@ WINDOWS = (
     Window("smach_viewer", "smach", "Shows state machines", "0.4.13", "State machines of smach, in a browser.",
            programs=("smach_viewer", "smach_viewer.py")),
 )  # fmt: skip
-"""To add a window, add a line here, its arguments (if any) in dashboard.py, and run ``python tools/commands.py``."""
+"""The table. To add a window, add a line here, its arguments (if any) in dashboard.py, and run ``python tools/commands.py``."""
 
 
 def view_of_plugin(plugin: str) -> str:
-    """Return the view for a name given to `rqt --standalone`. Raise UsageError if there is none."""
+    """Return the view for a name passed to `rqt --standalone`. Raise UsageError if there is none."""
     # Imported here because every command imports this module.
     from minirospy.base.errors import UsageError
     from minirospy.web.dashboard.views import VIEWS

@@ -211,7 +211,10 @@ def is_down() -> bool:
 
 
 def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None]:
-    """Call ``interrupt``, in any thread, if the node shuts down during the block; it must unblock calls made in the block."""
+    """Call ``interrupt``, in any thread, if the node shuts down during the block.
+
+    It must unblock the calls made in the block.
+    """
     return current_session().lifecycle.interrupting(interrupt)
 
 
@@ -221,7 +224,7 @@ def resolve_name(name: str, caller_id: str | None = None) -> str:
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
-    """Return the command line's remapping of ``name``, as a global name; ``name`` itself if there is none."""
+    """Return ``name`` as remapped on the command line, as a global name; return ``name`` itself if it is not remapped."""
     return current_session().identity.remap(name, caller_id)
 
 

@@ -17,7 +17,8 @@ class Deferral:
     """
 
     def __init__(self) -> None:
-        self.pending = False  # a signal waits for the main thread to dispatch it; set by the signal handler
+        # True while a signal, recorded by the signal handler, is pending until the main thread dispatches it
+        self.pending = False
         # Dispatches the pending signal; called in the main thread
         self.dispatch: Callable[[], object] = lambda: None
         self._depth = 0
@@ -43,7 +44,7 @@ class Deferral:
 
     @contextlib.contextmanager
     def lifted(self) -> Iterator[None]:
-        """Leave the critical section during a block that runs the user's code."""
+        """Leave the critical section for the duration of a block that runs the user's code."""
         depth = int(is_main_thread())
         self._depth -= depth
         try:

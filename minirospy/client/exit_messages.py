@@ -1,4 +1,4 @@
-"""What an interrupted process prints: what it is still waiting for. Tracebacks of the interrupt are suppressed."""
+"""Report what an interrupted process is still waiting for, and suppress the tracebacks of the interrupt."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["report_waiting", "suppress_tracebacks"]
 
 
 def report_waiting(*, is_leaving: bool) -> None:
-    """Print what the process is still waiting for; ``is_leaving``: the node waits for the master to unregister it."""
+    """Print what the process is still waiting for; ``is_leaving``: the node is waiting for the master to unregister it."""
     what = "the master to unregister this node" if is_leaving else _what_runs()
     advice = "Press Ctrl-C again to interrupt it, and a third time to end the process"
     # The terminal may have been closed.
@@ -39,7 +39,7 @@ def _what_runs() -> str:
 
 
 def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
-    """Let the program, or a thread, exit without a traceback and with status 0 on an expected uncaught error."""
+    """If an expected error is not caught, let the program or thread exit with status 0 and without a traceback."""
     hooks = sys.excepthook, threading.excepthook, sys.unraisablehook
 
     def is_interrupt(error: BaseException | None) -> bool:
@@ -65,7 +65,7 @@ def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
 
 
 def _place(frame: FrameType | None) -> str:
-    """Return the innermost file:line of the program's own code; "" if there is none."""
+    """Return file:line of the innermost frame in the program's own code, or "" if there is none."""
     libraries = (os.path.dirname(os.__file__), os.path.dirname(os.path.dirname(__file__)), "<frozen")
     while frame is not None and frame.f_code.co_filename.startswith(libraries):
         frame = frame.f_back

@@ -30,7 +30,7 @@ class Identity:
 
     def __init__(self, previous: Identity | None = None) -> None:
         """Use the identity ``previous`` until :meth:`take_name` is called, except for topic names."""
-        # Keys are resolved names; empty before init_node
+        # Dict from resolved names to their remappings; empty before init_node
         self.remappings: dict[str, str] = previous.remappings if previous else {}
         self._name: str | None = previous._name if previous else None
         self._arguments: names.Arguments | None = previous._arguments if previous else None
@@ -66,14 +66,14 @@ class Identity:
         """Return the global name of ``name``, resolved relative to this node or the node ``caller_id``."""
         node_name = caller_id or self.name
         if name and names.is_private(name):
-            # As in rospy, do not remove a slash after `~`; `~/x` resolves to `/x`.
+            # As in rospy, keep a slash after `~`, so that `~/x` resolves to `/x`.
             resolved = names.join(node_name, names.canonicalize(name)[1:])
         else:
             resolved = names.resolve(name, node_name)
         return self.remappings.get(resolved, resolved)
 
     def resolve_topic(self, name: str) -> str:
-        """Return the global name of a topic; a publisher or subscriber uses the name that was resolved when it was created.
+        """Return the global name of a topic. A publisher or subscriber keeps the name that was resolved when it was created.
 
         Before init_node, apply the remappings on the process's command line, and raise ValueError if the name is private.
         """
@@ -84,7 +84,7 @@ class Identity:
         return names.resolve(name, self.name, self.arguments.resolved_remappings(self.name))
 
     def remap(self, name: str, caller_id: str | None = None) -> str:
-        """Return the command line's remapping of ``name`` exactly as spelled, or ``name`` itself if there is none."""
+        """Return the command line's remapping of ``name`` as written there, or ``name`` itself if there is none."""
         mapped = self.arguments.remappings.get(name)
         return name if mapped is None else names.resolve(mapped, caller_id or self.name)
 

@@ -65,15 +65,15 @@ class Lifecycle:
         self._claim = threading.Lock()
         """Locked once the shutdown has started.
 
-        A lock and not a flag, because a signal handler may run between a test and an assignment.
+        This is a lock and not a flag, because a signal handler may run between a test and an assignment.
         """
-        # Set after the shutdown hooks have run: every blocking call returns
+        # Set after the shutdown hooks have run, so that every blocking call returns
         self.shutting_down = SignalSafeEvent()
         self.left = SignalSafeEvent()  # set when the node has left the graph
         self.reason: object = None  # the reason passed with the shutdown request
 
         self.hooks: list[Callable[[], object]] = []  # called while is_shutdown() is false
-        # Called after ``hooks``, including hooks that were added by a hook
+        # Called after ``hooks``, including those that a hook has added
         self.late_hooks: list[Callable[[], object]] = []
         self.interrupts: list[Callable[[], object]] = []
         """Called to unblock blocking calls, after is_shutdown() has become true and before the node leaves the graph."""
@@ -104,8 +104,8 @@ class Lifecycle:
         Return False, without waiting, if a shutdown is already in progress.
         """
         with self.deferral:
-            # Enter the deferral before claiming the shutdown: a second signal right after the claim would leave the
-            # shutdown claimed but never done.
+            # Enter the deferral before claiming the shutdown. Otherwise a second signal right after the claim would
+            # leave the shutdown claimed but never done.
             if not self._claim.acquire(blocking=False):
                 return False
             _log.debug("signal_shutdown [%s]", reason)
@@ -162,14 +162,17 @@ class Lifecycle:
         return self._this_thread.state.awareness is Awareness.NOTIFIED
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down, and record that the calling thread polls, or, if it has, was notified."""
+        """Return whether the node has shut down.
+
+        Record that the calling thread polls, or, if the node has shut down, that the thread was notified.
+        """
         self.deferral.poll()
         is_shutdown = self.shutting_down.is_set()
         self._this_thread.state.awareness = Awareness.NOTIFIED if is_shutdown else Awareness.POLLS
         return is_shutdown
 
     def check_interrupted_sleep(self) -> None:
-        """Record that the calling thread, whose sleep a shutdown interrupted, is notified; raise ROSInterruptException.
+        """Raise ROSInterruptException after a shutdown interrupted this thread's sleep, unless the thread polls is_shutdown().
 
         In a loop that polls is_shutdown() the sleep just returns early, as in rospy: the loop polls next, and the code after
         it still runs. The exception is raised in a thread that never polls, or that sleeps again without having polled.
@@ -191,14 +194,14 @@ class Lifecycle:
         return isinstance(error, errors.ROSInterruptException) and self.is_shutdown_requested
 
     def _run_hooks(self) -> None:
-        """Run the hooks, including those that hooks or other threads add meanwhile; then set ``shutting_down``."""
+        """Run the hooks, including those added in the meantime by hooks or other threads; then set ``shutting_down``."""
         while not self.shutting_down.is_set():
             for hooks in (self.hooks, self.late_hooks):
                 while hooks:
                     self._run(hooks.pop(0))
             with self._lock:
                 if not self.hooks and not self.late_hooks:
-                    # From now on a new hook is called immediately.
+                    # From now on a newly added hook is called immediately.
                     self.shutting_down.set()
 
     def _run(self, hook: Callable[[], object]) -> None:
@@ -206,7 +209,8 @@ class Lifecycle:
             with self.deferral.lifted():
                 hook()
         except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - the others have to run
-            # A KeyboardInterrupt here is the second Ctrl-C. Ignore write errors: the terminal may have been closed.
+            # A KeyboardInterrupt here is the second Ctrl-C. Ignore write errors, because the terminal may have been
+            # closed.
             if type(error) is not KeyboardInterrupt:
                 with contextlib.suppress(OSError, ValueError):
                     traceback.print_exc()

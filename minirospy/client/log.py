@@ -158,14 +158,14 @@ class _CallSites:
         place, now = _place(frame), current_session().clock.now()
         before = self._times.get(place)
         pause = period.to_nsec() if isinstance(period, times.Duration) else int(period * 1e9)
-        # Start again if simulated time has jumped back.
+        # Log again if simulated time has jumped back.
         due = before is None or now - before > pause or now < before
         if due:
             self._times[place] = now
         return due
 
     def is_new(self, frame: FrameType, text: object) -> bool:
-        """Return whether this call site's message is its first, or differs from its last."""
+        """Return whether this is the call site's first message, or differs from its previous one."""
         place = _place(frame)
         if place in self._texts and self._texts[place] == text:
             return False
@@ -199,7 +199,7 @@ def _throttle_function(level: int, name: str, *, identical: bool) -> ThrottledLo
         if not logger.isEnabledFor(level):
             return
         frame = sys._getframe(1)
-        # A period of 0 means none: then log if the message has changed, or always.
+        # With a period of 0 always log, or, if ``identical`` is set, only log a changed message.
         due = places.is_due(frame, period) if period else not identical
         if identical:
             due = places.is_new(frame, msg) or due

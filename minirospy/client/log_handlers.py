@@ -33,7 +33,7 @@ _text = logging.Formatter()
 
 
 class DeferringHandler(logging.Handler):
-    """A handler that defers signals while it writes a record, since files and streams are not reentrant."""
+    """A handler that defers signals while it writes a record, because files and streams are not reentrant."""
 
     def handle(self, record: logging.LogRecord) -> bool:
         """Write one record."""
@@ -50,7 +50,7 @@ class RosStreamHandler(DeferringHandler):
     def __init__(
         self, colorize: bool = True, stdout: TextIO | None = None, stderr: TextIO | None = None
     ) -> None:
-        """Print to ``stdout`` and ``stderr``, by default the streams that ``sys`` has when a line is written."""
+        """Print to ``stdout`` and ``stderr``, by default ``sys.stdout`` and ``sys.stderr`` at the time when a line is written."""
         super().__init__()
         self._colorize = colorize
         self._stdout = stdout
@@ -74,11 +74,11 @@ class RosStreamHandler(DeferringHandler):
                 stream.write(line.encode(encoding, "backslashreplace").decode(encoding) + "\n")
             stream.flush()
         except RuntimeError:
-            # Writing fails if a signal handler logs during the write that it interrupted.
+            # Writing fails if a signal handler logs while it interrupts another write.
             with contextlib.suppress(OSError, ValueError):
                 os.write(stream.fileno(), (line + "\n").encode(errors="backslashreplace"))
         except (OSError, ValueError, AttributeError):
-            # There is no terminal, or it was closed, which is not the program's fault.
+            # There is no terminal, or it was closed. Neither is the program's fault.
             pass
 
 
@@ -86,7 +86,7 @@ class RosOutHandler(DeferringHandler):
     """Publishes log records to /rosout (http://wiki.ros.org/rosout); a program may add it to its own loggers."""
 
     def __init__(self, level: int = 0, *, tell_topics: bool = True) -> None:
-        """Include the topics that the node publishes in each message if ``tell_topics`` is set."""
+        """Create the handler; with ``tell_topics``, each message includes the topics that the node publishes."""
         from rosgraph_msgs.msg import Log
 
         from minirospy.client.publisher import Publisher

@@ -1,4 +1,4 @@
-"""A node's logging after init_node: its loggers' handlers, its log file, its logger services.
+"""A node's logging after init_node: its loggers' handlers, its log file and its logger services.
 
 Source: http://wiki.ros.org/rospy/Overview/Logging.
 """
@@ -66,7 +66,8 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
     ours.setLevel(logging.DEBUG if log_level == DEBUG else logging.INFO)
     terminal = RosStreamHandler()
     terminal.setLevel(logging.DEBUG if log_level == DEBUG else logging.WARNING)
-    # rospy logs its own warnings with the program's logger, so the program's log level may hide them; do the same.
+    # rospy logs its own warnings with the program's logger, so the program's log level may hide them. Behave the same
+    # here.
     terminal.addFilter(lambda record: _rosout.isEnabledFor(record.levelno))
     _add_handler(session, ours, terminal)
     if path.parent.parent == session.identity.environment.log_dir:
@@ -158,8 +159,8 @@ def _log_to_file(session: Session, path: Path) -> None:
     root = logging.root
     if not root.handlers:
         root.setLevel(logging.INFO)
-    # Keep handlers that the program added to the root logger earlier (basicConfig), although rospy removes them.
-    # Filter them so that rosout lines are not printed on the terminal twice.
+    # Keep handlers that the program added to the root logger earlier (basicConfig), although rospy removes them, but
+    # filter them so that rosout lines are not printed on the terminal twice.
     for handler in root.handlers:
         if isinstance(handler, logging.StreamHandler) and handler.stream in (sys.stdout, sys.stderr):
             handler.addFilter(_is_not_ours)
@@ -171,7 +172,7 @@ def _is_not_ours(record: logging.LogRecord) -> bool:
 
 
 def _link_latest(folder: Path) -> None:
-    """Link ``latest``, beside a run's folder, to that folder."""
+    """Create the link ``latest`` to a run's folder, in the same parent folder."""
     link = folder.parent / "latest"
     # The file system does not support links, or another node created the link first.
     with contextlib.suppress(OSError, NotImplementedError):

@@ -36,14 +36,14 @@ _T = TypeVar("_T")
 
 
 class Unspecified:
-    """The type of ``default`` if the caller passes none; None would not do, since a caller may want None returned."""
+    """The type of ``default`` if the caller passes none. It is not None, because a caller may want None to be returned."""
 
 
 UNSPECIFIED = Unspecified()
 
 
 class MasterGoneError(ROSException, ConnectionRefusedError):
-    """The master does not respond. rospy raises the socket error, so programs may catch either class."""
+    """The master does not respond. rospy raises the socket error, so programs may catch either exception."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -210,7 +210,7 @@ def _ask(verb: str, name: str, call: Callable[[], _T]) -> _T:
 
 
 def as_xmlrpc_client(value: object) -> object:
-    """Return a value whose bytes and dates are wrapped in xmlrpc.client's classes, as Python's own client returns them."""
+    """Return a value whose bytes and dates are wrapped in xmlrpc.client's classes, as Python's own client does."""
     if isinstance(value, dict):
         return {key: as_xmlrpc_client(item) for key, item in value.items()}
     if isinstance(value, list):

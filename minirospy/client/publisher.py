@@ -40,7 +40,7 @@ __all__ = ["PublishedTopic", "Publisher", "SubscribeListener"]
 
 _log = logging.getLogger("rosout")
 _OF_THE_LIBRARY = frozenset({"/rosout", "/statistics"})
-"""Topics on which the library itself publishes; errors on them are not reported to the program."""
+"""The topics on which the library itself publishes; errors on them are not reported to the program."""
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 
 
@@ -59,11 +59,11 @@ class SubscribeListener:
 class Publisher(Topic[_M_co]):
     """Publishes messages of ``data_class`` on a topic.
 
-    ``queue_size``: how many messages may be queued for a slow subscriber before the oldest is dropped (0: no
+    ``queue_size``: maximum number of messages queued for a slow subscriber; beyond that the oldest is dropped (0: no
     limit; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later receives
-    the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is notified when subscribers
-    connect and disconnect, in a library thread, one event at a time; an object that is not a listener is ignored,
-    with a warning. Raise ValueError if the name, the class or queue_size is invalid.
+    the last message. ``headers``: fields for the connection header. ``subscriber_listener`` is notified when
+    subscribers connect and disconnect, in a library thread, one event at a time; an object that is not a listener is
+    ignored, with a warning. Raise ValueError if the name, the class or queue_size is invalid.
     """
 
     impl: PublishedTopic | None
@@ -107,7 +107,7 @@ class Publisher(Topic[_M_co]):
         """Publish a message, or a message with the given field values.
 
         Raise ROSException before init_node and after unregister, ROSSerializationException or TypeError if a value
-        is invalid. Blocks for a few milliseconds at most on a slow subscriber, except with ``queue_size=None``.
+        is invalid. With a slow subscriber it blocks for a few milliseconds at most, except with ``queue_size=None``.
         """
         state = self.impl
         if state is None:
@@ -187,8 +187,8 @@ class PublishedTopic(SharedTopic):
         with self._session.lock:
             if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
-            # Set this before registering: a subscriber may connect immediately, and a publish() before the master's
-            # response counts too.
+            # Set this before registering, because a subscriber may connect immediately, and a publish() before the
+            # master's response counts too.
             self._registered = True
             wait = self._session.start(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)
@@ -202,7 +202,7 @@ class PublishedTopic(SharedTopic):
             del self._session.published[self.resolved_name]
             if not self._session.node or self._session.is_shutdown():
                 return
-            # Start this now, before another thread can publish the topic again.
+            # Start unregistering now, before another thread can publish the topic again.
             wait = self._session.start(self._session.node.unadvertise(self.publication))
         unregister_from_master(wait)
 
@@ -213,7 +213,7 @@ class PublishedTopic(SharedTopic):
 
     @property
     def queue_size(self) -> int | None:
-        """Return the queue_size passed to the last Publisher; None if publish() waits for the sockets."""
+        """The queue_size passed to the last Publisher; None if publish() waits until messages are written to the sockets."""
         return self.publication.queue_size
 
     @property
@@ -235,7 +235,7 @@ class PublishedTopic(SharedTopic):
         self.is_latch = True
 
     def add_subscriber_listener(self, l: SubscribeListener) -> None:  # noqa: E741 - as rospy calls it
-        """Notify ``l`` when subscribers connect and disconnect from now on; warn and ignore it if it is not a listener."""
+        """From now on notify ``l`` when subscribers connect and disconnect. If it is not a listener, warn and ignore it."""
         if _is_listener(l):
             self.subscriber_listeners.append(l)
         else:
@@ -263,7 +263,7 @@ class PublishedTopic(SharedTopic):
             self._log_unheard()
 
     def forget_subscribers(self) -> None:
-        """Stop publishing to the current subscribers: this process is a fork, and they are connected to the parent process."""
+        """Stop publishing to the current subscribers, because in a fork they are connected to the parent process."""
         self.publication.links = ()
         self._registered = False
 
@@ -313,7 +313,7 @@ class PublishedTopic(SharedTopic):
         """Log that the first message had no subscriber.
 
         Log a warning only if the master reports a subscriber that is still connecting: many topics have no subscriber at
-        first, or ever.
+        first, or never have one.
         """
         if self.publication.expected and not self._session.is_shutdown():
             _log.warning(
@@ -332,7 +332,7 @@ class PublishedTopic(SharedTopic):
         try:
             message.serialize(pieces)
         except SerializationOverflowError:
-            # rospy does not convert struct's OverflowError, so programs catch that type.
+            # rospy does not convert struct's OverflowError, so programs catch that class.
             raise
         except SerializationError as error:
             if not self._has_header or getattr(message.header, "frame_id", "") is not None:
@@ -347,7 +347,7 @@ class PublishedTopic(SharedTopic):
         return pieces.frame()
 
     def _refused(self, message: Message, error: SerializationError) -> ROSSerializationException:
-        """Return the error for a message that does not match its type: rospy's message, then the topic."""
+        """Return the error for a message that does not match its type: rospy's error message, followed by the topic."""
         where = f"topic {self.resolved_name}, type {message._type}"
         return ROSSerializationException(f"{error}\n({where})")
 

@@ -113,7 +113,7 @@ class Service(Generic[_S_co]):
             del self._session.offered[self.resolved_name]
             if not server or not self._session.node or self._session.is_shutdown():
                 return
-            # Start this now, before another thread can offer the service again.
+            # Start unregistering now, before another thread can offer the service again.
             wait = self._session.start(self._session.node.unserve(server))
         unregister_from_master(wait)
 
@@ -197,13 +197,13 @@ class ServiceProxy(Generic[_S_co]):
         self.md5sum: str = service_class._md5sum
         self.buff_size = 65536
         self.persistent = persistent
-        self.uri: str | None = None  # the service's last known address, ``rosrpc://host:port``
+        self.uri: str | None = None  # last known URI of the service, ``rosrpc://host:port``
 
         self._headers = dict(headers or {})
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
         self._client_session: Session | None = None
-        # Counts the calls that reached the service. It is the seq of requests whose first field is a header.
+        # Number of calls that reached the service. It is the seq of requests whose first field is a header.
         self._calls = 0
         self._lock = threading.Lock()
 
@@ -239,7 +239,8 @@ class ServiceProxy(Generic[_S_co]):
         """Close a persistent connection; if another thread is calling through it, that call fails."""
         client = self._client
         if client and self._lock.locked():
-            # Shut the socket down: closing it would not wake a thread that reads from it. That thread then closes it.
+            # Shut the socket down, because closing it would not wake a thread that is reading from it. That thread
+            # then closes it.
             client.hang_up()
         else:
             self._disconnect()
@@ -275,7 +276,7 @@ class ServiceProxy(Generic[_S_co]):
     def _connect_ahead(self) -> ServiceClient | None:
         """Return a connection to the service's last known address, opened while the master is queried for the current one.
 
-        Do this only for addresses on this machine, since connecting to others may take long.
+        Do this only for addresses on this machine, because connecting to other hosts may take long.
         """
         from minirospy.runtime.node.service_client import parse_service_uri
 
@@ -309,7 +310,7 @@ class ServiceProxy(Generic[_S_co]):
             raise ServiceException(f"unable to contact master: {error}") from error
         try:
             if ahead and ahead.uri == uri:
-                # The server may have been about to exit: then connect again. Do not retry if the server does not
+                # The server may have been about to exit, so connect again. Do not retry if the server does not
                 # respond, because it may have received the request.
                 with contextlib.suppress(ConnectionError, WireError):
                     ahead.finish(request)
@@ -383,7 +384,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
             _log.warning("wait_for_service(%s): %s", name, why)
             reported.add(why)
         elif not reported and time.monotonic() - start > _SILENT_SECONDS:
-            # rospy logs nothing here, so a misspelled name goes unnoticed.
+            # rospy logs nothing here, so a misspelled name would go unnoticed.
             _log.info("wait_for_service(%s): %s, waiting...", name, why)
             reported.add(why)
         pause = _POLL_SECONDS if end is None else min(_POLL_SECONDS, max(0.0, end - time.monotonic()))
@@ -392,7 +393,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
 
 
 def _probe(name: str, timeout: float) -> str | None:
-    """Return the reason why the service cannot be called yet, or None if it can."""
+    """Return the reason why the service cannot be called yet, or None if it can be called."""
     from minirospy.runtime.node.service_client import ServiceClient
 
     session = current_session()

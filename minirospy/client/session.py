@@ -38,23 +38,23 @@ _log = logging.getLogger(__name__)
 
 
 class Session:
-    """The process's node, from before init_node until after the node's shutdown: its name, lifecycle, clock, tables and loop."""
+    """The process's node before, during and after its lifetime: its name, lifecycle, clock, tables and event loop."""
 
     def __init__(self, previous: Session | None = None, *, is_fork: bool = False) -> None:
-        """Replace the session ``previous``; its name, clock and listeners remain in use until init_node is called."""
+        """Replace the session ``previous``; the previous name, clock and listeners remain in use until init_node is called."""
         self.is_fork = is_fork
-        self.is_abandoned = False  # this process is a fork, and the session belongs to its parent
+        self.is_abandoned = False  # True if this process is a fork, and the session belongs to its parent
         self._forked_from = previous.name if previous and is_fork else ""
-        self._reported: set[str] = set()  # handles that :meth:`report_fork` has already reported
+        self._reported: set[str] = set()  # names of handles that :meth:`report_fork` has already reported
         self.identity: Identity = Identity(previous.identity if previous else None)
         self.lifecycle = Lifecycle(self._leave)
         self.signals = SignalWatchdog(self.lifecycle, self._stop_leaving, self._is_sending)
 
         self.lock = threading.RLock()  # orders registrations, and guards the tables
         self.clock: Clock = previous.clock if previous else WallClock()
-        # Notified of each new simulated time
+        # Notified whenever the simulated time changes
         self.time_changed: threading.Condition = previous.time_changed if previous else threading.Condition()
-        # The time is available: after init_node, or once a program without a node has set it
+        # True if the time is available: after init_node, or once a program without a node has set it
         self.has_time: bool = bool(previous and previous.has_time)
 
         self.published: dict[str, PublishedTopic] = {}
@@ -105,12 +105,12 @@ class Session:
 
     def open_node(self, xmlrpc_port: int, tcpros_port: int) -> None:
         """Start the loop and the node's servers. Raise ROSInitException if a server cannot listen."""
-        # Imported here: a program without a node need not import asyncio.
+        # Import this here, because a program without a node need not import asyncio.
         from minirospy.runtime.node.node import Node
         from minirospy.runtime.transport.loop import LoopThread
 
         with self.lifecycle.deferral:
-            # asyncio's loops do not shut down properly if interrupted while starting.
+            # Defer Ctrl-C, because asyncio's loops do not shut down properly if interrupted while starting.
             self._loop = LoopThread()
         self._opened = Node(
             self.name,
@@ -152,7 +152,7 @@ class Session:
         return self.is_fork and self.node is None and not self.is_shutdown()
 
     def why_fork_has_no_effect(self, handle: str) -> str:
-        """Return the error message for a handle that has no effect in a fork."""
+        """Return the error message for using a handle in a forked process, where it has no effect."""
         return (
             f"{handle} has no effect in this process, which is a fork of node [{self._forked_from}]: call "
             "rospy.init_node() in the child process, and create it after that"
@@ -178,7 +178,7 @@ class Session:
         assert self._loop is not None
         loop = self._loop
         with self.lifecycle.deferral:
-            # A shutdown during this call would wait for the loop to close, which needs a lock that this thread holds.
+            # Defer a shutdown: it would wait for the loop to close, which needs a lock that this thread holds here.
             wait = self._or_interrupted(lambda: loop.start(coroutine))
         return lambda: self._or_interrupted(lambda: wait(None))
 
@@ -199,9 +199,12 @@ class Session:
         return self.lifecycle.is_shutdown()
 
     def poll_shutdown(self) -> bool:
-        """Return whether the node has shut down, and record that the calling thread polls, or, if it has, was notified."""
+        """Return whether the node has shut down.
+
+        Record that the calling thread polls, or, if the node has shut down, that the thread was notified.
+        """
         if self._installs_signals:
-            # A fork uses the default signal handling until it polls.
+            # A fork keeps the default signal handling until it polls.
             self._installs_signals = False
             self.signals.install()
         return self.lifecycle.poll_shutdown()
@@ -222,7 +225,7 @@ class Session:
         self.signals.flush_at_exit()
 
     def abandon_in_fork(self) -> None:
-        """In a fork, detach what the session refers to: the node, its sockets and its locks belong to the parent."""
+        """In a fork, drop the references to the node, its sockets and its locks, because they belong to the parent."""
         self.is_abandoned = True
         for published in self.published.values():
             published.forget_subscribers()

@@ -1,4 +1,4 @@
-"""The shutdown of a process that is a node, as a state machine; docs/shutdown.md draws it.
+"""The shutdown of a process that is a node, as a state machine; docs/shutdown.md contains its diagram.
 
 Its inputs are events: a signal, a phase that the node has entered, a clock tick. Its outputs are actions. This module uses
 no threads, signals or clocks: :mod:`minirospy.client.signals` performs the actions.
@@ -10,7 +10,8 @@ import enum
 
 __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 
-_GRACE_SECONDS = 0.5  # for the main thread to start the hooks, and again to see that is_shutdown() is true
+# seconds for the main thread to start the hooks, and again to see that is_shutdown() is true
+_GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
 
 
@@ -36,11 +37,11 @@ class Action(enum.Enum):
 
 
 class Awareness(enum.IntEnum):
-    """How far a thread in the program has been notified of the shutdown."""
+    """The extent to which a thread in the program has been notified of the shutdown."""
 
-    NONE = 0  # it has never called is_shutdown()
+    NONE = 0  # the thread has never called is_shutdown()
     POLLS = 1
-    CUT_SHORT = 2  # it polls, but has not polled since the shutdown interrupted its sleep
+    CUT_SHORT = 2  # the thread polls, but has not polled since the shutdown interrupted its sleep
     NOTIFIED = 3  # notified by is_shutdown() or an exception: anything the thread does now is clean-up
 
 
@@ -63,7 +64,7 @@ class ShutdownMachine:
     def __init__(self) -> None:
         self.main = ThreadState()
         self.main_has_ended = False
-        self.runs_in_main = False  # the main thread itself runs the hooks and unregisters the node
+        self.runs_in_main = False  # True if the main thread itself runs the hooks and unregisters the node
         self.phase = Phase.RUNNING
         self.signals = 0
         self._signalled = 0.0

@@ -27,10 +27,10 @@ _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 _EXIT_STATUS = 130
 
 _DEFER_SECONDS = 0.05
-"""Wait this long for the main thread's next rospy call: only there the hooks cannot interrupt a half-finished operation."""
+"""Seconds to wait for the main thread's next rospy call, where the hooks cannot interrupt a half-finished operation."""
 
 _TICK_SECONDS = 0.01
-# Maximum time counted for one tick, so that time during which the process or the machine was suspended is not counted
+# Maximum seconds counted for one tick, so that time during which the process or the machine was suspended is excluded
 _MAX_STEP = 0.05
 
 
@@ -40,9 +40,9 @@ class SignalWatchdog:
     def __init__(
         self, lifecycle: Lifecycle, stop_leaving: Callable[[], object], is_sending: Callable[[], bool]
     ) -> None:
-        """Call ``stop_leaving()`` to let the node leave the graph without waiting for the master's response.
+        """Create the watchdog. It calls ``stop_leaving()`` to let the node leave the graph without waiting for the master.
 
-        ``is_sending()`` returns whether a link's lock is held, so that a hook that publishes could deadlock.
+        ``is_sending()`` returns whether a link's lock is held; a hook that publishes could then deadlock.
         """
         self._lifecycle = lifecycle
         self._machine = lifecycle.machine
@@ -50,11 +50,11 @@ class SignalWatchdog:
         self._deferral.dispatch = self._dispatch
         self._stop_leaving = stop_leaving
         self._is_sending = is_sending
-        # Signal number -> previous handler
+        # Dict from signal number to the previous handler
         self._previous: dict[int, Callable[[int, FrameType | None], object] | int | None] = {}
         self._number = int(signal.SIGINT)
-        self._interrupt: Action | None = None  # the exception that the main thread must raise
-        self._is_nudge = False  # a nudge has been sent but has not reached the handler yet
+        self._interrupt: Action | None = None  # action for which the main thread must raise an exception
+        self._is_nudge = False  # True if a nudge has been sent but has not reached the handler yet
         self._nudging = threading.Lock()
         self._sending: socket.socket | None = None
         self._arrived = self._handled = self._nudges = 0
@@ -72,7 +72,7 @@ class SignalWatchdog:
         for name in [name for name in _NAMES if hasattr(signal, name)]:
             number = getattr(signal, name)
             handler = signal.getsignal(number)
-            # Leave SIGHUP ignored if nohup has ignored it.
+            # If nohup has set SIGHUP to be ignored, leave it ignored.
             if handler != self._on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
                 self._previous[number] = handler
                 signal.signal(number, self._on_signal)
@@ -135,7 +135,7 @@ class SignalWatchdog:
         action, self._interrupt = self._interrupt, None
         if action is Action.KEYBOARD_INTERRUPT:
             raise KeyboardInterrupt
-        # If the main thread was notified meanwhile, the exception would interrupt the program's clean-up.
+        # If the main thread has been notified in the meantime, the exception would interrupt the program's clean-up.
         if action is Action.INTERRUPT and not self._machine.main_ends_by_itself:
             raise self._lifecycle.interrupted("the program was signalled to end")
 
@@ -198,7 +198,8 @@ class SignalWatchdog:
         """Run the handler in the main thread, interrupting its system call, if any."""
         with self._nudging:
             if self._is_nudge or not self._is_handled(self._number):
-                # Send one nudge at a time: the system merges two undelivered ones, but they are counted.
+                # Send only one nudge at a time, because the system merges two undelivered signals, but they are
+                # counted.
                 return
             self._nudges += 1
             self._is_nudge = True

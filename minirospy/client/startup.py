@@ -44,10 +44,9 @@ def init_node(
 ) -> None:
     """Make this process the node ``name``; wait for a master.
 
-    ``anonymous`` appends a number, so that several nodes with one name can run. ``log_level``: rospy.DEBUG to rospy.FATAL.
-    Raise ValueError if the name is empty or has a namespace, ROSException if called again with other
-    arguments, ROSInitException if the node cannot be set up, ROSInterruptException if it is shut down while it
-    waits.
+    ``anonymous`` appends a number, so that several nodes with the same name can run. ``log_level``: rospy.DEBUG to
+    rospy.FATAL. Raise ValueError if the name is empty or has a namespace, ROSException if called again with other
+    arguments, ROSInitException if the node cannot be set up, ROSInterruptException if it is shut down while it waits.
     """
     _check_name(name)
     session = current_session()
@@ -158,7 +157,8 @@ def _leave_with_child_process() -> None:
     """
     process, util = (sys.modules.get(f"multiprocessing.{name}") for name in ("process", "util"))
     if process and util and process.parent_process() is not None:
-        # Use a high priority so that, as with atexit, the node leaves before the process joins its own children.
+        # Use a high priority so that, as with atexit, the node leaves the graph before the process joins its own
+        # children.
         util.Finalize(None, lambda: current_session().shut_down_at_exit(), exitpriority=100)
 
 
@@ -186,7 +186,7 @@ def _wait_for_master(session: Session) -> None:
             if wait_for_event(session.lifecycle.shutting_down, _POLL_SECONDS):
                 break
         except RpcFault:
-            return  # a master without this call, such as @foxglove/ros1
+            return  # the master does not support this call, for example that of @foxglove/ros1
         except RpcError as error:
             raise ROSInitException(f"what answers at {uri} is not a ROS master: {error}") from error
         else:

@@ -28,9 +28,9 @@ _FIRST_WINDOW = 2.0
 
 
 class WindowLimits(NamedTuple):
-    """The limits of an adaptive window: it doubles below ``min_elements`` messages and halves above ``max_elements``.
+    """The limits of an adaptive window. Its length doubles below ``min_elements`` messages and halves above ``max_elements``.
 
-    Its length stays between ``min_size`` and ``max_size`` seconds.
+    It stays between ``min_size`` and ``max_size`` seconds.
     """
 
     min_elements: float = 10
@@ -63,7 +63,10 @@ class Spread(NamedTuple):
 
 
 class Report(NamedTuple):
-    """The measurements for one publisher in one window. Times are in nanoseconds, spreads in seconds, ``traffic`` in bytes."""
+    """The measurements for one publisher in one window.
+
+    Times are in nanoseconds, ``Spread`` values in seconds, ``traffic`` in bytes.
+    """
 
     publisher: str
     start: int
@@ -99,7 +102,7 @@ class TopicStatisticsCounter:
         self._windows: dict[str, _Window] = {}
 
     def count(self, message: Message, header: Header, size: int, now: int) -> Report | None:
-        """Count one message of ``size`` bytes that arrived at ``now`` (ns); return the report if this completes a window."""
+        """Count one message of ``size`` bytes that arrived at ``now`` (ns); return the report if this ends a window."""
         publisher = header.get("callerid", "")
         window = self._windows.get(publisher)
         if window is None or now < window.start:

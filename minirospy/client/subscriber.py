@@ -38,12 +38,12 @@ _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
 class Subscriber(Topic[_M_co]):
     """Calls ``callback(message)`` with each message on a topic.
 
-    ``callback_args`` is passed to the callback as second argument. ``queue_size``: while the callback is
-    busy, keep only this many of the newest messages (None: all, in order). ``buff_size`` is accepted for compatibility:
-    queue_size alone determines which messages are kept. Subscribers to one topic in a process share the connections;
-    they keep as many messages as the largest queue_size. If a Subscriber is added to a latched topic later, its callback
-    receives the last message before the constructor returns. Raise ValueError if the name or class is invalid,
-    ROSException if the size is.
+    ``callback_args`` is passed to the callback as second argument. ``queue_size``: number of newest messages to keep
+    while the callback is busy (None: all, in order). ``buff_size`` is accepted for compatibility: queue_size alone
+    determines which messages are kept. Subscribers to one topic in a process share the connections; they keep as many
+    messages as the largest queue_size. If a Subscriber is added to a latched topic later, its callback receives the
+    last message before the constructor returns. Raise ValueError if the name or class is invalid, ROSException if a
+    size is invalid.
     """
 
     impl: SubscribedTopic | None
@@ -80,8 +80,8 @@ class Subscriber(Topic[_M_co]):
                     self._session, self.resolved_name, data_class
                 )
             state.join(self, queue_size, buff_size, tcp_nodelay)
-            # Read the links after joining: a message on a link that opens meanwhile may be delivered twice, but is
-            # not lost.
+            # Read the links after joining: a message on a link that opens in the meantime may be delivered twice, but
+            # is not lost.
             links = state.links
         self.impl = state
 
@@ -138,7 +138,7 @@ class _Callback(NamedTuple):
 
 
 class _Receiver(NamedTuple):
-    """A message class, whether it can be read from a memoryview (genpy's cannot), and the callbacks for it."""
+    """A message class, its callbacks, and whether it can deserialize a memoryview (genpy's classes cannot)."""
 
     data_class: type[Message]
     takes_memoryview: bool
@@ -211,7 +211,7 @@ class SubscribedTopic(SharedTopic):
             del self._session.subscribed[self.resolved_name]
             if not self._session.node or not self.subscription or self._session.is_shutdown():
                 return
-            # Start this now, before another thread can subscribe to the topic again.
+            # Start unregistering now, before another thread can subscribe to the topic again.
             wait = self._session.start(self._session.node.unsubscribe(self.subscription))
         unregister_from_master(wait)
 
@@ -225,7 +225,7 @@ class SubscribedTopic(SharedTopic):
         self.replay(self.data_class, callback, links)
 
     def remove_callback(self, cb: Callable[..., object], cb_args: object) -> None:
-        """Remove a callback that add_callback or a Subscriber has added. Raise KeyError if there is none."""
+        """Remove a callback that add_callback or a Subscriber has added. Raise KeyError if it is not registered."""
         with self._session.lock:
             if (callback := _Callback(cb, cb_args)) in self._added:
                 self._added.remove(callback)
@@ -312,8 +312,8 @@ class SubscribedTopic(SharedTopic):
             self._deliver(frame, link.header, receivers)
             newest = link.latched
             if newest is not None and newest is not frame:
-                # A newer message arrived meanwhile, and may have been delivered before this older one: deliver the
-                # newer one again, so that it is the last.
+                # A newer message has arrived in the meantime, and may have been delivered before this older one:
+                # deliver the newer one again, so that it is the last.
                 self._deliver(newest, link.header, receivers)
 
     def _handle_with(self, callback: _Callback) -> Subscriber[Message]:
@@ -357,6 +357,6 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
         # call.
         if is_callers_thread and not isinstance(error, Exception):
             raise
-        # While a shutdown hook releases resources that the callback uses, the callback's errors mean nothing.
+        # Ignore the callback's errors while a shutdown hook releases resources that the callback uses.
         if not current_session().lifecycle.is_shutdown_requested:
             _log.error("bad callback: %s\n%s", callback.function, traceback.format_exc())

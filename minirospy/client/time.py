@@ -36,7 +36,10 @@ _NOT_INITIALIZED = "time is not initialized. Have you called init_node()?"
 
 
 class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSInterruptException):
-    """Simulated time jumped back to ``time`` seconds before the sleep started; as in rospy, this is also a KeyboardInterrupt."""
+    """Simulated time jumped back during a sleep, to ``time`` seconds before its start.
+
+    As in rospy, also a KeyboardInterrupt.
+    """
 
 
 class Duration(times.Duration):
@@ -89,7 +92,7 @@ def get_time() -> float:
 
 
 def is_wallclock() -> bool:
-    """Return whether the node uses the system time, not simulated time."""
+    """Return whether the node uses the system time, as opposed to simulated time."""
     return not isinstance(current_session().clock, SimulatedClock)
 
 
@@ -106,7 +109,7 @@ def sleep(duration: float | times.Duration) -> None:
 class Rate:
     """Runs a loop at ``hz`` iterations per second: ``sleep()`` subtracts the time that the loop's own work took.
 
-    ``last_time`` is the start of this period, ``sleep_dur`` its length; a program may change either.
+    ``last_time`` is the start of the current period, ``sleep_dur`` its length; a program may change either.
     """
 
     def __init__(self, hz: float, reset: bool = False) -> None:
@@ -119,7 +122,7 @@ class Rate:
         self._reset = reset
 
     def remaining(self) -> Duration:
-        """Return the remaining time of this period."""
+        """Return the remaining time of the current period."""
         return self._remaining(get_rostime())
 
     def sleep(self) -> None:
@@ -143,20 +146,23 @@ class Rate:
         self.last_time = _time(now if now - started > 2 * period else started)
 
     def _remaining(self, curr_time: times.Time) -> Duration:
-        """Return the time left in this period at ``curr_time``. Programs' subclasses that sleep differently call this."""
+        """Return the time left in this period at ``curr_time``.
+
+        Subclasses in programs call this to sleep in a different way.
+        """
         return Duration(0, self._left(curr_time.to_nsec()))
 
     def _left(self, now: int) -> int:
         if self.last_time.to_nsec() > now:
-            # Time jumped back.
+            # Time has jumped back, so start a new period.
             self.last_time = _time(now)
         return self.sleep_dur.to_nsec() - (now - self.last_time.to_nsec())
 
 
 class TimerEvent:
-    """The argument for a Timer's callback: expected and real times of this call and the previous one.
+    """The argument for a Timer's callback: expected and actual times of this call and the previous one.
 
-    ``last_duration`` is in seconds; the fields for the previous call are None the first time.
+    ``last_duration`` is in seconds; in the first call the fields for the previous call are None.
     """
 
     def __init__(
@@ -177,8 +183,9 @@ class TimerEvent:
 class Timer(threading.Thread):
     """Calls ``callback(TimerEvent)`` every ``period`` (a Duration), or once with ``oneshot``, in its own thread.
 
-    ``reset``: start again if simulated time jumps back; otherwise the timer stops with
-    ROSTimeMovedBackwardsException. An exception in the callback stops the timer too; so does ``sys.exit()``, which is logged.
+    ``reset``: start again if simulated time jumps back; otherwise the timer then stops with
+    ROSTimeMovedBackwardsException. An exception in the callback stops the timer too; so does ``sys.exit()``, which is
+    logged.
     """
 
     def __init__(
@@ -199,7 +206,7 @@ class Timer(threading.Thread):
 
     @property
     def _shutdown(self) -> bool:
-        """Return whether the timer was shut down. Programs read and set this attribute on rospy's Timer."""
+        """True if the timer was shut down. Programs read and set this attribute on rospy's Timer."""
         return self._ended.is_set()
 
     @_shutdown.setter
@@ -230,7 +237,7 @@ class Timer(threading.Thread):
                 try:
                     self._callback(TimerEvent(last_expected, last_real, expected, real, last_duration))
                 except SystemExit as error:
-                    # threading reports every other error of a thread; rospy's timer ends without a word.
+                    # threading reports all other exceptions in a thread; rospy's timer stops without a message.
                     _log.error("Timer ends: its callback %s called sys.exit(%s)", self._callback, error)
                     return
                 if self._oneshot:
@@ -245,7 +252,7 @@ class Timer(threading.Thread):
 
 
 def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
-    """Sleep; return early if ``stop`` is set. Without ``stop``, raise if the node shuts down."""
+    """Sleep; return early if ``stop`` is set. Without ``stop``, a shutdown interrupts it as in :func:`sleep`."""
     if nanoseconds <= 0:
         return
     session = current_session()

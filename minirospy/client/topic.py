@@ -40,7 +40,7 @@ class AnyMsg(Message):
         self._buff: bytes | None = None
 
     def serialize(self, buff: protocols.Writer) -> None:
-        """Write the received bytes."""
+        """Write the message's bytes."""
         if self._buff is None:
             raise ROSException("AnyMsg is not initialized")
         buff.write(self._buff)
@@ -156,7 +156,10 @@ def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> N
 
 
 def unregister_from_master(wait: Callable[[], object]) -> None:
-    """Wait for an unregistration to finish. A master that does not respond is notified later, or has lost the registration."""
+    """Wait for an unregistration to finish.
+
+    If the master does not respond, it is notified later, or has lost the registration.
+    """
     try:
         wait()
     except (MasterUnreachableError, RpcError) as error:

@@ -68,7 +68,7 @@ _IN_ARCHIVE = (
 )
 
 INTERRUPTED = 130
-"""The shell's exit status for a program that SIGINT has ended, so that `catkin_make && roslaunch ...` stops."""
+"""The shell's exit status for a program terminated by SIGINT, so that `catkin_make && roslaunch ...` stops."""
 
 
 class RosText(NamedTuple):
@@ -82,7 +82,7 @@ class RosText(NamedTuple):
 
 
 class WordedError(MinirospyError):
-    """An error whose ROS message depends on the command as well as the error: ``ros`` is printed first."""
+    """An error whose ROS message depends on the command as well as on the error. ``ros``, that message, is printed first."""
 
     def __init__(self, error: Exception, ros: RosText) -> None:
         super().__init__(str(error))
@@ -90,7 +90,9 @@ class WordedError(MinirospyError):
 
 
 Wording = Mapping[str, RosText]
-"""ROS's messages by the kind of a NotFoundError, ``no answer from`` + the kind of a NodeUnreachableError, or ``master``."""
+"""Dict from the kind of a NotFoundError, ``no answer from`` + the kind of a NodeUnreachableError, or ``master``, to ROS's
+message.
+"""
 
 NO_MASTER = RosText("ERROR: Unable to communicate with master!")
 
@@ -125,9 +127,9 @@ def run(
     *,
     heeds_interrupts: bool = True,
 ) -> int:
-    """Run ``body`` and return the exit status, ``interrupted`` after Ctrl-C.
+    """Run ``body`` and return the exit status, which is ``interrupted`` after Ctrl-C.
 
-    A named error is printed as ``name: ERROR: text`` on stderr, after ROS's message for it. ``heeds_interrupts``: end at
+    A named error is printed as ``name: ERROR: text`` on stderr, after ROS's message for it. ``heeds_interrupts``: exit on
     SIGINT even if the signal was ignored at the start, unless ``interrupted`` is nonzero.
     """
     _open_streams()
@@ -155,7 +157,7 @@ def run(
         _flush()
         return 0
     except OSError as error:
-        # For example a full disk or a missing permission: print the file's name and the system's message.
+        # This is, for example, a full disk or a missing permission: print the file's name and the system's message.
         why = error.strerror or str(error)
         return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:
@@ -189,10 +191,10 @@ def _heed_break() -> None:
 
 
 def _heed_interrupts() -> None:
-    """End at SIGINT even if a script has started the command with `&`, for which the shell sets the signal to be ignored.
+    """Exit on SIGINT even if a script started the command with `&`, for which the shell sets the signal to be ignored.
 
-    ROS's commands also end then, because they are nodes and install their own handlers. A build keeps the shell's
-    setting.
+    ROS's commands exit then too, because they are nodes and install their own handlers. A build does not call this, and keeps
+    the shell's setting.
     """
     import signal
     import threading
@@ -218,12 +220,12 @@ def _open_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if type(stream) is io.TextIOWrapper and stream.isatty():
-            # Strings from robots are shown on a terminal; their control sequences must not be executed.
+            # Do not execute control sequences in strings from robots when they are shown on a terminal.
             setattr(sys, name, SafeTerminal.around(stream))
 
 
 def warn(what: str, name: str = "") -> None:
-    """Print one line on stderr after flushing stdout; if ``name`` is not legal, add the reason."""
+    """Print one line on stderr after flushing stdout; if ``name`` is not a legal name, add the reason."""
     from minirospy.introspect.graph import why_illegal
 
     why = why_illegal(name) if name else ""
@@ -241,8 +243,8 @@ def warn_unpublished(graph: Graph, topic: str) -> None:
 def warn_no_subscribers(topic: str, subscribed: Iterable[str]) -> None:
     """Warn that ``topic`` has no subscribers if ``subscribed`` contains a name that is almost equal.
 
-    A publisher may start first, so only a likely typing error is reported. If /robot1/scan has subscribers, /robot2/scan
-    is not a typing error.
+    A publisher may start before its subscribers, so only a likely typo is reported. If /robot1/scan has subscribers,
+    /robot2/scan is not a typo.
     """
     others = [each for each in subscribed if _without_digits(each) != _without_digits(topic)]
     if near := did_you_mean(topic, others, only_slips=True):
@@ -298,7 +300,7 @@ def complain(name: str, error: Exception, status: int = 1, ros_text: str = "") -
 
 
 def _flush() -> None:
-    """Flush stdout; if that fails, discard the output, so that the interpreter's own flush at exit does not fail, too."""
+    """Flush stdout. If that fails, discard the output, so that the interpreter's own flush at exit does not fail too."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -42,7 +42,7 @@ def ask_for(
     complain: Callable[[Exception], None],
     known: Collection[str] = (),
 ) -> _M:
-    """Fill ``message`` from the user's input at a prompt per field, and return it; empty input keeps the value.
+    """Prompt the user for each field of ``message``, and return the filled message; empty input keeps a field's value.
 
     Skip the top-level fields in ``known``.
 
@@ -55,7 +55,7 @@ def ask_for(
         answer = ask(_question(field)).strip()
         while answer:
             try:
-                # Try the value on a separate message first, so that an invalid value does not remain in ``message``.
+                # Try the value on another message first, so that an invalid value does not remain in ``message``.
                 values = _nested(field.path, _value(field, answer))
                 check(fill(type(message)(), [values]))
             except (MessageException, ValueTextError) as error:

@@ -46,9 +46,9 @@ class CommandLineError(UsageError):
 
 
 class Misuse(UsageError):
-    """Arguments that parse but are invalid or do not fit together; ``ros`` is ROS's message.
+    """Arguments that can be parsed but are invalid or contradict each other; ``ros`` is ROS's message.
 
-    A command's function raises it; its parser adds the usage.
+    A command's function raises it, and the command's parser adds the usage.
     """
 
     def __init__(self, text: str, ros: str = "") -> None:
@@ -57,7 +57,7 @@ class Misuse(UsageError):
 
 
 class _Help(argparse.HelpFormatter):
-    """Formats help as wide as the terminal.
+    """Formats help to the width of the terminal.
 
     By default, argparse gets the width from shutil, whose import takes longer than argparse's own.
     """
@@ -71,7 +71,7 @@ class _Help(argparse.HelpFormatter):
 
 
 class _Accepted(argparse.Action):
-    """An option that is accepted for compatibility and stores nothing."""
+    """An option that is accepted for compatibility and has no effect."""
 
     def __init__(self, option_strings: Sequence[str], dest: str, nargs: int | str = 0, **kwargs: Any) -> None:
         super().__init__(option_strings, dest, nargs=nargs, **{**kwargs, "default": argparse.SUPPRESS})
@@ -81,7 +81,7 @@ class _Accepted(argparse.Action):
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser whose errors end with the command that prints the help.
+    """An argument parser whose error messages end with the command that prints the help.
 
     ``ros_usage`` is ROS's usage. If it is set, options and positional arguments may alternate, as with optparse, and help
     and errors are formatted like optparse's. ``missing`` and ``surplus`` are ROS's messages for a missing or a surplus
@@ -151,7 +151,10 @@ class Parser(argparse.ArgumentParser):
         return group
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, as the command's function takes them. Raise CommandLineError if they are invalid."""
+        """Return the arguments by name, ready to be passed to the command's function.
+
+        Raise CommandLineError if they are invalid.
+        """
         parsed = self.parse_intermixed_args(words) if self._intermixed else self.parse_args(words)
         return vars(parsed)
 
@@ -185,7 +188,7 @@ class Parser(argparse.ArgumentParser):
     def _check_options(self, args: Sequence[str] | None) -> None:
         """Report an unknown long option before a missing argument, because the option may have consumed the argument."""
         if any(action.nargs == argparse.REMAINDER for action in self._actions):
-            return  # the remaining options belong to another program
+            return  # the remaining words are another program's options
         for word in itertools.takewhile("--".__ne__, sys.argv[1:] if args is None else args):
             option = word.partition("=")[0]
             if option.startswith("--") and not any(
@@ -198,7 +201,7 @@ class Parser(argparse.ArgumentParser):
                 )
 
     def _ros_message(self, message: str) -> str:
-        """Return the message that optparse, or ROS's command, prints in place of argparse's ``message``."""
+        """Return the message that optparse, or ROS's command, prints instead of argparse's ``message``."""
         import re
 
         if match := re.match(r"unrecognized arguments: (-\S)", message):
@@ -271,7 +274,7 @@ class AssignmentParser(Parser):
 
 
 def split_assignments(words: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Return the other arguments, and the assigned values by name; drop special names such as __ns, which nodes read."""
+    """Return the other arguments, and a dict of the assigned values; drop special names such as __ns, which nodes read."""
     return [word for word in words if ":=" not in word], names.parse_launch_arguments(words)
 
 
@@ -288,17 +291,17 @@ def integer(name: str) -> Callable[[str], int]:
 
 
 def attach_completer(action: argparse.Action, completer: str) -> None:
-    """Set an argument's completer, by name: see :meth:`Parser.add_argument`."""
+    """Set an argument's completer by name; see :meth:`Parser.add_argument`."""
     setattr(action, _COMPLETER, completer)
 
 
 def completer_of(action: argparse.Action) -> str:
-    """Return the name of an argument's completer; empty if it has none."""
+    """Return the name of an argument's completer, or "" if it has none."""
     return str(getattr(action, _COMPLETER, ""))
 
 
 def _without_hint(message: str) -> str:
-    """Return the part of ``message`` that argparse wrote, without the suggestions after it."""
+    """Return ``message`` as argparse wrote it, without the suggestions appended to it."""
     return message.partition("; did you mean ")[0]
 
 

@@ -1,6 +1,6 @@
-"""Commands, each a parser and a typed function, and families of such verbs under one name.
+"""Commands and verbs, each a parser and a typed function, and families of verbs under one command name.
 
-The function's parameters have the names of the parser's arguments: `Command.run` passes them by name. Thus the parser is
+The parser's arguments have the names of the function's parameters: `Command.run` passes them by name. Thus the parser is
 available without running the command, and the function can be called without a command line. A function with many
 arguments takes one record that contains them: see :func:`with_options`.
 """
@@ -26,7 +26,7 @@ _Options = TypeVar("_Options")
 
 
 class Command(NamedTuple):
-    """A command without verbs.
+    """A command that has no verbs.
 
     ``interrupted`` is the exit status after Ctrl-C, ``misuse_status`` the status after a usage error.
     """
@@ -53,7 +53,7 @@ class Command(NamedTuple):
 
 
 class Verb(NamedTuple):
-    """One verb of a family: its name, one line of help, its parser, and the function that is called with the parsed arguments.
+    """A verb in a family: its name, one line of help, its parser, and the function that is called with the parsed arguments.
 
     In a family that is a node, the function also takes ``arguments``, the remapping arguments. ``wording`` contains ROS's
     messages for this verb's errors.
@@ -106,7 +106,7 @@ class Family(NamedTuple):
 
     A verb may be a family itself. ``is_node``: launch files start it as a node (`<node pkg="rostopic" type="rostopic"
     args="pub ..."/>`), with `__name:=` and remappings among its arguments. ``interrupted``: the exit status after Ctrl-C.
-    ``wording``: ROS's messages for errors. ``shows_help_on_error``: an unknown verb prints the help on stdout, too.
+    ``wording``: ROS's messages for errors. ``shows_help_on_error``: an unknown verb also prints the help on stdout.
     """
 
     name: str
@@ -130,7 +130,7 @@ class Family(NamedTuple):
         return verb.name.removeprefix(f"{self.name} ")
 
     def find(self, name: str) -> Verb | Family | None:
-        """Return the verb called ``name``."""
+        """Return the verb called ``name``, or None if there is none."""
         return next((verb for verb in self.verbs if self.verb_name(verb) == name), None)
 
     def help(self) -> str:
@@ -163,7 +163,7 @@ class Family(NamedTuple):
             raise WordedError(error, ros) from error
 
     def _refuse(self, name: str) -> int:
-        """Report a verb that does not exist."""
+        """Report that a verb does not exist, and return the exit status."""
         hint = did_you_mean(name, map(self.verb_name, self.verbs))
         error = UsageError(
             f"unknown command `{self.name} {name}`{hint} (`{self.name} -h` shows what there is)"

@@ -62,7 +62,7 @@ def open_reader(path: str) -> Iterator[BagReader]:
 
 
 def version_of(path: str) -> int:
-    """Return a bag's version, 200 for 2.0, even if it has no index. Raise BagFormatError if the file is not a bag."""
+    """Return a bag's version (200 means 2.0), even if it has no index. Raise BagFormatError if the file is not a bag."""
     with open(path, "rb") as stream:
         return read_version(stream)
 
@@ -80,7 +80,7 @@ def data_size(reader: BagReader) -> int:
 
 
 def chunks_end(path: str) -> int:
-    """Return the offset of the index in a version 2.0 bag; 0 if it has none. Raise OSError if the file cannot be read."""
+    """Return the offset of the index in a version 2.0 bag, or 0 if there is none. Raise OSError if the file cannot be read."""
     try:
         with open_reader(path) as reader:
             return reader.index_position if isinstance(reader, ChunkedReader) else 0
@@ -89,7 +89,7 @@ def chunks_end(path: str) -> int:
 
 
 def backup_path(path: str) -> str:
-    """Return the path of a bag's backup: ``a.orig.bag``."""
+    """Return the path of a bag's backup: ``a.orig.bag`` for ``a.bag``."""
     return "{}.orig{}".format(*os.path.splitext(path))
 
 
@@ -117,7 +117,7 @@ def class_of(type_: str, md5sum: str, definition: str, warn: Callable[[str], obj
 
 
 def compress(source: str, target: str, compression: str, progress: Progress) -> None:
-    """Copy a bag, compressing its chunks differently. Raise BagError if the bag is invalid, OSError if a file fails.
+    """Copy a bag with another compression of its chunks. Raise BagError if it is invalid, OSError if a file operation fails.
 
     All connections are kept. If the source is damaged, the target contains the messages before the damage.
     """
@@ -133,7 +133,7 @@ def copy_bag(
 ) -> None:
     """Copy a bag in time order, with each connection replaced by ``change(connection)``.
 
-    Raise BagError if the bag is invalid, OSError if a file fails.
+    Raise BagError if the bag is invalid, OSError if a file operation fails.
     """
     with open_reader(source) as reader, new_bag(target, compression) as writer:
         numbers: dict[int, int] = {}
@@ -151,7 +151,7 @@ def copy_bag(
 
 
 class Expression:
-    """A Python expression of `rosbag filter` over topic, m and t. Raise ValueTextError if it does not parse."""
+    """A Python expression of `rosbag filter` over topic, m and t. Raise ValueTextError if its syntax is invalid."""
 
     def __init__(self, text: str) -> None:
         try:
@@ -194,7 +194,7 @@ def filter_bag(
 ) -> FilterResult:
     """Write the messages for which ``keep`` is true to a new bag; call ``on_shown`` with each value of ``show``.
 
-    Raise BagError if the bag is invalid, OSError if a file fails, ValueTextError if the expression fails, or
+    Raise BagError if the bag is invalid, OSError if a file operation fails, ValueTextError if the expression raises, or
     MessageException if a message cannot be deserialized.
     """
     needs_message = keep.needs_message or (show is not None and show.needs_message)
@@ -256,7 +256,7 @@ def reindex(path: str, progress: Progress) -> list[str]:
 def convert12(source: str, target: str, progress: Progress) -> None:
     """Convert a version 1.2 bag, with or without an index, to version 2.0.
 
-    Raise BagError if it is invalid, OSError if a file fails.
+    Raise BagError if the bag is invalid, OSError if a file operation fails.
     """
     with open(source, "rb") as stream, new_bag(target, compressions.NONE) as writer:
         reader = unindexed_old_bag(stream)
@@ -271,7 +271,7 @@ def convert12(source: str, target: str, progress: Progress) -> None:
 
 
 def check_bag_name(path: str) -> None:
-    """Raise UsageError if the name of an output bag ends like an MCAP file's."""
+    """Raise UsageError if an output bag has an MCAP file's name extension."""
     if path.endswith(".mcap"):
         raise UsageError(
             f"{path} would be a bag: end its name with .bag; `rosbag convert` makes an MCAP file of that"
@@ -282,7 +282,7 @@ def check_bag_name(path: str) -> None:
 def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
     """Yield a writer of a new bag; chunks are compressed in parallel. After an error or Ctrl-C the file is a valid bag.
 
-    Raise UsageError before writing if the name ends like an MCAP file's.
+    Raise UsageError before writing if the name has an MCAP file's extension.
     """
     check_bag_name(path)
     with contextlib.ExitStack() as stack:

@@ -9,7 +9,7 @@ __all__ = ["configuration_documents", "parameter_values"]
 
 
 def configuration_documents(text: str) -> list[object]:
-    """Return the documents of a file; a Python object, as ROS's dynparam dumps it, becomes a dict.
+    """Return the documents in a file; a Python object, as ROS's dynparam writes it, becomes a dict.
 
     Raise MinirospyError if the file is not YAML, or its aliases expand to too much data.
     """

@@ -26,7 +26,7 @@ class Filter:
     """A Python expression over a message ``m`` and its ``topic``, as the user typed it."""
 
     def __init__(self, expression: str) -> None:
-        """Raise UsageError if the expression does not parse."""
+        """Compile the expression. Raise UsageError if its syntax is invalid."""
         self._expression = expression
         try:
             self._code = compile(expression, "--filter", "eval")
@@ -38,17 +38,19 @@ class Filter:
         try:
             # eval is safe here: the code is the user's own, on the user's own machine, as in ROS.
             return bool(eval(self._code, {"m": message, "topic": topic}))
-        except Exception as error:  # the user's expression may raise anything: report it to the user
+        # the user's expression may raise any exception, which is reported to the user
+        except Exception as error:
             raise UsageError(f"filter [{self._expression}]: {type(error).__name__}: {error}") from error
 
 
 class Echo:
     """Formats a topic's messages, or one of their fields, as output lines, each ending with a line feed.
 
-    ``plot``: comma-separated values, with a header line first. ``strings`` and ``arrays``: whether to show such fields.
-    ``width``: the width of numbers. ``offset``: show times as differences from ``now()``, which returns nanoseconds.
-    ``header_times``: in a plot, use the time in a message's header, if it has one, instead of the receive time.
-    ``is_type_known``: whether ROS looks up the type of a field that is not a message, as it does for topics, not for bags.
+    ``plot``: print comma-separated values, with a header line first. ``strings`` and ``arrays``: show fields of these
+    kinds. ``width``: the width of numbers. ``offset``: show times as differences from ``now()``, which returns
+    nanoseconds. ``header_times``: in a plot, use the time in a message's header, if it has one, instead of the receive
+    time. ``is_type_known``: ROS looks up the type of a field that is not a message, as it does for topics, but not for
+    bags.
     """
 
     def __init__(
@@ -115,7 +117,7 @@ class Echo:
     def _is_shown_whole(self, value: object) -> bool:
         """Return whether to print a value unchanged.
 
-        This applies to a bag's field that is not a message, because ROS does not look up its type.
+        This applies to a field of a bag's message that is not itself a message, because ROS does not look up its type.
         """
         return not self._is_type_known and not is_message(value)
 
@@ -138,7 +140,7 @@ def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int 
     """Return a message filled from YAML values.
 
     ``now`` represents ``nanoseconds`` (or the current time), ``auto`` a stamped header. Raise MessageException, with the
-    names of the fields, if the values do not fit.
+    names of the fields, if the values do not match the fields.
     """
     message = fill(cls(), values, words_of(time.time_ns() if nanoseconds is None else nanoseconds))
     serialize(message)
@@ -146,7 +148,7 @@ def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int 
 
 
 def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
-    """Return ``value`` with placeholders for strings or arrays; ``type_`` is its ROS type, "" if unknown.
+    """Return ``value`` with placeholders for strings or arrays; ``type_`` is its ROS type, or "" if unknown.
 
     As in ROS, arrays of messages are not elided, and the placeholder of a fixed-length array contains the length, as in
     ``[3``.
@@ -166,7 +168,8 @@ def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
         name: elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
     }
-    # A placeholder is a string whatever the field's type, and a field's printed form depends on its declared type.
+    # A placeholder is a string regardless of the field's type, and how a field is printed depends on its declared
+    # type.
     types = tuple(
         "string" if isinstance(fields[name], str) else slot_type
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)

@@ -1,6 +1,6 @@
 """Parse and follow paths to fields of messages: ``pose/position/x``, ``points[0]/x``, ``ranges[1:3]``, ``points[:]/x``.
 
-Pure: :func:`parse_path` returns steps, which are then applied to a message to get a value. Source:
+Pure: :func:`parse_path` returns steps, which other functions apply to a message to get a value. Source:
 http://wiki.ros.org/rostopic#rostopic_echo.
 """
 
@@ -23,7 +23,7 @@ _TIMES = {
     "time": {"secs": "uint32", "nsecs": "uint32"},
     "duration": {"secs": "int32", "nsecs": "int32"},
 }
-"""The primitive types that nevertheless have fields."""
+"""The primitive types that have fields nevertheless."""
 
 
 class Step(NamedTuple):
@@ -34,12 +34,12 @@ class Step(NamedTuple):
 
 
 def parse_path(path: str) -> tuple[Step, ...]:
-    """Parse a path; the empty path refers to the message itself. Raise UsageError if its syntax is invalid."""
+    """Parse a path; the empty path refers to the whole message. Raise UsageError if its syntax is invalid."""
     return tuple(_parse_step(part, path) for part in path.split("/")) if path else ()
 
 
 def field_value(message: object, steps: tuple[Step, ...]) -> object:
-    """Return the value at a path; for a slice of messages followed by a field, the list of that field's values.
+    """Return the value at a path. For a slice of messages followed by a field, return a list of that field's values.
 
     Raise NotFoundError if a field does not exist, IndexError if an array is too short.
     """
@@ -66,7 +66,7 @@ def field_value(message: object, steps: tuple[Step, ...]) -> object:
 
 
 def field_type(message_class: type[Message], path: str) -> str:
-    """Return the ROS type of the field at a path of a message class.
+    """Return the ROS type of the field at a path in a message class.
 
     Raise NotFoundError if the field does not exist or the class of an inner message is not installed.
     """

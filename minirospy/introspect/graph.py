@@ -1,4 +1,4 @@
-"""The graph that queries refer to: a master, and name resolution for the caller."""
+"""The graph that queries are about: a master, and name resolution for the caller."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = [
     "why_illegal",
 ]
 
-_MAX_NAME_LENGTH = 4096  # characters; the master refuses longer names
+_MAX_NAME_LENGTH = 4096  # maximum characters in a name; the master refuses longer names
 
 
 class NodeAddress(NamedTuple):
@@ -40,7 +40,7 @@ class NodeAddress(NamedTuple):
 class Graph:
     """A connection to a master, with ``tool`` as caller_id; names are resolved in ``namespace``, then remapped.
 
-    A context manager. Every call raises MasterUnreachableError if no master answers.
+    A context manager. Every call raises MasterUnreachableError if no master responds.
     """
 
     def __init__(
@@ -108,9 +108,9 @@ class Graph:
 
 
 def why_illegal(name: str) -> str:
-    """Return the reason why a topic's or service's global name is not legal; "" if it is legal.
+    """Return the reason why a topic's or service's global name is not legal, or "" if it is legal.
 
-    rospy accepts such names, roscpp does not. A field path may follow a topic name: /points[0]/x.
+    rospy accepts illegal names, roscpp does not. A field path may follow a topic name: /points[0]/x.
     """
     if len(name) > _MAX_NAME_LENGTH:
         return f"a name has {_MAX_NAME_LENGTH} characters at most"
@@ -119,7 +119,7 @@ def why_illegal(name: str) -> str:
 
 
 def in_namespace(name: str, namespace: str) -> bool:
-    """Return whether a global name is ``namespace`` or is below it; every name is below the root."""
+    """Return whether a global name is ``namespace`` or is below it. Every name is below the root namespace."""
     return namespace in ("", "/") or name == namespace or name.startswith(namespace.rstrip("/") + "/")
 
 

@@ -28,12 +28,12 @@ class Kind(Enum):
 
     @property
     def word(self) -> str:
-        """Return the kind as a word."""
+        """The kind as a word."""
         return "message" if self is Kind.MESSAGE else "service"
 
 
 class Interfaces:
-    """All types of one kind in all packages. Raises DefinitionError if a definition does not parse."""
+    """All types of one kind in all packages. Methods raise DefinitionError if a definition cannot be parsed."""
 
     def __init__(self, packages: Packages, kind: Kind) -> None:
         self._packages = packages
@@ -74,15 +74,15 @@ class Interfaces:
         return found
 
     def text(self, type_: str) -> str:
-        """Return a type's definition as it is in its file. Raise NotFoundError if the type does not exist."""
+        """Return a type's definition exactly as in its file. Raise NotFoundError if the type does not exist."""
         return self._spec(type_).text
 
     def description(self, type_: str) -> str:
-        """Return a type's constants and fields, with inner types expanded. Raise NotFoundError if a type does not exist."""
+        """Return a type's constants and fields, with inner types expanded. Raise NotFoundError if one does not exist."""
         return describe(self._spec(type_), self._catalogue.message)
 
     def md5sum(self, type_: str) -> str:
-        """Return a type's md5sum. Raise NotFoundError if a type does not exist."""
+        """Return a type's md5sum. Raise NotFoundError if the type, or one that it uses, does not exist."""
         spec = self._spec(type_)
         if isinstance(spec, ServiceSpec):
             return service_md5(spec, self._catalogue.message)

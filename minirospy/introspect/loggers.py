@@ -22,16 +22,20 @@ __all__ = ["logger_level", "logger_levels", "set_logger_level"]
 
 
 def logger_levels(graph: Graph, node: str) -> dict[str, str]:
-    """Return the levels (lower case) of a node's loggers, by logger; ``node`` is a global name.
+    """Return a dict from logger to level (lower case) for a node; ``node`` is a global name.
 
-    Raise NotFoundError, NodeUnreachableError, or MinirospyError if the node has no logger services.
+    Raise NotFoundError if the node does not exist, NodeUnreachableError if it does not respond, or MinirospyError if it
+    has no logger services.
     """
     response = _ask(graph, node, "get_loggers", "roscpp/GetLoggers", [])
     return {logger.name: logger.level for logger in cast("GetLoggersResponse", response).loggers}
 
 
 def logger_level(graph: Graph, node: str, logger: str) -> str:
-    """Return the level of one logger. Raise NotFoundError if the logger does not exist, or as :func:`logger_levels` does."""
+    """Return the level of one logger.
+
+    Raise NotFoundError if the logger does not exist; otherwise raise the same exceptions as :func:`logger_levels`.
+    """
     levels = logger_levels(graph, node)
     if logger not in levels:
         raise NotFoundError(f"logger of node {node}", logger, levels)
@@ -39,7 +43,7 @@ def logger_level(graph: Graph, node: str, logger: str) -> str:
 
 
 def set_logger_level(graph: Graph, node: str, logger: str, level: str) -> None:
-    """Set a logger's level. Raise the same errors as :func:`logger_level`."""
+    """Set a logger's level. Raise the same exceptions as :func:`logger_level`."""
     # A node accepts any logger name, so check first that the logger exists.
     logger_level(graph, node, logger)
     _ask(graph, node, "set_logger_level", "roscpp/SetLoggerLevel", [logger, level])

@@ -44,21 +44,21 @@ class Received(NamedTuple):
 
 
 class MessageClasses:
-    """Message classes for publishers' messages; each is looked up or generated once."""
+    """Message classes for what publishers send; each class is looked up or generated once."""
 
     def __init__(self) -> None:
         self._classes: dict[tuple[str, str], type[Message]] = {}
 
     def for_header(self, header: Mapping[str, str]) -> type[Message]:
-        """Return the class for a publisher's connection header: the installed one if the md5sums agree.
+        """Return the class for a publisher's connection header. If the md5sums agree, this is the installed one.
 
         Raise NotFoundError if it is not installed and the publisher sent no definition, or DefinitionError if the
-        definition does not parse.
+        definition cannot be parsed.
         """
         key = (header.get("type", "*"), header.get("md5sum", "*"))
         if key not in self._classes:
             if len(self._classes) >= _MAX_CLASSES:
-                # Normal use never needs this many types: a publisher invents them.
+                # Normal use never needs this many types, so a publisher is inventing them.
                 self._classes.clear()
             self._classes[key] = self._find(*key, header.get("message_definition", ""))
         return self._classes[key]
@@ -66,7 +66,8 @@ class MessageClasses:
     def read(self, received: Received) -> Message:
         """Deserialize a received message.
 
-        Raise DeserializationError if its bytes are invalid, or as :meth:`for_header` does.
+        Raise DeserializationError if its bytes are invalid, or the exceptions of :meth:`for_header` if there is no class
+        for it.
         """
         message = self.for_header(received.header)()
         message.deserialize(received.body)
@@ -91,7 +92,7 @@ def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | Non
     """Fill the fields of ``message`` from YAML values, either one dictionary or a value per field in order.
 
     Return the message. ``keys`` maps words to the values that they represent, such as ``now`` to a time. Raise
-    MessageException if the values do not fit.
+    MessageException if the values do not match the fields.
     """
     from minirospy.core.idl.message import fill_message_args
 
@@ -114,12 +115,12 @@ def words_of(nanoseconds: int) -> dict[str, object]:
 
 
 def check(message: Message) -> None:
-    """Raise MessageException, with the field's name, if a value does not fit the definition."""
+    """Raise MessageException, with the field's name, if a value does not match the definition."""
     serialize(message)
 
 
 def serialize(message: Message) -> bytes:
-    """Serialize a message. Raise MessageException if a value does not fit its field."""
+    """Serialize a message. Raise MessageException if a value does not match its field."""
     buffer = BytesIO()
     try:
         message.serialize(buffer)

@@ -13,17 +13,17 @@ from minirospy.base.errors import MinirospyError, ServiceException
 __all__ = ["MAX_CONCURRENT", "NodeQueries"]
 
 MAX_CONCURRENT = 64
-"""Concurrent first queries: a node that hangs occupies only one connection."""
+"""Maximum number of concurrent first queries; a node that hangs occupies only one of them."""
 
 _MAX_CONCURRENT_RETRIES = 32
-"""Concurrent retries; limited separately, so that retries do not delay first queries."""
+"""Maximum number of concurrent retries; limited separately, so that retries do not delay first queries."""
 _QUERY_SECONDS = 5.0
-_AGAIN_SECONDS = 10.0  # before a node that did not respond is queried again
+_AGAIN_SECONDS = 10.0  # seconds before a node that did not respond is queried again
 _REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
-"""Pause after a refused query, base and increment per failed query.
+"""Seconds to pause after a refused query: base, and increment per failed query.
 
-A refused query is cheap, and a killed server may be restarted soon, so refused queries are retried sooner; 500 dead nodes
-are queried every 10 s.
+A refused query is cheap, and a killed server may be restarted soon, so refused queries are retried sooner than others. With
+500 dead nodes, each is queried every 10 s.
 """
 
 _Key = TypeVar("_Key")
@@ -89,7 +89,7 @@ class NodeQueries(Generic[_Key, _Found]):
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # Done callbacks of tasks that have just finished run only after this.
+        # Clear the tasks here, because done callbacks of tasks that have just finished run only after this.
         self._tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:
@@ -104,7 +104,7 @@ class NodeQueries(Generic[_Key, _Found]):
             self._reporter.report(error)
             self._failed(key)
         else:
-            # A key that is absent now must be queried again if it returns.
+            # If the key is absent now, it must be queried again when it returns.
             if key in self._present:
                 self.found[key] = found
                 return True

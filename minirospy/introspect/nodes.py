@@ -52,7 +52,7 @@ __all__ = [
 
 
 _SHUTDOWN_SECONDS = 10.0
-"""Long enough for a node to run its shutdown hooks before it responds."""
+"""Seconds, long enough for a node to run its shutdown hooks before it responds."""
 
 
 class TypedName(NamedTuple):
@@ -136,7 +136,7 @@ def find_node(graph: Graph, name: str) -> NodeAddress:
 
 
 def node_detail(graph: Graph, name: str) -> NodeDetail:
-    """Return the master's information about a node (global name). Raise NotFoundError if it is not registered."""
+    """Return the master's information about a node (global name). Raise NotFoundError if the node is not registered."""
     state = graph.state()
     # Use the types that publishers registered: rosnode prints "unknown type" for a topic without publishers.
     types = dict(graph.master.get_published_topics())
@@ -179,7 +179,7 @@ def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> 
             if isinstance(error.__cause__, TimeoutError):
                 raise NodeUnreachableError(node.name, error.uri, error.why) from error
         except RpcError:
-            pass  # a node that exits immediately may not complete its response
+            pass  # a node that exits immediately may not finish sending its response
 
 
 def is_unknown_host(error: NodeUnreachableError) -> bool:
@@ -210,9 +210,9 @@ def unreachable_nodes(
 
 
 def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = None) -> None:
-    """Unregister everything that a node registered with the master; a newer node of the same name is not affected.
+    """Unregister everything that a node registered with the master; a newer node with the same name is not affected.
 
-    ``state``: the master's state, if the caller already has it. Raise MasterUnreachableError if no master answers.
+    ``state``: the master's state, if the caller already has it. Raise MasterUnreachableError if no master responds.
     """
     from minirospy.runtime.rpc.master_proxy import MasterProxy
 
@@ -221,8 +221,8 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
     # Use the node's name as the caller_id: the master removes only the caller's own registrations.
     master = MasterProxy(graph.master.uri, node.name)
     try:
-        # Topics are unregistered by the node's URI, services by their own URI. If the node's name still has this URI
-        # after the services were looked up, none of them can belong to a newer node.
+        # Topics are unregistered by the node's URI, services by their own URI. If the node's name is still registered
+        # with this URI after the services were looked up, none of them can belong to a newer node.
         services = {service: _service_uri(master, service) for service in _held_by(state.services, node.name)}
         with contextlib.suppress(RpcRefused):
             if master.lookup_node(node.name) == uri:
@@ -237,7 +237,7 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
 
 
 def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
-    """Return whether a node's address has no listening process, or one that is not the node.
+    """Return whether no process listens at a node's address, or one that is not the node.
 
     Return False for a node that does not respond in time: it may be alive.
     """

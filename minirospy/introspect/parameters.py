@@ -36,7 +36,7 @@ class RootValueError(ValueTextError):
 class ParameterFile(NamedTuple):
     """One document of a parameter file: its values and their namespace.
 
-    ``own_namespace``: the namespace is the document's own key ``_ns``.
+    ``own_namespace``: the namespace was set by the key ``_ns`` in the document.
     """
 
     namespace: str
@@ -51,7 +51,10 @@ def list_parameters(graph: Graph, namespace: str = "/") -> list[str]:
 
 
 def get_parameter(graph: Graph, name: str) -> object:
-    """Return the value of a parameter (global name), a dictionary for a namespace. Raise NotFoundError if it is not set."""
+    """Return the value of a parameter (global name), or a dictionary for a namespace.
+
+    Raise NotFoundError if it is not set.
+    """
     try:
         return graph.master.get_param(name)
     except RpcRefused:
@@ -87,7 +90,7 @@ def delete_parameter(graph: Graph, name: str) -> None:
 def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFile]:
     """Parse a parameter file named ``where``; return its documents, to be set below ``namespace`` (global).
 
-    Raise ValueTextError if it is not YAML, or has unnamed values at the root.
+    Raise ValueTextError if the file is not YAML, or has unnamed values at the root.
     """
     files = []
     for document in parse_documents(text, where):
@@ -111,7 +114,7 @@ def dump_parameters(values: object) -> str:
 
 
 def flatten(name: str, value: object) -> Iterator[tuple[str, object]]:
-    """Yield each individual parameter at or below ``name``, in the order of the values."""
+    """Yield each individual parameter at or below ``name`` with its value, in the order of the values."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from flatten(_join(name, str(key)), inner)

@@ -25,7 +25,7 @@ def plot_header(value: object, *, strings: bool = True, arrays: bool = True) -> 
 def plot_row(
     value: object, nanoseconds: int, *, strings: bool = True, arrays: bool = True, origin: int = 0
 ) -> str:
-    """Return the line of values, starting with the message's time.
+    """Return the line of values for a message, starting with its time.
 
     ``origin`` (nanoseconds) is subtracted from the line's times.
     """
@@ -33,7 +33,7 @@ def plot_row(
 
 
 def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -> Iterator[_Cell]:
-    # Plain ``if``s, most frequent first: this runs for every value of every message.
+    # Use plain ``if`` statements, the most frequent first, because this runs for every value in every message.
     if isinstance(value, bool):
         yield _Cell(name, str(int(value)))
     elif isinstance(value, int | float):

@@ -26,13 +26,13 @@ class ProcessLoads:
         self._known: dict[int, psutil.Process] = {}
 
     def look(self, pids: Iterable[int]) -> dict[int, ProcessLoad]:
-        """Return the loads by process id, without processes that have exited or that this user may not inspect."""
+        """Return the loads by process id, omitting processes that have exited or that this user may not inspect."""
         before, self._known = self._known, {}
         found = {}
         for pid in set(pids):
             with contextlib.suppress(psutil.Error, ValueError):
                 process = before.get(pid)
-                # The id of an exited process may have been reused.
+                # Another process may have reused the id of an exited process.
                 is_new = process is None or not process.is_running()
                 if process is None or is_new:
                     process = psutil.Process(pid)

@@ -13,7 +13,7 @@ __all__ = ["prototype"]
 
 _WIDE = 5
 _COLUMNS = 80
-_NO_BYTES = '!!binary ""'  # an empty uint8[], which is a byte string, not a list of numbers
+_NO_BYTES = '!!binary ""'  # the value of an empty uint8[], which is a byte string, not a list of numbers
 
 
 def prototype(
@@ -22,7 +22,7 @@ def prototype(
     """Return a message of default values as YAML, as `rosmsg-proto` writes it, for the user to edit and publish.
 
     A variable-length array has one element, as an example, or none with ``empty_arrays``. ``without``: names of fields to
-    leave out, also in inner messages.
+    leave out, including those of inner messages.
     """
     lines = _Yaml().lines(_Defaults(catalogue, without, empty_arrays).of(spec))
     return "\n".join(map(_wrapped, lines))
@@ -58,7 +58,7 @@ class _Defaults(NamedTuple):
 class _Yaml:
     """A YAML writer.
 
-    From the first wide value on, it writes innermost lists and dictionaries on one line, as `rosmsg-proto` does.
+    Once it has met a wide value, it writes innermost lists and dictionaries on one line, as `rosmsg-proto` does.
     """
 
     def __init__(self) -> None:

@@ -23,11 +23,11 @@ __all__ = ["publish_all", "values_to_publish"]
 def values_to_publish(
     fields: Sequence[str], arguments: Sequence[str], file: str | None
 ) -> Iterator[list[object]]:
-    """Yield the YAML values of each message with ``fields``, at least one message.
+    """Yield the YAML values of each message that has ``fields``; there is at least one message.
 
-    ``arguments`` are the values of one message; without them, read a file, or read standard input as data arrives. Raise
-    UsageError if there are no values, NotFoundError if the file does not exist, or ValueTextError if the input is not
-    YAML.
+    ``arguments`` are the values of one message. If there are none, the values are read from a file, or from standard input as
+    data arrives. Raise UsageError if there are no values, NotFoundError if the file does not exist, or ValueTextError if the
+    input is not YAML.
     """
     if arguments or (file is None and not fields):
         yield parse_arguments(arguments)
@@ -68,7 +68,7 @@ def publish_all(
         on_message(message)
         publisher.publish(message)
         sent += 1
-        # Measure from the start, not from the last message, so that errors in the pauses do not accumulate.
+        # Measure from the start, not from the last message, so that errors do not accumulate.
         pause = round(start + sent * 1e9 / rate) - node.clock.now()
 
         try:

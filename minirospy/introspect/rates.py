@@ -23,14 +23,14 @@ __all__ = [
 ]
 
 UNBOUNDED = 50000
-"""Maximum messages in a window without a limit, to bound the memory use of a long measurement."""
+"""Maximum number of messages in a window that has no limit, to bound the memory use of a long measurement."""
 
 
 _NOTHING = "no new messages"
 
 
 class Spread(NamedTuple):
-    """Mean, extremes and standard deviation of a series of times in seconds, and the number of messages."""
+    """Mean, minimum, maximum and standard deviation of a series of times in seconds, and the number of messages."""
 
     mean: float
     min: float
@@ -74,7 +74,7 @@ class RateWindow:
         self._last = time
 
     def report(self) -> Spread | None:
-        """Return the statistics; None if no message has arrived since the last report, or too few in total."""
+        """Return the statistics, or None if no message has arrived since the last report, or too few in total."""
         if self._arrived == self._reported or not self._pauses:
             return None
         self._reported = self._arrived
@@ -92,7 +92,7 @@ class BandwidthWindow:
         self._messages.append((time, size))
 
     def report(self, now: float) -> Bandwidth | None:
-        """Return the statistics; None before the second message."""
+        """Return the statistics, or None before the second message."""
         messages = list(self._messages)
         if len(messages) < 2:
             return None
@@ -116,7 +116,7 @@ class DelayWindow:
         self._delays.append(time - stamp)
 
     def report(self) -> Spread | None:
-        """Return the statistics; None if no message has arrived since the last report."""
+        """Return the statistics, or None if no message has arrived since the last report."""
         if self._arrived == self._reported:
             return None
         self._reported = self._arrived
@@ -124,7 +124,7 @@ class DelayWindow:
 
 
 def rate_text(reports: Mapping[str, Spread | None]) -> str:
-    """Return what `rostopic hz` prints once a second: two lines for one topic, a table for several."""
+    """Return the text that `rostopic hz` prints once a second: two lines for one topic, a table for several."""
     if len(reports) == 1:
         (report,) = reports.values()
         return f"average rate: {report.rate:.3f}\n\t{_extremes(report)}" if report else _NOTHING
@@ -137,12 +137,12 @@ def rate_text(reports: Mapping[str, Spread | None]) -> str:
 
 
 def delay_text(report: Spread | None) -> str:
-    """Return what `rostopic delay` prints once a second."""
+    """Return the text that `rostopic delay` prints once a second."""
     return f"average delay: {report.mean:.3f}\n\t{_extremes(report)}" if report else _NOTHING
 
 
 def bandwidth_text(reports: Mapping[str, Bandwidth | None]) -> str:
-    """Return what `rostopic bw` prints once a second: two lines for one topic, a table for several; "" if there are none."""
+    """Return the text that `rostopic bw` prints once a second: two lines for one topic, a table for several, "" for none."""
     rows = [
         (
             name,
@@ -183,7 +183,7 @@ def _four_digits(number: float) -> str:
 
 
 def _bytes(number: float, rate: float) -> str:
-    """Format a number of bytes, in the unit that fits the rate."""
+    """Format a number of bytes, in the unit that suits the rate."""
     unit, size = ("B", 1.0) if rate < 1e3 else ("KB", 1e3) if rate < 1e6 else ("MB", 1e6)
     return f"{number / size:.2f}{unit}"
 

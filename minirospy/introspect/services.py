@@ -61,7 +61,7 @@ class ServiceOffer(NamedTuple):
 
 
 def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
-    """Return the services at or below ``namespace``, sorted by name."""
+    """Return the services at or below ``namespace`` with their nodes, sorted by name."""
     state = graph.state()
     return [
         ServiceNode(name, tuple(state.services[name]))
@@ -102,7 +102,7 @@ def service_arguments(type_: str) -> list[str]:
 
 
 def find_services_of_type(graph: Graph, type_: str) -> list[str]:
-    """Return the sorted names of the services of a type, without services that do not respond."""
+    """Return the sorted names of the services with this type, omitting services that do not respond."""
     return [service.name for service in list_services(graph) if _probed_type(graph, service.name) == type_]
 
 
@@ -116,10 +116,10 @@ def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object
 
 
 def fill_request(type_: str, arguments: Sequence[object]) -> Message:
-    """Return a request of a service type, filled from YAML values (one dictionary, or all fields in order).
+    """Return a request for a service type, filled from YAML values (one dictionary, or all fields in order).
 
-    ``now`` represents the current time, ``auto`` a stamped header, whose ``seq`` is 1, as in the first call of a proxy.
-    Raise NotFoundError if the type is not installed, MessageException if the values do not fit.
+    ``now`` represents the current time, ``auto`` a stamped header. The header's ``seq`` is 1, as in a proxy's first call.
+    Raise NotFoundError if the type is not installed, MessageException if the values do not match the fields.
     """
     from minirospy.core.idl.load import service_class
     from minirospy.core.idl.message import number_header
@@ -133,7 +133,7 @@ def fill_request(type_: str, arguments: Sequence[object]) -> Message:
 def call_service(graph: Graph, service: str, type_: str, request: Message) -> Message:
     """Call a service and return the response.
 
-    Raise NotFoundError if the service does not exist, or ServiceException with the handler's message.
+    Raise NotFoundError if the service does not exist, or ServiceException, with the server's message, if the call fails.
     """
     from minirospy.core.idl.load import service_class
     from minirospy.introspect.messages import check, serialize
@@ -163,7 +163,7 @@ def call_service(graph: Graph, service: str, type_: str, request: Message) -> Me
 
 
 def _probed_type(graph: Graph, service: str) -> str | None:
-    """Return a service's type; None if it does not exist or does not respond."""
+    """Return a service's type, or None if the service does not exist or does not respond."""
     try:
         return _probe(graph, service, graph.master.lookup_service(service))
     except (RpcRefused, NodeUnreachableError):
@@ -188,7 +188,7 @@ def _probe(graph: Graph, service: str, uri: str) -> str:
 
 
 def _why(error: Exception) -> str:
-    """Return `Connection refused` instead of `[Errno 111] Connection refused`; for a timeout, the likely cause."""
+    """Return an error's message without its number (`Connection refused`); for a timeout, return the likely cause."""
     if isinstance(error, TimeoutError):
         return f"timed out; {SUSPENDED}"
     return getattr(error, "strerror", None) or str(error)

@@ -44,7 +44,7 @@ class Snapshot:
 class Changes:
     """The difference between two snapshots: new or changed entries, each in full, and removed names.
 
-    A topic that has lost its last publisher but has subscribers is in ``publishers`` with no nodes.
+    A topic that has lost its last publisher but still has subscribers is in ``publishers`` with an empty list.
     """
 
     publishers: Table
@@ -54,7 +54,7 @@ class Changes:
     removed_services: tuple[str, ...]
 
     def __bool__(self) -> bool:
-        """Return whether anything has changed."""
+        """Return whether there are any changes."""
         return bool(
             self.publishers
             or self.subscribers
@@ -65,7 +65,7 @@ class Changes:
 
 
 def compare(before: Snapshot, after: Snapshot) -> Changes:
-    """Return the difference; changed types do not count."""
+    """Return the difference; a changed type alone does not count."""
     left = before.topics - after.topics
     return Changes(
         _changed(before.publishers, after.publishers, left),
@@ -77,7 +77,7 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
 
 
 async def fetch(call: Callable[..., Awaitable[Any]]) -> Snapshot:
-    """Return the current graph; ``call(method, *arguments)`` calls the master, and its errors are raised."""
+    """Return the current graph. ``call(method, *arguments)`` calls the master; its exceptions are passed on."""
     state = await call("getSystemState")
     types = await call("getTopicTypes")
     publishers, subscribers, services = (

@@ -1,4 +1,4 @@
-"""Nodes that tools use to listen and publish; a process may have several.
+"""Nodes with which tools listen and publish; a process may have several of them.
 
 Messages arrive in one worker per connection; :class:`Inbox` passes them to the reading thread, and blocks the workers
 while that thread is busy, so that a slow terminal does not make memory grow.
@@ -37,18 +37,21 @@ if TYPE_CHECKING:
 __all__ = ["Inbox", "ToolNode", "TopicPublisher", "wait_for_topic"]
 
 _POLL_SECONDS = 0.1
-_WAITING = 64  # messages queued for the reading thread
+_WAITING = 64  # maximum number of messages queued for the reading thread
 
 _SLICE = 0.05 if sys.platform == "win32" else 3600.0
-"""On Windows Ctrl-C does not interrupt a wait of the main thread, so waits are split into short slices."""
+"""Seconds per wait of the main thread.
+
+On Windows Ctrl-C does not interrupt a wait, so waits there are split into short slices.
+"""
 
 
 class ToolNode:
     """A node named ``name``, or ``<tool>_<pid>_<milliseconds>`` by default; a context manager.
 
-    ``ended`` is set when the node has to stop. ``clock`` is the machine's time or, with ``ros_time`` and if the parameter
-    /use_sim_time is set, the time from /clock; ``simulated`` is True in the latter case. Raise MasterUnreachableError if
-    no master answers.
+    ``ended`` is set when the node has to stop. ``clock`` is the machine's time or, with ``ros_time`` and if the
+    parameter /use_sim_time is set, the time from /clock; ``simulated`` is True in the latter case. Raise
+    MasterUnreachableError if no master responds.
     """
 
     def __init__(
@@ -90,9 +93,9 @@ class ToolNode:
         self._loop.close()
 
     def wait(self, seconds: float) -> bool:
-        """Sleep for ``seconds``, or until the node has to stop, and then return True.
+        """Sleep for ``seconds``, or until the node has to stop; return whether it has to stop.
 
-        Raise an error that :meth:`measure` met.
+        Raise the exception of a function passed to :meth:`measure`, if it raised one.
         """
         end = time.monotonic() + seconds
         while not self.ended.is_set():
@@ -116,7 +119,7 @@ class ToolNode:
         """Call ``deliver(bytes, header)`` in a worker for each message on a topic of any type.
 
         The bytes are valid only during the call. A node subscribes to a topic only once, so the same worker also calls
-        later listeners, for example on the /clock that the node itself uses. A later listener is first called in this
+        later listeners, for example for /clock, which the node itself uses. A later listener is first called in this
         thread, with the last message received from each latched publisher.
         """
         if topic in self._listeners:
@@ -193,7 +196,7 @@ class _Listeners:
     def __init__(self, first: Callable[[Frame, Header], None]) -> None:
         self._functions: tuple[Callable[[Frame, Header], None], ...] = (first,)
         self._lock = threading.Lock()
-        # Publisher's name -> its last message, for latched publishers.
+        # Dict from publisher's name to its last message, for latched publishers.
         self._latched: dict[str, tuple[bytes, Header]] = {}
 
     def add(self, function: Callable[[Frame, Header], None]) -> None:
@@ -234,13 +237,13 @@ class Inbox:
             return
 
     def close(self) -> None:
-        """Stop the reading after the queued messages."""
+        """Make the reader stop once it has read the queued messages."""
         if not self._closed.is_set():
             self._closed.set()
             try:
                 self._messages.put_nowait(None)
             except queue.Full:
-                pass  # the queue is full: the reader checks the flag after it has read all messages
+                pass  # the queue is full: the reader checks the flag after it has read the queued messages
 
     def __iter__(self) -> Iterator[Received]:
         while True:
@@ -284,7 +287,7 @@ class TopicPublisher:
 def wait_for_topic(graph: Graph, name: str, on_waiting: Callable[[], object]) -> TopicField:
     """Wait until ``name``, a topic or a path to a topic's field, is published; return the topic and the field.
 
-    Call ``on_waiting`` once if it has to wait.
+    Call ``on_waiting`` once if this has to wait.
     """
     field = find_topic(graph, name)
     if field is None:

@@ -2,7 +2,7 @@
 
 Surveys also include the CPU and memory use of local processes.
 
-Traffic comes from the nodes' own counters (getBusStats), so that measuring a topic needs no subscription.
+Traffic is computed from the nodes' own counters (getBusStats), so that measuring a topic needs no subscription.
 Source: http://wiki.ros.org/ROS/Slave_API (getBusStats, getBusInfo).
 """
 
@@ -53,7 +53,7 @@ class Survey:
 def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
     """Query the master and all nodes in parallel; with ``processes``, also measure loads.
 
-    Raise MasterUnreachableError if no master answers.
+    Raise MasterUnreachableError if no master responds.
     """
     state = graph.state()
     answers = ask_nodes(graph, state, with_stats=True)
@@ -78,7 +78,7 @@ def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, flo
     found: dict[Edge, tuple[float, float]] = {}
     for key, now in after.counts.items():
         then = before.counts.get(key)
-        # roscpp's counters are 32-bit: skip those that have wrapped around.
+        # roscpp's counters are 32-bit numbers: skip those that have wrapped around.
         if then is None or now.messages < then.messages or now.bytes < then.bytes:
             continue
         hz, size = found.get(key[2], (0.0, 0.0))
@@ -87,7 +87,10 @@ def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, flo
 
 
 def describe(now: Survey, before: Survey | None = None) -> dict[str, object]:
-    """Return a survey as values for JSON: ``nodes``, ``traffic`` as [sender, topic, receiver, Hz, bytes/s], ``mismatches``."""
+    """Return a survey as values for JSON: ``nodes``, ``traffic``, ``mismatches``.
+
+    A row in ``traffic`` is [sender, topic, receiver, Hz, bytes/s].
+    """
     held: dict[str, list[str]] = {}
     for service, nodes in now.state.services.items():
         for node in nodes:
@@ -157,7 +160,7 @@ def _counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
         try:
             topic, *_, connections = row
             for number, size, *more in connections:
-                # rospy's rows have messages, connected; roscpp's rows have bytes of messages, messages, connected.
+                # rospy's rows have messages and connected; roscpp's have bytes of messages, messages and connected.
                 messages = more[1] if len(more) > 2 else more[0]
                 receiver = receivers.get((topic, str(number)))
                 if receiver is not None:

@@ -1,4 +1,4 @@
-"""Format the output of `rosnode info` and `rostopic info`. Pure, except that addresses are looked up in the graph."""
+"""Format the output of `rosnode info` and `rostopic info`. Pure, except that it looks up addresses in the graph."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def connections_text(graph: Graph, connections: Connections) -> str:
         lines.append("Connections:")
         for link in connections.links:
             to = link.destination
-            # An inbound connection has the publisher's URI instead of its name.
+            # For an inbound connection, this is the publisher's URI instead of its name.
             shown = f"{names[to]} ({to})" if to in names else to
             lines += (
                 f" * topic: {link.topic}",
@@ -68,7 +68,7 @@ def topic_text(detail: TopicDetail) -> str:
 
 
 def _direction(direction: str, info: str) -> str:
-    """Return ``outbound (port - host:port) [socket]``; the numbers are parsed from the string that nodes send."""
+    """Return ``outbound (port - host:port) [socket]``; the numbers are from the string that nodes send."""
     import re
 
     match = re.match(r"\w+ connection on port (\S+) to \[(\S+) on socket (\d+)\]", info)

@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 UNKNOWN_TYPE = "unknown type"
-"""Printed for a topic whose type no node has declared, because it has only subscribers to any type."""
+"""Shown for a topic whose type no node has declared, because it only has subscribers to any type."""
 
 _ANY = "*"
 
@@ -96,7 +96,7 @@ def list_topics(graph: Graph, namespace: str = "/") -> TopicList:
 
 
 def by_host(graph: Graph, found: TopicList) -> dict[str, TopicList]:
-    """Return the topics by host, sorted, for hosts whose nodes use the topics."""
+    """Return a dict from host, sorted, to the topics that the nodes on that host use."""
     hosts = {
         node: node_host(graph.node_uri(node)) for side in found for topic in side for node in topic.nodes
     }
@@ -141,7 +141,7 @@ def find_topic(graph: Graph, name: str) -> TopicField | None:
 
 
 def find_topics_of_type(graph: Graph, type_: str) -> list[str]:
-    """Return the sorted names of the topics of a type."""
+    """Return the sorted names of the topics with this type."""
     return sorted(topic for topic, of in graph.master.get_topic_types().items() if of == type_)
 
 
@@ -157,7 +157,7 @@ def topic_field_type(field: TopicField) -> str:
 
 
 def require_topic(graph: Graph, name: str) -> TopicField:
-    """Return the topic as :func:`find_topic` does.
+    """Return the topic as :func:`find_topic` does, but never None.
 
     Raise NotFoundError if the topic does not exist or its type is not known.
     """

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 __all__ = ["ServiceInfo", "TypeTexts", "described", "installed_type", "type_of_text"]
 
 _MAX_NAMES = 2_000
-"""Cached types, including names of types that are not installed: limited, because a peer may send any number of names."""
-_MAX_CONCURRENT = 32  # publishers queried concurrently
+"""Maximum number of cached types, including types that are not installed: a peer may send any number of names."""
+_MAX_CONCURRENT = 32  # maximum number of publishers queried concurrently
 
 
 def installed_type(name: str) -> InterfaceType | None:
-    """Return an installed message type; None if the type is not installed or cannot be read."""
+    """Return an installed message type, or None if the type is not installed or its module cannot be loaded."""
     from minirospy.core.idl.load import get_message_class
 
     try:
@@ -36,7 +36,7 @@ def installed_type(name: str) -> InterfaceType | None:
 
 
 def type_of_text(name: str, text: str) -> InterfaceType | None:
-    """Return the type for a full definition; None if it does not parse.
+    """Return the type for a full definition, or None if it cannot be parsed.
 
     Generates no class, because that would take a second.
     """
@@ -102,7 +102,7 @@ class TypeTexts:
         return None
 
     async def header_of(self, topic: str, publisher: str) -> Header:
-        """Return a publisher's connection header: connect as a subscriber, then disconnect."""
+        """Return a publisher's connection header, by connecting as a subscriber and then disconnecting."""
         uri = await self._node.call_master("lookupNode", publisher)
         answer = await self._rpc.call(uri, "requestTopic", self._node.name, topic, [["TCPROS"]])
         match answer:
@@ -126,7 +126,7 @@ class TypeTexts:
 
 @dataclass(frozen=True)
 class ServiceInfo:
-    """A service's type: the full definitions of its request and response."""
+    """A service's type, with the full definitions of its request and response."""
 
     name: str
     type: str
@@ -136,7 +136,7 @@ class ServiceInfo:
 
 
 def described(name: str, header: Mapping[str, str]) -> ServiceInfo:
-    """Return the type named in a service's connection header. Raise NotFoundError if the type is not installed."""
+    """Return the service type named in a service's connection header. Raise NotFoundError if the type is not installed."""
     from minirospy.core.idl.load import get_service_class
 
     type_ = header.get("type", "")

@@ -39,7 +39,7 @@ _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
 _MAX_ANGLE_LENGTH = 200
-_MAX_SHOWN_DIGITS = 40  # digits of an integer in an error message
+_MAX_SHOWN_DIGITS = 40  # maximum number of digits that an error message shows of an integer
 
 
 def parse_value(text: str) -> object:
@@ -66,7 +66,10 @@ def parse_value(text: str) -> object:
 
 
 def parse_documents(text: str, where: str) -> Iterator[object]:
-    """Yield the values of a YAML string's documents, which are separated by ``---``. Raise ValueTextError if it is invalid."""
+    """Yield the values of a YAML string's documents, which are separated by ``---``.
+
+    Raise ValueTextError if the string is invalid.
+    """
     import yaml
 
     try:
@@ -76,9 +79,9 @@ def parse_documents(text: str, where: str) -> Iterator[object]:
 
 
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
-    """Yield values as :func:`parse_documents` does, but each as soon as it is complete.
+    """Yield values as :func:`parse_documents` does, but each one as soon as its document is complete.
 
-    `rostopic echo /a | rostopic pub /b TYPE` needs this.
+    For example, `rostopic echo /a | rostopic pub /b TYPE` needs this.
     """
     text: list[str] = []
     for line in lines:
@@ -103,7 +106,7 @@ def message_values(documents: Iterable[object]) -> Iterator[list[object]]:
 
 
 def format_value(value: object) -> str:
-    """Format a value as YAML, as `rosparam get` prints it; a list or dictionary ends with a line feed."""
+    """Format a value as YAML, as `rosparam get` prints it; the string for a list or dictionary ends with a line feed."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -116,7 +119,7 @@ def format_value(value: object) -> str:
 
 
 def format_pretty(value: object) -> str:
-    """Format a value for people, as `rosparam get -p` prints it: strings unquoted, not meant to be parsed."""
+    """Format a value for people, as `rosparam get -p` prints it: strings are unquoted, so the output cannot be parsed."""
     if isinstance(value, dict):
         return "\n".join(_pretty_lines(value, ""))
     return value if isinstance(value, str) else format_value(value)
@@ -157,7 +160,7 @@ def _is_digits(text: str) -> bool:
 
 
 def _is_plain_text(word: str) -> bool:
-    """Return whether YAML parses a string as itself: it has only letters, digits, / and _, and no special meaning."""
+    """Return whether YAML parses a string as itself, because it has only letters, digits, / and _, and no special meaning."""
     return (
         len(word) > 1
         and word.isascii()

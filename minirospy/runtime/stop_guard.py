@@ -1,6 +1,6 @@
-"""A thread that stops actuators when commands for them stop arriving; nothing that blocks the event loop delays it.
+"""A thread that stops actuators when commands for them stop arriving; a blocked event loop does not delay it.
 
-A call that holds Python's global interpreter lock (GIL) does delay the thread, so the servers limit one call's input.
+A call that holds Python's global interpreter lock (GIL) does delay the thread, so the servers limit the input of one call.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ __all__ = ["StopGuard"]
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
-"""Stops an actuator; called in the guard's thread. It must check for itself whether a command has arrived meanwhile."""
+"""Stops an actuator; called in the guard's thread. It must check whether a command has arrived in the meantime."""
 
 
 class StopGuard:
@@ -30,10 +30,10 @@ class StopGuard:
         self._deadlines: dict[Stop, float] = {}
         self._thread: threading.Thread | None = None
         self._next = 0.0
-        # The deadline until which the thread waits.
+        # The deadline for which the thread is waiting.
 
     def arm(self, stop: Stop, deadline: float) -> None:
-        """Call ``stop`` at ``deadline``, a time on the clock; this replaces its previous deadline.
+        """Call ``stop`` at ``deadline``, in seconds of the clock; this replaces the previous deadline of ``stop``.
 
         Raise BridgeError if the thread cannot be started.
         """
@@ -66,7 +66,7 @@ class StopGuard:
                     _log.exception("what is driven could not be stopped")
 
     def _wait(self) -> list[Stop]:
-        """Wait until deadlines have passed, and return their functions; return [] once there are no deadlines."""
+        """Wait until deadlines have passed, and return their functions; return [] if there are no deadlines."""
         with self._changed:
             while self._deadlines:
                 now = self._clock()

@@ -1,4 +1,4 @@
-"""Servers that open the graph to browsers and to programs without ROS, such as the Foxglove WebSocket protocol.
+"""Servers that make the graph accessible to browsers and to programs without ROS, for example with the Foxglove protocol.
 
-``python -m pip install "minirospy[web]"``. docs/bridge.md describes how to use them.
+Install with ``python -m pip install "minirospy[web]"``. docs/bridge.md describes how to use them.
 """

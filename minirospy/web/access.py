@@ -1,8 +1,8 @@
 """Access control: checks a request's Host, Origin and token, and filters names of topics, services and parameters.
 
-Pure. On loopback, every user of this machine may connect, but no page from a foreign site may: a browser sends the page's
-site in ``Origin``, and the name that it looked up in ``Host`` (which reveals DNS rebinding). Beyond loopback, a token is
-required. Source: RFC 6455, section 10.2 (Origin).
+Pure. On loopback, every user of this machine may connect, but no page from another site: a browser sends the page's
+site in ``Origin``, and the host name that it resolved in ``Host`` (which reveals DNS rebinding). Beyond loopback, a
+token is required. Source: RFC 6455, section 10.2 (Origin).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ APP_ORIGINS = (
     "https://studio.foxglove.dev",
     "https://lichtblick-suite.github.io",
 )
-"""Origins of the front ends' pages; a browser sends these origins for no other pages."""
+"""Origins of the front ends' pages; browsers send these origins only for those pages."""
 
 _LOCAL_NAMES = ("localhost",)
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{8,200}")
@@ -88,9 +88,10 @@ class Credentials(NamedTuple):
 class Access:
     """The access rules for one listener.
 
-    ``hosts``: names of this machine in addition to addresses and localhost. ``origins``: patterns of additional pages
-    that may connect, besides those from this machine and the front ends. Tokens: "" for none. ``requires_token``: set for
-    a listener beyond loopback. ``default_is_read``: clients that need no token have read-only access.
+    ``hosts``: names of this machine in addition to addresses and localhost. ``origins``: patterns for additional pages
+    that may connect, besides those from this machine and the front ends. A token is "" if there is none.
+    ``requires_token`` is set for a listener that is not on loopback. ``default_is_read``: clients that need no token have
+    read-only access.
     """
 
     hosts: tuple[str, ...] = ()
@@ -113,7 +114,7 @@ class Access:
             return refusal
         grant = self._grant_of(request.token)
         if grant:
-            # The user has given the token to this page: do not check the page's origin.
+            # The user has given the token to this page, so do not check the page's origin.
             return grant
 
         if request.token and (self.read_token or self.write_token):
@@ -188,12 +189,12 @@ def is_loopback(host: str) -> bool:
 
 
 def without_token(target: str) -> str:
-    """Return a request's path for logs, without the query, which may contain a token."""
+    """Return a request's path without the query, which may contain a token, for use in logs."""
     return unquote(urlsplit(target).path)[:200]
 
 
 def header_items(headers: Mapping[str, str], name: str) -> list[str]:
-    """Return the items of a header whose value is a list."""
+    """Return the items in a header whose value is a list."""
     return [item.strip() for item in headers.get(name, "").split(",") if item.strip()]
 
 

@@ -48,13 +48,13 @@ def own_addresses() -> list[str]:
 
 
 def host_names() -> list[str]:
-    """Return the names by which other machines may reach this machine: its host name and its multicast DNS name."""
+    """Return the names by which other machines may reach this machine: its host name and its mDNS name."""
     name = socket.gethostname()
     return [name, f"{name.partition('.')[0]}.local"]
 
 
 def qr_code(text: str) -> str:
-    """Return a QR code for a terminal; "" if the library segno is missing."""
+    """Return a QR code for a terminal, or "" if the library segno is missing."""
     try:
         import segno
     except ImportError:

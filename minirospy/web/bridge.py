@@ -49,10 +49,10 @@ _DIAGNOSTICS_SECONDS = 1.0
 
 @dataclass(frozen=True)
 class BridgeOptions:
-    """``address`` is the address for all listeners; each protocol has a port, which is None if the protocol is not served.
+    """The bridge's options.
 
-    ``certificate`` and ``key`` are PEM files. Times are in seconds: ``max_refresh_interval`` between queries of an
-    unchanged graph,
+    ``address`` is the address for all listeners; a protocol's port is None if it is not served. ``certificate`` and
+    ``key`` are PEM files. Times are in seconds: ``max_refresh_interval`` between queries of an unchanged graph,
     ``retry_delay`` before a port in use is tried again (None: never).
     """
 
@@ -86,7 +86,7 @@ class Extras:
 
 
 class Bridge:
-    """Opens a node's graph to browsers. Runs on the node's loop."""
+    """Makes a node's graph accessible to browsers. Runs on the node's loop."""
 
     def __init__(
         self,
@@ -197,7 +197,7 @@ class Bridge:
         await close_all([part.close for part in parts])
 
     def status(self) -> dict[str, object]:
-        """Return the bridge's listeners and clients as JSON values."""
+        """Return the bridge's listeners and clients as values for JSON."""
         clients = []
         for endpoint, listener in self.listeners.items():
             for connection in listener.connections:

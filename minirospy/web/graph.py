@@ -34,13 +34,13 @@ MIN_REFRESH_INTERVAL = 0.25  # seconds between refreshes while the graph changes
 
 _QUEUE = 100
 _MAX_WAITING = 32_000_000
-"""Bytes of clients' messages that are queued for the subscribers of new topics.
+"""Maximum bytes of clients' messages that are queued for the subscribers of new topics.
 
 Above this limit, only the newest message per topic is queued.
 """
 
 _QUERY_SECONDS = 2.0
-"""Timeout, after which the graph is reported without the service types that are still unknown."""
+"""Timeout in seconds, after which the graph is reported without the service types that are still unknown."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class SharedTopic:
         self.received_bytes = 0
         self._graph = graph
         self._listeners: list[TopicListener] = []
-        # The key is the id of the header, which is one object per connection.
+        # The key is the id of the header, which is a single object for each connection.
         self._latched: dict[int, Arrival] = {}
         self._subscription: RawSubscription | None = None
 
@@ -135,7 +135,7 @@ class Publication:
         self._graph = graph
         self._shared: _SharedPublisher | None = shared
         self._waiting: deque[bytes] | None = None
-        """Messages queued until the subscribers are connected."""
+        """Messages queued until the subscribers are connected; None if they are connected."""
 
     @property
     def has_joined(self) -> bool:
@@ -209,7 +209,10 @@ class SharedGraph:
         max_refresh_interval: float = 1.0,
         clock: Callable[[], int] | None = None,
     ) -> None:
-        """``max_refresh_interval``: seconds between refreshes of an unchanged graph. ``clock``: see :meth:`now`."""
+        """Create the graph.
+
+        ``max_refresh_interval``: seconds between refreshes if nothing changes. ``clock``: see :meth:`now`.
+        """
         self.node = node
         self._clock = clock
         self.waiting_bytes = 0
@@ -254,7 +257,7 @@ class SharedGraph:
     # --- the graph
 
     def watch(self, listener: GraphListener) -> None:
-        """Call ``listener`` with each graph change; the first listener's first change is the whole graph."""
+        """Call ``listener`` with each graph change. The first change that the first listener receives is the whole graph."""
         self._listeners.append(listener)
         if self._watching is None:
             self.snapshot = Snapshot()
@@ -271,7 +274,7 @@ class SharedGraph:
             self._watching = None
 
     def refresh_soon(self) -> None:
-        """Refresh the graph now, because it has changed."""
+        """Refresh the graph soon, because it has changed."""
         self._refresh_soon.set()
 
     async def look(self) -> None:
@@ -318,11 +321,11 @@ class SharedGraph:
                 await asyncio.wait_for(self._refresh_soon.wait(), pause)
 
     def service_info(self, service: str) -> ServiceInfo | None:
-        """Return a service's type; or None if it is unknown or not installed."""
+        """Return a service's type, or None if it is unknown or not installed."""
         return self._service_types.found.get((service, self.snapshot.services.get(service, ())))
 
     async def _look_up_services(self, found: Snapshot) -> None:
-        """Query the nodes of new services for their types, which the master does not know."""
+        """Query the nodes of new services for the services' types, which the master does not know."""
         wanted = {key: None for key in found.services.items() if self.filters.services(key[0])}
         await self._service_types.look(wanted, _QUERY_SECONDS)
 
@@ -374,7 +377,7 @@ class SharedGraph:
         return Publication(self, topic, shared)
 
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
-        """Unadvertise a topic after its last client has left."""
+        """Unadvertise a topic after the last client that published it has left."""
         shared.clients -= 1
         if not shared.clients and self._publishers.get(topic) is shared:
             del self._publishers[topic]
@@ -386,7 +389,7 @@ class SharedGraph:
     async def call(self, service: str, md5sum: str, request: bytes) -> bytes:
         """Call a service; return the response's bytes.
 
-        Raise ServiceException, or BridgeError if clients may not call the service.
+        Raise ServiceException if the call fails, or BridgeError if clients may not call the service.
         """
         if not self.filters.services(service):
             raise BridgeError(f"service [{service}] may not be called by clients")

@@ -24,17 +24,20 @@ __all__ = [
     "width_of",
 ]
 
-_MAX_VALUES = 4_000_000  # values in one JSON string; as numbers they take 160 MB
-_MAX_STRINGS = 2_000_000  # strings in one JSON string, including field names; they take 150 MB
-_MAX_COLLECTIONS = 1_000_000  # lists and objects in one JSON string; they take 100 to 240 MB
-MAX_QUICK_CHARACTERS = 64 * 1024  # in any string that is parsed on the event loop: takes at most 2 ms
-# in a string with few values, such as a base64 image, that is parsed on the event loop
+_MAX_VALUES = 4_000_000  # maximum number of values in one JSON string; decoded as numbers, they take 160 MB
+# maximum number of strings in one JSON string, including field names; they take 150 MB
+_MAX_STRINGS = 2_000_000
+# maximum number of lists and objects in one JSON string; they take 100 to 240 MB
+_MAX_COLLECTIONS = 1_000_000
+# maximum characters in any string that is parsed on the event loop; parsing takes at most 2 ms
+MAX_QUICK_CHARACTERS = 64 * 1024
+# Maximum characters in a string with few values, such as a base64 image, that is parsed on the event loop
 MAX_QUICK_STRINGS = 4 * 1024 * 1024
 MAX_QUICK_VALUES = 20_000
-_PIECE = 32 * 1024  # characters of numbers that one call parses
+_PIECE = 32 * 1024  # maximum characters of numbers that one call parses
 
-_PIECE_VALUES = 1000  # values of a list that one call encodes: 1 ms for floats
-_PIECE_CHARACTERS = 64 * 1024  # characters of a string that one call encodes
+_PIECE_VALUES = 1000  # maximum values of a list that one call encodes: 1 ms for floats
+_PIECE_CHARACTERS = 64 * 1024  # maximum characters of a string that one call encodes
 
 _SPACE = re.compile(r"[ \t\n\r]*")
 _MARKS = re.compile(r'[\[\]{}"]')
@@ -49,7 +52,7 @@ _CONTINUATIONS = bytes(range(0x80, 0xC0))
 
 
 def size_in_memory(data: bytes | bytearray) -> int:
-    """Return the bytes that a UTF-8 string takes as a str.
+    """Return the number of bytes in memory of the str decoded from UTF-8 data.
 
     One wide character makes every character take two or four.
     """
@@ -66,7 +69,7 @@ def width_of(text: str) -> int:
     if text.isascii():
         return 1
     if len(text) == 1:
-        # Python 3.12 and later also store a UTF-8 copy in single-character strings.
+        # Do not use the size of a single-character string, because Python 3.12 and later also store its UTF-8 copy.
         return 1 if text <= "\xff" else 2 if text <= "\uffff" else 4
     # In other strings, such a copy can only make this value too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
@@ -94,7 +97,7 @@ def load_json(
 def load_json_in_pieces(text: str) -> object:
     """Parse JSON as :func:`load_json` does, but without holding the GIL for long.
 
-    For use in a thread alongside the event loop.
+    Use it in a thread alongside the event loop.
     """
     _check_counts(text, _MAX_VALUES, _MAX_COLLECTIONS)
     found: object = _PiecewiseDecoder().decode(text)
@@ -102,7 +105,7 @@ def load_json_in_pieces(text: str) -> object:
 
 
 def _check_counts(text: str, max_values: int, max_collections: int) -> None:
-    """Raise ValueError if a string has too many values; brackets and commas in strings are counted as well."""
+    """Raise ValueError if JSON text has too many values; brackets and commas inside strings are counted as well."""
     for marks, most in ((",", max_values), ("[{", max_collections)):
         if len(text) > most and sum(map(text.count, marks)) > most:
             raise ValueError(f"more than {most} values")
@@ -178,9 +181,9 @@ def dump_json(value: object) -> str:
 
 
 def dump_json_in_pieces(value: object) -> str:
-    """Do the same as :func:`dump_json` without holding the GIL for long, for a thread alongside the event loop.
+    """Return the same as :func:`dump_json`, without holding the GIL for long, for a thread alongside the event loop.
 
-    Dictionary keys are strings.
+    Dictionary keys must be strings.
     """
     return "".join(_pieces(value))
 
@@ -235,7 +238,7 @@ def _nested_elements(values: list[object]) -> Iterator[str]:
 
 
 def _size(value: object) -> int:
-    """Return the number of numbers that take about as long to encode as a value; counting stops early for a large value."""
+    """Return the number of numbers that take about as long to encode as a value. Stops counting early for a large value."""
     if isinstance(value, str):
         return 1 + len(value) * _PIECE_VALUES // _PIECE_CHARACTERS
     if not isinstance(value, dict | list):

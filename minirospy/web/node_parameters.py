@@ -24,9 +24,9 @@ _OFF = (None, False, 0, "", "None")
 async def private_parameters(
     node: Node, without_effect: Iterable[str] = (), given: Mapping[str, object] = MappingProxyType({})
 ) -> dict[str, object]:
-    """Return a node's private parameters, including ``given`` arguments.
+    """Return a node's private parameters, including the arguments ``given``.
 
-    Warn of each parameter in ``without_effect`` that is set.
+    Warn about each parameter in ``without_effect`` that is set.
     """
     found = await node.get_param("~", {})
     private = {**(found if isinstance(found, dict) else {}), **given}
@@ -53,7 +53,7 @@ def number(private: Mapping[str, object], name: str, default: float) -> float:
 
 
 def texts(private: Mapping[str, object], name: str, default: Sequence[str]) -> list[str]:
-    """Return a parameter that is a list of strings. Raise BridgeError if it is not."""
+    """Return a parameter that is a list of strings. Raise BridgeError if it is not one."""
     found = private.get(name, default)
     if not isinstance(found, list | tuple) or not all(isinstance(each, str) for each in found):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be a list of strings")
@@ -63,7 +63,7 @@ def texts(private: Mapping[str, object], name: str, default: Sequence[str]) -> l
 def globs(private: Mapping[str, object], name: str) -> list[str]:
     """Return globs, given in one of the formats that rosbridge accepts: a list, or a string such as "['/tf', '/odom*']".
 
-    [] allows all.
+    An empty list allows all names.
     """
     found = private.get(name, "")
     if isinstance(found, str):

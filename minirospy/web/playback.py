@@ -32,7 +32,7 @@ class PlayerPlayback:
         self._did_seek = False
 
     def now(self) -> int:
-        """Return the bag's current time, which stamps messages."""
+        """Return the bag's current time, used as messages' timestamp."""
         return self._player.state().time
 
     def state(self) -> PlaybackState:
@@ -60,7 +60,7 @@ class PlayerPlayback:
 
 
 class PlayerBridge:
-    """A bridge for a player, on a separate loop; a context manager. Raise BridgeError if it cannot start."""
+    """A bridge for a player, on a separate loop. A context manager. Raise BridgeError if the bridge cannot start."""
 
     def __init__(self, player: Player, span: tuple[int, int], port: int) -> None:
         self._playback = PlayerPlayback(player, span)

@@ -33,7 +33,7 @@ __all__ = [
 
 
 _LARGE_BLOCK = 4 * 1024 * 1024
-"""Size of blocks that are returned to the system when freed; larger than camera images, because mapping memory takes time."""
+"""Size in bytes from which freed blocks are returned to the system; larger than camera images, because mapping takes time."""
 
 
 class Part(Protocol):
@@ -46,14 +46,15 @@ class Part(Protocol):
 
 _P = TypeVar("_P", bound=Part)
 
-_SWITCH_SECONDS = 0.0005  # GIL switch interval; with Python's 5 ms the loop waits that long after each call
+# GIL switch interval; with Python's default of 5 ms, the loop waits that long after each call
+_SWITCH_SECONDS = 0.0005
 
 
 def prefer_the_loop() -> None:
-    """Reduce the event loop's delays by threads that process large messages, and by the garbage collector.
+    """Reduce the delays that the garbage collector, and threads that process large messages, cause for the event loop.
 
-    Call this after all imports: otherwise the collector visits the imported objects, for 15 ms each time a client sends
-    thousands of arrays.
+    Call this after all imports: otherwise the collector visits the imported objects, which takes 15 ms each time a client
+    sends thousands of arrays.
     """
     sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_SECONDS))
     gc.collect()
@@ -71,7 +72,7 @@ def require_libraries() -> None:
 
 
 def run_program(name: str, module: str) -> int:
-    """Run a node's program, whose module imports the libraries; return its exit status, or 1 if a library is missing."""
+    """Run a node's program from ``module``, which imports the libraries; return its exit status, or 1 if a library is missing."""
 
     def body() -> int:
         require_libraries()
@@ -112,10 +113,11 @@ def run(
 ) -> int:
     """Run a bridge on a node of this name until it is shut down; return the exit status.
 
-    ``argv``: remappings, as a launch file passes them; None: the process's own. ``start`` makes the bridge,
-    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for
-    which it would import message classes. ``registration_fault_lines`` is passed to the node. ``connect`` opens resources
-    that may fail, before the node registers its name, because the master ends a running node with the same name.
+    ``argv``: remappings, as a launch file passes them (None: the process's own). ``start`` creates the bridge,
+    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time,
+    for which it would import message classes. ``registration_fault_lines`` is passed to the node. ``connect`` opens
+    resources that may fail, before the node registers its name, because the master ends a running node with the same
+    name.
     """
     return_large_blocks(_LARGE_BLOCK)
     loop = new_event_loop()

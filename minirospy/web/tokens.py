@@ -20,7 +20,7 @@ _NAME = "bridge-tokens.json"
 
 
 class Tokens(NamedTuple):
-    """``write`` lets a client publish, call services and set parameters; ``read`` gives read-only access."""
+    """The tokens: ``write`` lets a client publish, call services and set parameters; ``read`` gives read-only access."""
 
     write: str
     read: str
@@ -45,7 +45,7 @@ def _is_own(found: os.stat_result) -> bool:
 
 
 def kept_tokens(home: Path, *, renews: bool = False) -> Tokens:
-    """Return the tokens in ROS_HOME; create new ones if there are none, or if ``renews``.
+    """Return the tokens in ROS_HOME; create new ones if there are none, or if ``renews`` is set.
 
     Raise BridgeError if they cannot be stored.
     """

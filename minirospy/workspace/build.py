@@ -1,4 +1,4 @@
-"""Build a workspace: packages in ``src`` -> ``devel``, with generated messages and the files to source.
+"""Build a workspace: generate messages and the files to source from the packages in ``src`` into ``devel``.
 
 No compiler runs, and no files are copied: Python programs stay in the source folders, and ``devel`` refers to them.
 Unchanged parts are not regenerated. Source: http://wiki.ros.org/catkin/workspaces.
@@ -50,7 +50,7 @@ PROVIDED = frozenset(
     tf_conversions urdf urdfdom xacro xmlrpcpp
     """.split()  # noqa: SIM905
 )
-"""Packages without messages that Python packages depend on: minirospy provides their functions, or they require a compiler."""
+"""Packages without messages that Python packages depend on. minirospy provides their functions, or they need a compiler."""
 
 _KINDS = {".msg": "message", ".srv": "service", ".action": "action"}
 _RELAY = """# Made by catkin_make: {name!r} is in {folder!r}; what was generated for it is here.
@@ -67,8 +67,8 @@ with open(__file__, "rb") as _source:
 """
 
 
-# Use the interpreter that has rospy, unless its path is too long or contains white space, which a shebang line does
-# not allow.
+# Use the interpreter that has rospy, unless its path is too long or contains white space, which shebang lines do not
+# allow.
 _SHEBANG = (
     sys.executable
     if sys.executable and not re.search(r"\s|.{120}", sys.executable)
@@ -98,7 +98,7 @@ class Workspace(NamedTuple):
 
 
 def find_workspace(start: Path) -> Path:
-    """Return the workspace that contains ``start``: a folder that was built before, or that contains src.
+    """Return the workspace that contains ``start``: a parent folder that was built before, or that contains src.
 
     Raise BuildError if there is none.
     """
@@ -150,7 +150,7 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 
 
 class Report(NamedTuple):
-    """The result of building a package. ``made``: the generated parts, as a string; empty if nothing has changed."""
+    """The result of building a package. ``made`` describes the generated parts; it is empty if nothing has changed."""
 
     plan: Plan
     made: str
@@ -165,7 +165,7 @@ def build(
     chosen: Collection[str] | None = None,
     report: Callable[[Report], None] = lambda each: None,
 ) -> None:
-    """Build the ``chosen`` packages, or all, into the devel folder; call ``report`` with the result of each.
+    """Build the ``chosen`` packages, or all packages, into the devel folder; call ``report`` with the result of each.
 
     ``outside``: the packages in other workspaces and in minirospy. Raise BuildError if a package cannot be built, or
     DefinitionError if a definition is invalid.
@@ -195,7 +195,7 @@ def write_set_up(
 ) -> None:
     """Write the setup files. The workspaces that are sourced in the environment become this workspace's parents.
 
-    If none is sourced, the previous build's parents remain.
+    If none is sourced, the parents of the previous build remain.
     """
     # If the workspace's own setup file is sourced, it must not extend itself.
     own = {
@@ -279,7 +279,7 @@ class _Builder:
                 stamp.unlink()
 
     def _compile(self, plan: Plan, has_relay: bool) -> dict[Path, str]:
-        """Return a package's generated modules: file -> text.
+        """Return a package's generated modules, as a dict from file to source text.
 
         Raise DefinitionError if a definition is invalid, or BuildError if a type is missing.
         """
@@ -287,7 +287,7 @@ class _Builder:
         try:
             texts = compile_package(self._catalogue, plan.name)
         except DefinitionError as error:
-            # The error for a type that contains itself contains the type's name: replace the name by the type's file.
+            # The error for a type that contains itself names the type: replace its name by the type's file.
             files = {f"{plan.name}/{path.stem}": str(path) for path in plan.definitions}
             raise DefinitionError(files.get(error.file, error.file), error.line, error.text) from error
         modules = {folder / name: text for name, text in texts.items()}
@@ -298,7 +298,7 @@ class _Builder:
         return modules
 
     def _outside_key(self, names: Iterable[str]) -> str:
-        """Return a fingerprint of other workspaces' messages, because a parent workspace may have been rebuilt."""
+        """Return a fingerprint of the messages in other workspaces, because a parent workspace may have been rebuilt."""
         known = [name for name in names if name in self._folders]
         return _key(
             path
@@ -324,7 +324,7 @@ class _Builder:
             path = Path(name)
             path.unlink(missing_ok=True)
             for folder in path.parents:
-                # Also remove a folder that contains only Python's cache.
+                # Also remove a folder that then contains only Python's cache.
                 if folder == self._modules or not folder.is_dir() or any(folder.glob("*.py")):
                     break
                 for cached in folder.glob("__pycache__/*.pyc"):
@@ -336,7 +336,7 @@ class _Builder:
     # --- checks
 
     def _check_needs(self, plan: Plan) -> tuple[str, ...]:
-        """Return warnings about the package's name, and about packages in find_package() that do not exist."""
+        """Return warnings about the package's name, and about packages that find_package() names but that do not exist."""
         warnings = [warning] if (warning := naming_warning(plan.name)) else []
         known = self._folders.keys() | PROVIDED
         for name, line in plan.needs:
@@ -348,7 +348,7 @@ class _Builder:
         return tuple(warnings)
 
     def _check_messages(self, plan: Plan) -> tuple[str, ...]:
-        """Check that every type used in a package's definitions exists, and that catkin's declarations name its package."""
+        """Check that every type used in a package's definitions exists, and is in a package that CMakeLists.txt declares."""
         for name in plan.message_depends:
             if name not in self._folders:
                 raise BuildError(
@@ -397,7 +397,7 @@ class _Builder:
                 raise BuildError(str(file), _line_of(file, field.name), str(error)) from error
 
     def _closure(self, names: Iterable[str]) -> set[str]:
-        """Return the packages whose messages the messages of ``names`` may use."""
+        """Return the packages whose messages may be used, directly or indirectly, in messages of the packages ``names``."""
         found: set[str] = set()
         waiting = list(names)
         while waiting:
@@ -443,9 +443,9 @@ def _read_stamp(stamp: Path) -> dict[str, Any]:
 
 
 def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
-    """Return the programs in devel that run those in source folders: file -> text.
+    """Return the stub programs in devel that run the programs in the source folders, as a dict from file to source text.
 
-    These programs put those from setup.py on PATH, and let real ROS run a program that is not executable itself.
+    These stubs put the programs from setup.py on PATH, and let real ROS run a program that is not executable itself.
     """
     places = {devel / "bin" / path.name: path for path in (setup.scripts if setup else ())}
     for rule in plan.installs:
@@ -461,7 +461,7 @@ def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, 
 
 
 def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
-    """Return the modules in devel that load those in source folders: file -> text."""
+    """Return the stub modules in devel that load the modules in the source folders, as a dict from file to source text."""
     if setup is None:
         return {}
     modules = devel / DIST_PACKAGES
@@ -493,7 +493,7 @@ def _counts(plan: Plan, setup: PythonSetup | None) -> str:
 
 
 def _line_of(file: Path, name: str) -> int:
-    """Return the first line of a file that contains a word; 1 if no line does."""
+    """Return the number of the first line in a file that contains a word, or 1 if none does."""
     word = re.compile(rf"(?<![\w]){re.escape(name)}(?![\w])")
     for number, line in enumerate(read_definition(file).split("\n"), 1):
         if word.search(line.split("#", 1)[0]):

@@ -22,11 +22,11 @@ _RUN_WITH = (Kind.BUILD_EXPORT, Kind.EXEC)
 def build_order(
     manifests: Mapping[str, Manifest], also: Mapping[str, Collection[str]] | None = None
 ) -> list[str]:
-    """Return the names of packages, each after its build dependencies. If several could be next, the first by name is next.
+    """Return the names of packages, each after its build dependencies.
 
-    A package's build dependencies are those that it needs to build and test, their run dependencies, and the packages
-    that ``also`` lists for its name. Message generators and their dependencies come first. Raise CircularDependencyError
-    if dependencies form a cycle.
+    Among those that may be next, the first by name comes next. A package's build dependencies are those that it needs to
+    build and test, their run dependencies, and the packages that ``also`` lists for its name. Message generators and
+    their dependencies come first. Raise CircularDependencyError if dependencies form a cycle.
     """
     routes = {name: _routes(name, manifests, (also or {}).get(name, ())) for name in manifests}
     early = _generators(manifests, routes)
@@ -50,7 +50,7 @@ def build_order(
 
 
 def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str]) -> dict[str, str]:
-    """Return a package's build dependencies, including indirect ones, each mapped to the package that names it."""
+    """Return a package's direct and indirect build dependencies, as a dict from each to the package that names it."""
     found = dict.fromkeys(sorted({*manifests[name].depends(*_BUILT_FROM), *also} & manifests.keys()), name)
     waiting = list(found)
     for each in waiting:
@@ -77,7 +77,7 @@ def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[
 
 
 def _circle(nodes: list[str], routes: Mapping[str, Mapping[str, str]]) -> tuple[str, ...]:
-    """Return the names of a cycle, each before its dependency, starting and ending with the first by name.
+    """Return the names in a cycle, each before its dependency, starting and ending with the alphabetically first name.
 
     ``nodes`` is graphlib's cycle: each name before a package that depends on it, with the first name repeated at the end.
     """

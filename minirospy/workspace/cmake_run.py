@@ -22,9 +22,9 @@ _VARIABLE = re.compile(r"(?<!\\)\$(ENV)?\{([^${}]*)\}")
 _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
-"""Optional packages that Python packages search for, reported as found."""
-_MAX_LOOPS = 100_000  # iterations of a foreach() with RANGE
-_MAX_DEPTH = 40  # nested files and macros; a file nested deeper must include itself
+"""Optional packages that Python packages search for, which are reported as found."""
+_MAX_LOOPS = 100_000  # maximum iterations of a foreach() with RANGE
+_MAX_DEPTH = 40  # maximum depth of nested files and macros; a file nested deeper must include itself
 
 
 class Command(NamedTuple):
@@ -51,9 +51,10 @@ class _Leave(Exception):
 
 
 def run_cmake(file: Path, variables: Mapping[str, str]) -> Iterator[Command]:
-    """Yield the commands that a CMakeLists.txt runs. ``variables`` are set beforehand; ``ENV{X}`` is an environment variable.
+    """Yield the commands that a CMakeLists.txt runs.
 
-    Raise BuildError if the file does not exist, a bracket is not closed, or a condition or pattern does not parse.
+    ``variables`` holds the initial variables; a key ``ENV{X}`` sets an environment variable. Raise BuildError if the file
+    does not exist, a bracket is not closed, or a condition or pattern cannot be parsed.
     """
     return _Run(file.parent, dict(variables), {}, 0).file(file)
 
@@ -157,7 +158,7 @@ class _Run:
                 yield Command(statement.name, tuple(arguments), statement.line, file, self._folder)
 
     def _arguments(self, words: Sequence[Word]) -> list[str]:
-        """Return words with variables expanded; a list in an unquoted word becomes several words."""
+        """Return words with variables expanded; a list in an unquoted word expands to several words."""
         found: list[str] = []
         for word in words:
             text = self._filled(word.text)
@@ -211,9 +212,9 @@ class _Run:
                     break
 
     def _loop_items(self, words: list[str]) -> list[str]:
-        """Return the items of a loop: words, a ``RANGE`` of numbers, or ``IN LISTS`` of variables and ``ITEMS``.
+        """Return the items of a loop: words, numbers in a ``RANGE``, or ``IN LISTS`` of variables and ``ITEMS``.
 
-        Raise ValueError on a ``RANGE`` of more than ``_MAX_LOOPS`` numbers.
+        Raise ValueError if a ``RANGE`` has more than ``_MAX_LOOPS`` numbers.
         """
         if words[:1] == ["RANGE"]:
             numbers = [int(word) for word in words[1:] if word.isdecimal() and len(word) < 20]
@@ -238,7 +239,7 @@ class _Run:
         yield from ()
 
     def _call(self, name: str, arguments: list[str]) -> Iterator[Command]:
-        """Yield the commands of a function, in a new scope, or of a macro, whose arguments are not variables."""
+        """Yield the commands of a function, which has a new scope, or of a macro, whose arguments are not variables."""
         macro = self._macros[name]
         values = {
             **dict(zip(macro.parameters, arguments, strict=False)),
@@ -430,7 +431,7 @@ _OPERATORS = {Word(text) for text in (*_COMPARE, "IN_LIST", "AND", "OR", ")")}
 
 
 class _Condition:
-    """``any := one {AND one | OR one}``, ``one := NOT one | ( any ) | TEST word | word [COMPARE word]``."""
+    """The grammar: ``any := one {AND one | OR one}``, ``one := NOT one | ( any ) | TEST word | word [COMPARE word]``."""
 
     def __init__(self, words: Sequence[Word], known: Mapping[str, str], folder: Path) -> None:
         self._words = words
@@ -442,7 +443,7 @@ class _Condition:
             "IS_DIRECTORY": lambda name: bool(name) and (folder / name).is_dir(),
             "IS_SYMLINK": lambda name: bool(name) and (folder / name).is_symlink(),
             "IS_ABSOLUTE": lambda name: Path(name).is_absolute(),
-            # A target exists if it is a target for generated code. Commands and policies are CMake's own, so they
+            # Targets for generated code exist, other targets do not. Commands and policies are CMake's own, so they
             # exist.
             "TARGET": lambda name: bool(re.search(r"_gen(erate_messages|cfg|cpp|py)", name)),
             "COMMAND": lambda name: True,
@@ -499,7 +500,7 @@ class _Condition:
         return word.text if word.quoted else self._known.get(word.text, word.text)
 
     def _word(self) -> Word:
-        # An empty variable expands to no word: `if(${UNSET} STREQUAL "x")`.
+        # An empty variable expands to no word at all: `if(${UNSET} STREQUAL "x")`.
         if self._next >= len(self._words) or self._words[self._next] in _OPERATORS:
             return Word("", True)
         self._next += 1

@@ -1,4 +1,4 @@
-"""Create a package: its package.xml and CMakeLists.txt, with common entries as comments to edit.
+"""Create a package: its package.xml and CMakeLists.txt, with common entries as comments that the user can edit.
 
 Source: http://wiki.ros.org/catkin/commands/catkin_create_pkg, http://wiki.ros.org/catkin/package.xml.
 """
@@ -63,7 +63,7 @@ def create_package(parent: Path, package: NewPackage) -> list[Path]:
     if package.meta:
         return made
     if "roscpp" in package.depends:
-        # ROS puts C++ headers into this folder.
+        # The package's C++ headers belong in this folder.
         made.append(folder / "include" / package.name)
     made.append(folder / "src")
 

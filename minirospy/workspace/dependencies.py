@@ -23,7 +23,7 @@ _RUNNING = ("run_depend", "exec_depend", "depend")
 
 
 class CircularDependencyError(MinirospyError):
-    """Packages depend on each other; ``circle`` starts and ends with the same package."""
+    """Packages depend on each other; ``circle`` lists them, and starts and ends with the same package."""
 
     def __init__(self, circle: tuple[str, ...]) -> None:
         super().__init__(circle)
@@ -94,7 +94,7 @@ class Dependencies:
         return self._manifests[name]
 
     def direct(self, name: str) -> list[str]:
-        """Return a package's direct dependencies, ordered by kind of tag. Raise as :meth:`manifest` does."""
+        """Return a package's direct dependencies, ordered by kind of tag. Raise the same exceptions as :meth:`manifest`."""
         self.folder(name)
         dependencies = self.manifest(name).dependencies
         wanted = [each.name for tag in _RUNNING for each in dependencies if each.tag == tag]
@@ -103,7 +103,7 @@ class Dependencies:
     def all(self, name: str) -> list[str]:
         """Return a package's direct and indirect dependencies, each after its own dependencies.
 
-        Raise CircularDependencyError if the dependencies form a cycle, or the errors of :meth:`direct`.
+        Raise CircularDependencyError if the dependencies form a cycle; otherwise raise the same exceptions as :meth:`direct`.
         """
         found: dict[str, None] = {}
 
@@ -121,12 +121,12 @@ class Dependencies:
     def tree(self, name: str) -> Iterator[tuple[int, str]]:
         """Yield (dependency, depth), each dependency after the package that depends on it; depths start at 0.
 
-        A dependency of several packages is yielded several times. Raise the errors of :meth:`all`.
+        A dependency of several packages is yielded several times. Raise the same exceptions as :meth:`all`.
         """
         return _walk(name, self.direct, ())
 
     def chains(self, name: str, target: str) -> list[tuple[str, ...]]:
-        """Return each path from a package to one of its dependencies. Raise the errors of :meth:`all`."""
+        """Return each path from a package to one of its dependencies. Raise the same exceptions as :meth:`all`."""
         found = []
         path: list[str] = [name]
         for depth, each in self.tree(name):
@@ -155,7 +155,7 @@ class Dependencies:
         return sorted(found)
 
     def keys(self, name: str) -> list[str]:
-        """Return all of a package's dependencies, of every kind, sorted. Raise the errors of :meth:`manifest`."""
+        """Return all of a package's dependencies, of every kind, sorted. Raise the same exceptions as :meth:`manifest`."""
         self.folder(name)
         return sorted(self.manifest(name).depends())
 
@@ -180,7 +180,7 @@ class Dependencies:
 def is_metapackage(folder: Path) -> bool:
     """Return whether the package in a folder is a metapackage."""
     try:
-        # Do not parse a file that does not contain the tag.
+        # Do not parse a file that does not contain this tag.
         if b"<metapackage" not in (folder / "package.xml").read_bytes():
             return False
         from minirospy.workspace.manifest import read_manifest

@@ -1,4 +1,4 @@
-"""A table of ROS 1 packages and modules that minirospy lacks, such as those in C++ or Qt, and their replacements.
+"""A table of ROS 1 packages and modules that minirospy does not include, such as those in C++ or Qt, and their replacements.
 
 The table is used only if a package, program or module is not found, so packages in a workspace or an installation take
 precedence.
@@ -165,7 +165,7 @@ _QT_LIBRARIES = (
 _MESSAGES = {
     "costmap_converter": "https://github.com/rst-tu-dortmund/costmap_converter",
 }
-"""Packages of definitions, with the arguments that `git clone` needs for their ROS 1 version."""
+"""Packages of message definitions, with the arguments that `git clone` needs to get their ROS 1 version."""
 
 IMPORTED = frozenset(
     {
@@ -178,7 +178,7 @@ IMPORTED = frozenset(
         *_QT_LIBRARIES,
     }
 )
-"""Modules of these packages that Python programs import; `overlay/` has a module for each, which raises ImportError."""
+"""Modules in these packages that Python programs import. For each, `overlay/` has a module that raises ImportError."""
 
 SUBMODULES = {
     "roslaunch.child": "roslaunch.parent.ROSLaunchParent launches files, on other machines by ssh, too",
@@ -186,7 +186,7 @@ SUBMODULES = {
     "roslaunch.netapi": "`rosnode list` lists the nodes; a roslaunch does not serve its list of processes",
     "roswtf.context": "`roswtf` and `minirospy doctor` make the checks, and roswtf.model has the classes of errors",
 }
-"""Submodules of ROS packages that minirospy's packages lack, with their replacements; `overlay/` has a module for each."""
+"""Submodules of ROS packages that minirospy's packages lack, with their replacements. `overlay/` has a module for each."""
 
 
 def advice(name: str) -> str:

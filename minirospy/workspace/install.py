@@ -19,7 +19,10 @@ _SHEBANG = re.compile(rb"^#!\s*\S*/(?:env\s+)?python[\d.]*\s*$")
 
 
 def install(workspace: Workspace, plan: Plan) -> int:
-    """Copy the files that one package installs; return their number. Raise BuildError if a folder is in a file's place."""
+    """Copy the files that one package installs; return their number.
+
+    Raise BuildError if a folder exists where a file belongs.
+    """
     copies = dict(_copies(workspace, plan))
     for target, (source, program) in copies.items():
         if target.is_symlink() or target.is_dir():
@@ -68,7 +71,7 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
         if source.is_file():
             yield place / (rule.rename or source.name), (source, rule.program)
             continue
-        # As in CMake: with a trailing slash, install the folder's contents; else the folder itself.
+        # As in CMake, install the folder's contents if there is a trailing slash, else the folder itself.
         target = place if name.endswith("/") else place / source.name
         for path in _files(source):
             below = path.relative_to(source)

@@ -1,4 +1,4 @@
-"""Parse a package.xml into a frozen :class:`Manifest`. Formats 1, 2 and 3.
+"""Parse a package.xml of format 1, 2 or 3 into a frozen :class:`Manifest`.
 
 Parsing is lenient: errors that catkin reports but a reader can ignore (a missing maintainer, a tag of another format) are
 recorded in :attr:`Manifest.problems`, and a build prints them as warnings.
@@ -113,7 +113,7 @@ class Manifest(NamedTuple):
     problems: tuple[Problem, ...]
 
     def depends(self, *kinds: Kind) -> tuple[str, ...]:
-        """Return the names of the dependencies of these kinds (default: all), without duplicates, in file order."""
+        """Return the names of all dependencies, or of those of these kinds, without duplicates, in file order."""
         wanted = frozenset(kinds or Kind)
         return tuple(dict.fromkeys(each.name for each in self.dependencies if wanted & each.kinds))
 
@@ -140,7 +140,7 @@ def naming_warning(name: str) -> str | None:
 def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
     """Read the manifest in a file, or in a folder's package.xml; ``variables`` override VARIABLES in conditions.
 
-    Raise ManifestError if the file does not exist, is not XML or not a package, has no name, or a condition does not parse.
+    Raise ManifestError if the file does not exist, is not a package's XML, has no name, or contains an invalid condition.
     """
     if path.is_dir():
         path = path / "package.xml"
@@ -152,7 +152,7 @@ def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Man
 
 
 def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
-    """Parse a manifest; ``path`` is for errors. Raise ManifestError as read_manifest does."""
+    """Parse a manifest; ``path`` is used in errors. Raise the same exceptions as :func:`read_manifest`."""
     root = _parse(text, path)
     if root.tag != "package":
         raise ManifestError(str(path), root.line, f"the root tag is <{root.tag}> instead of <package>")
@@ -160,9 +160,10 @@ def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] |
 
 
 def evaluate_condition(condition: str, variables: Mapping[str, str]) -> bool:
-    """Return whether ``$ROS_VERSION == 1 and ...`` is true; values are compared as strings, an unknown variable is empty.
+    """Return whether a condition such as ``$ROS_VERSION == 1 and ...`` is true.
 
-    Raise ValueError, with the reason, if the condition does not parse.
+    Values are compared as strings, and an unknown variable is empty. Raise ValueError, with the reason, if the condition
+    cannot be parsed.
     """
     return _Condition(condition, variables).value()
 
@@ -215,7 +216,7 @@ def _parse(text: bytes | str, path: Path) -> _Element:
     except XmlError as error:
         raise ManifestError(str(path), error.line, error.why) from error
     except (expat.ExpatError, ValueError, LookupError) as error:
-        # If Python does not know the encoding, the error is a LookupError, without a code.
+        # If Python does not know the encoding, the error is a LookupError, which has no code.
         code = getattr(error, "code", None)
         why = expat.ErrorString(code) if code is not None else str(error)
         raise ManifestError(str(path), parser.CurrentLineNumber, f"not XML: {why}") from error
@@ -232,7 +233,7 @@ _OLD_KINDS = {
 }
 _KINDS = {
     "depend": {Kind.BUILD, Kind.BUILD_EXPORT, Kind.EXEC},
-    # Not part of formats 2 and 3, but packages use it there.
+    # This tag is not part of formats 2 and 3, but packages use it there.
     "run_depend": {Kind.BUILD_EXPORT, Kind.EXEC},
     **{kind.value: {kind} for kind in Kind},
 }
@@ -387,7 +388,8 @@ class _Reader:
 # --- conditions
 
 _TOKEN = re.compile(r"""\s*(?:(==|!=|<=|>=|<|>|[()])|(\$?[A-Za-z0-9_-]+)|("[^"]*"|'[^']*')|(\S))""", re.ASCII)
-_MAX_BRACKETS = 50  # nested in a condition; the parser recurses three times per nesting level
+# maximum nested brackets in a condition; the parser recurses three times per nesting level
+_MAX_BRACKETS = 50
 _COMPARE = {
     "==": str.__eq__,
     "!=": str.__ne__,
@@ -399,7 +401,7 @@ _COMPARE = {
 
 
 class _Condition:
-    """``any := all {"or" all}``, ``all := one {"and" one}``, ``one := "(" any ")" | value operator value``."""
+    """The grammar: ``any := all {"or" all}``, ``all := one {"and" one}``, ``one := "(" any ")" | value operator value``."""
 
     def __init__(self, text: str, variables: Mapping[str, str]) -> None:
         self._variables = variables

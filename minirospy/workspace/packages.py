@@ -37,7 +37,7 @@ _PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
 _RUNS_PYTHON = re.compile(r"(i?python|pypy)[0-9.]*|coverage[0-9.]*|kernprof|i?pdb3?|pudb3?")
 _ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
-_SHOWN = 12  # programs listed in an error: about one line
+_SHOWN = 12  # maximum number of programs listed in an error: about one line
 
 
 class NotExecutableError(MinirospyError):
@@ -71,7 +71,7 @@ class Packages:
     def find(self, name: str) -> Path:
         """Return the folder of a package. Raise NotFoundError with similar names."""
         for root in self.roots:
-            # If a folder has the package's name, try it before searching.
+            # If a folder's name is the package's name, try that folder before searching.
             if package_name(root / name) == name:
                 return root / name
             for folder in self._crawled(root):
@@ -108,7 +108,7 @@ class Packages:
         return sorted({path.name for path in _files(folder) if _is_program(path)})
 
     def find_executable(self, package: str, name: str) -> list[str]:
-        """Return the command that runs a package's program, the first if several have the name.
+        """Return the command that runs a package's program; if several have this name, that of the first.
 
         Python programs run in this interpreter, not in the one that ``env`` finds. Raise NotFoundError, with similar
         names, if there is none, or NotExecutableError if the file cannot be run.
@@ -116,9 +116,9 @@ class Packages:
         return self.find_executables(package, name)[0]
 
     def find_executables(self, package: str, name: str) -> list[list[str]]:
-        """Return each command for a program name or a path in the package; several folders may have a program with that name.
+        """Return the commands for a program name or a path in a package; several folders may contain a program with that name.
 
-        Raise as :meth:`find_executable` does.
+        Raise the same exceptions as :meth:`find_executable`.
         """
         folder = self.find(package)
         candidates = (
@@ -129,7 +129,7 @@ class Packages:
         candidates = [path for path in candidates if path.is_file()]
         runnable = [path for path in candidates if is_python(path) or os.access(path, os.X_OK)]
         if runnable:
-            # Ignore the copies of scripts that a build puts in devel.
+            # Ignore the copies of scripts that a build writes to devel.
             own = [path for path in runnable if path.is_relative_to(folder)] or runnable
             return [[sys.executable, str(path)] if is_python(path) else [str(path)] for path in own]
         if candidates:
@@ -156,7 +156,7 @@ class Packages:
         raise NotFoundError("file", name, same_kind, hint)
 
     def hidden_hint(self, package: str, name: str, found: Path) -> str:
-        """Return a hint if the file is in another package of the same name, which the found package hides; otherwise ""."""
+        """Return a hint if the file is in another package with the same name, which the found package hides; otherwise ""."""
         for folder in self.copies().get(package, ()):
             if folder != found and any(path.name == name for path in _files(folder)):
                 return f"; the package of that name in {folder}, which this one hides, has it"
@@ -169,7 +169,7 @@ class Packages:
 
 
 class CrawlTime(NamedTuple):
-    """A folder that is searched for packages: the time in seconds, including subfolders, and whether it contains a package."""
+    """The search time for a folder and its subfolders, in seconds, and whether the folder contains a package."""
 
     folder: Path
     seconds: float
@@ -230,7 +230,7 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _leads_back(entry: os.DirEntry[str]) -> bool:
-    """Return whether an entry is a link to one of its own parent folders, which would make the search endless."""
+    """Return whether an entry is a link to one of its own parent folders, which would make the search infinite."""
     return entry.is_symlink() and Path(entry.path).parent.resolve().is_relative_to(Path(entry.path).resolve())
 
 
@@ -245,9 +245,9 @@ def package_name(folder: Path) -> str | None:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Yield a package's files: first in its own folder, then in the folders where a build or an installation puts programs.
+    """Yield a package's files, first those in its own folder, then those where a build or an installation puts programs.
 
-    The Python modules in minirospy's own packages are skipped: `rosrun` does not run them.
+    The Python modules in minirospy's own packages are skipped, because `rosrun` does not run them.
     """
     is_ours = folder.parent == _OURS / "ros"
     for path, folders, names in os.walk(folder):
@@ -265,7 +265,7 @@ def _files(folder: Path) -> Iterator[Path]:
         Path(prefix) for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if prefix
     ]
     if folder.parent.name == "share":
-        # The programs for /usr/share/PKG are in /usr/lib/PKG, whatever workspace is sourced.
+        # Programs of a package in /usr/share/PKG are in /usr/lib/PKG, whichever workspace is sourced.
         prefixes.append(folder.parents[1])
     for prefix in dict.fromkeys(prefixes):
         programs = prefix / "lib" / (package_name(folder) or folder.name)
@@ -295,7 +295,7 @@ def is_python(path: Path) -> bool:
 
 
 def why_ros_refuses(program: Path) -> str | None:
-    """Return the reason why ROS 1 would not run a Python program that minirospy runs, and a remedy, or None.
+    """Return why ROS 1 would not run a Python program that minirospy runs, with a remedy, or None if it would.
 
     ROS 1 lets the system choose the interpreter, which requires execute permission and a shebang line.
     """
@@ -315,7 +315,7 @@ def why_ros_refuses(program: Path) -> str | None:
 def with_prefix(prefix: list[str], command: list[str]) -> list[str]:
     """Return a program's command with a prefix such as ``gdb --args`` or ``python3 -m pdb``.
 
-    If the prefix runs Python files itself, only the file follows, as in ROS 1.
+    If the prefix is a Python command, only the file follows it, as in ROS 1.
     """
     if any(_RUNS_PYTHON.fullmatch(Path(word).stem) for word in prefix):
         command = command[-1:]

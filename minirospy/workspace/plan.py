@@ -25,7 +25,7 @@ from minirospy.workspace.manifest import PACKAGE_NAME, VARIABLES, Kind, Manifest
 __all__ = ["DIST_PACKAGES", "Install", "Plan", "Test", "read_plan"]
 
 DIST_PACKAGES = "lib/python3/dist-packages"
-"""The folder for Python packages below a devel or install folder, as in ROS on Debian and Ubuntu."""
+"""The folder for Python packages in a devel or install folder, as in ROS on Debian and Ubuntu."""
 
 _FOLDERS = {"add_message_files": "msg", "add_service_files": "srv", "add_action_files": "action"}
 _COMPILED = ("add_executable", "add_library", "catkin_add_gtest", "add_rostest_gtest")
@@ -65,15 +65,15 @@ _BEFORE = {
 """Commands that catkin requires before other commands, although the order has no effect here."""
 _GENERATORS = {"message_generation", "genmsg", "actionlib_msgs"}
 """Packages that define CMake's message macros; at least one must be found before the macros are used."""
-_CMAKE_VERSION = "3.25.1"  # the CMake version that package files see
+_CMAKE_VERSION = "3.25.1"  # the version that CMakeLists.txt files see as CMake's
 
 
 class Install(NamedTuple):
-    """Files for the install folder: ``sources`` below the package; ``destination`` below the install folder.
+    """Files to install: ``sources`` are below the package, ``destination`` is below the install folder.
 
-    For a folder with a trailing slash, its contents are copied; otherwise the folder itself. ``chosen`` and ``excluded``
-    are regular expressions for paths to include (none: all) and to exclude. ``program``: make the files executable;
-    ``python``: scripts to which devel refers; ``optional``: they may be missing.
+    For a folder with a trailing slash, its contents are copied; otherwise the folder itself. ``chosen`` and
+    ``excluded`` are regular expressions for paths to include (none: all) and to exclude. ``program``: make the files
+    executable; ``python``: the files are scripts that devel refers to; ``optional``: the files may be missing.
     """
 
     command: Command
@@ -111,7 +111,7 @@ class Plan(NamedTuple):
     """A package's part in the build.
 
     ``definitions`` are the .msg, .srv and .action files; ``message_depends`` the packages whose messages these may
-    contain; ``needs`` the packages found by find_package, with the lines; ``skipped`` the targets that need a compiler;
+    contain; ``needs`` the packages in find_package(), with their lines; ``skipped`` the targets that need a compiler;
     ``has_setup``: setup.py names Python packages; ``not_installed``: definitions that are not installed; ``options``: the
     .cfg files of dynamic_reconfigure.
     """
@@ -139,11 +139,11 @@ class Plan(NamedTuple):
 def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
     """Return the plan of the package in ``folder``; ``variables`` are those set by ``catkin_make -DNAME=VALUE``.
 
-    Raise ManifestError if package.xml is invalid, or BuildError if CMakeLists.txt is.
+    Raise ManifestError if package.xml is invalid, or BuildError if CMakeLists.txt is invalid.
     """
     manifest = read_manifest(folder)
     if not PACKAGE_NAME.match(manifest.name):
-        # The package's name becomes part of folder and module names.
+        # This is an error, because the package's name becomes part of folder and module names.
         problem = next(problem for problem in manifest.problems if "is not a package name" in problem.text)
         raise ManifestError(str(manifest.path), *problem)
 
@@ -232,7 +232,7 @@ class _Collector:
                 "generate_messages() is missing: messages, services and actions are added, but not generated"
             )
             self.warn(first.file, first.line, text)
-            # Continue without them, as catkin does.
+            # Continue without the definitions, as catkin does.
             self._definitions.clear()
 
     def plan(self) -> Plan:
@@ -254,7 +254,7 @@ class _Collector:
         )
 
     def _path(self, command: Command, name: str) -> str:
-        """Return, relative to the package, a path that a command names."""
+        """Return a path that a command names, relative to the package."""
         if command.folder == self._folder:
             return name
         path = Path(os.path.relpath(command.folder / name, self._folder)).as_posix()
@@ -413,7 +413,7 @@ def _error(command: Command, text: str) -> BuildError:
 
 
 def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the patterns that ``PATTERN x`` and ``REGEX x`` include, and the patterns with ``EXCLUDE``, which they exclude."""
+    """Return two tuples of patterns: those included by ``PATTERN x`` and ``REGEX x``, and those followed by ``EXCLUDE``."""
     chosen: list[str] = []
     excluded: list[str] = []
     for index, (kind, text) in enumerate(pairwise(arguments)):
@@ -425,7 +425,7 @@ def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, .
 
 
 def _variables(folder: Path, name: str) -> dict[str, str]:
-    """Return the variables that catkin and CMake set in advance. Destinations are below the install folder."""
+    """Return the variables that catkin and CMake set in advance. Destinations are relative to the install folder."""
     source = folder.as_posix()
 
     places = {"BIN": "lib", "ETC": "etc", "INCLUDE": "include", "SHARE": "share"}

@@ -1,4 +1,4 @@
-"""The PowerShell files ``devel/setup.ps1`` and ``ros.ps1``'s environment, as strings. Pure.
+"""The PowerShell files, ``devel/setup.ps1`` and the environment for ``ros.ps1``, as strings. Pure.
 
 This part of ``setup_files`` supports PowerShell 5.1 and later on Windows, macOS and Linux.
 """
@@ -78,7 +78,7 @@ def powershell_setup(
     *,
     extends: bool,
 ) -> str:
-    """Return the text of setup.ps1 or, with ``extends``, of local_setup.ps1, which keeps the sourced workspaces."""
+    """Return the text of setup.ps1 or, with ``extends``, of local_setup.ps1, which leaves the sourced workspaces active."""
     chain = "".join(f"    _minirospy_workspace {quoted(parent)} put\n" for parent in reversed(parents))
     others = "" if extends else _OTHERS.replace("@CHAIN@", chain)
     last = "".join(f"_minirospy_last ROS_PACKAGE_PATH {quoted(folder)}\n" for folder in share)

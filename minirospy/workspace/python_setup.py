@@ -1,6 +1,6 @@
 """Read the contents of a package's setup.py: Python packages, modules and scripts.
 
-The file is executed with a ``setup()`` that only records its arguments, so that it may compute anything, and needs
+The file is executed with a ``setup()`` that only records its arguments, so that it may compute its arguments, and needs
 neither setuptools nor catkin_pkg. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
 """
 
@@ -41,7 +41,7 @@ class PythonSetup(NamedTuple):
 
 
 def read_python_setup(folder: Path) -> PythonSetup:
-    """Return the packages and scripts in ``folder``/setup.py. Raise BuildError, with the line, if it fails."""
+    """Return the packages and scripts that ``folder``/setup.py names. Raise BuildError, with the line, if it fails."""
     file = folder / "setup.py"
     given = _run(file)
     roots = _given(file, given, "package_dir", dict, "{'': 'src'}")
@@ -116,7 +116,7 @@ def _run(file: Path) -> Mapping[str, object]:
 
 
 class _StandIn(types.ModuleType):
-    """A module that has every attribute; each is an empty class, unless the attribute is set."""
+    """A module that has every attribute. Each attribute is an empty class, unless it has been set."""
 
     def __getattr__(self, name: str) -> type:
         if name.startswith("__"):
@@ -150,9 +150,9 @@ _TOOLS = {"catkin_pkg", "distutils", "setuptools"}
 
 @contextmanager
 def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
-    """Replace the modules that a setup.py imports, with a ``setup`` that records its arguments; change to the file's folder.
+    """Replace the modules that a setup.py imports, so that ``setup`` records its arguments; change to the file's folder.
 
-    As for a script, modules in its folder can be imported; they are unloaded afterwards.
+    As in a script, modules in the file's folder can be imported; they are unloaded afterwards.
     """
 
     def setup(**arguments: object) -> None:
@@ -191,7 +191,8 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
     sys.meta_path.insert(0, finder)
     sys.path.insert(0, str(folder))
     os.chdir(folder)
-    # Set the variables that catkin's build sets, because a terminal without a sourced setup.bash has none of them.
+    # Set the variables that catkin's build sets, because a terminal in which no setup.bash is sourced has none of
+    # them.
     os.environ.update({name: VARIABLES[name] for name in unset})
     try:
         yield
@@ -209,7 +210,7 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
 
 
 def _metadata(folder: Path) -> dict[str, str]:
-    """Return a package's metadata from package.xml, under the names of ``setup()``'s arguments."""
+    """Return a package's metadata from package.xml, with the names of ``setup()``'s arguments as keys."""
     manifest = read_manifest(folder)
     return {
         "name": manifest.name,

@@ -35,11 +35,11 @@ class SetUp(NamedTuple):
 
 
 def setup_files(setup: SetUp) -> dict[str, str]:
-    """Return all setup files of a prefix: file name -> text."""
+    """Return all setup files for a prefix, as a dict from file name to text."""
     files = {
         ".catkin": ";".join(map(str, setup.sources)),
         "setup.sh": _posix(setup, _others_make_way(setup)),
-        # These work like `setup.sh --extend`: they keep the sourced workspaces.
+        # These files work like `setup.sh --extend`: they leave the sourced workspaces active.
         "local_setup.sh": _posix(setup, ""),
         "env.sh": _ENV,
         "setup.fish": _fish(setup),
@@ -156,7 +156,7 @@ _minirospy_workspace() {
 
 
 def _others_make_way(setup: SetUp) -> str:
-    """Return the code that removes previously sourced workspaces and adds this workspace's parents."""
+    """Return the code that removes the previously sourced workspaces from the environment and adds this workspace's parents."""
     chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
     return f"""if [ "${{1:-}}" != --extend ]; then
   # Remove the workspaces that were sourced before.
@@ -219,7 +219,7 @@ _BASE = {
 
 
 def _quoted(path: Path) -> str:
-    """Return a path as one word for a POSIX shell."""
+    """Return a path quoted as one word for a POSIX shell."""
     return "'" + str(path).replace("'", "'\\''") + "'"
 
 
@@ -296,7 +296,7 @@ def _fish_base(setup: SetUp) -> str:
 
 
 def _fish_quoted(path: Path) -> str:
-    """Return a path as one word for fish, whose single quotes allow two escapes, unlike in other shells."""
+    """Return a path quoted as one word for fish, whose single quotes allow two escapes, unlike those of other shells."""
     return "'" + str(path).replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 

@@ -39,14 +39,14 @@ _POOLS = {"rx": 256, "acc": 32, "app": 32, "tx": 32, "net": 32}
 _THREADS = f"({', '.join(f'{pool}: (worker_threads: {count})' for pool, count in _POOLS.items())})"
 """Zenoh sets SO_LINGER to 10 s, so that closing a dead link blocks a thread, mostly one in its rx pool, for 10 s.
 
-Measured: the loss of 100 robots together is noticed after 30 s with 32 threads in each pool, after 11 s with 128 threads
-in rx. The lease is 10 s.
+Measured: the simultaneous loss of 100 robots is noticed after 30 s with 32 threads in each pool, and after 11 s with 128
+threads in rx. The lease is 10 s.
 """
 _CONNECT_MS = 3000
 
 
 class EndpointError(BridgeError):
-    """An endpoint in the arguments that can never work."""
+    """An endpoint in the arguments can never work."""
 
     def __init__(self, endpoint: str, reason: str) -> None:
         super().__init__(f"[{escaped(endpoint)}] {reason}")
@@ -98,7 +98,7 @@ class Query(Protocol):
 
 
 class Declared(Protocol):
-    """A declaration that can be undeclared."""
+    """A declaration, such as a subscriber, that can be undeclared."""
 
     def undeclare(self) -> None: ...
 
@@ -170,7 +170,7 @@ class NetworkOptions:
     """The endpoints to connect to and to listen on. By default, connect to a local router, and do not listen.
 
     ``config``: a file in Zenoh's format, for TLS, users and all other settings; ``source``: the option that names this
-    file. ``scouts``: whether to discover peers by multicast.
+    file. ``scouts``: discover peers by multicast.
     """
 
     connect: tuple[str, ...] = ()
@@ -213,7 +213,10 @@ def to_endpoint(text: str, *, listens: bool = False) -> str:
 
 
 def unresolved(endpoints: Iterable[str]) -> list[str]:
-    """Return the hosts in endpoints that do not resolve now. They may resolve later, for example once mDNS runs. Blocks."""
+    """Return the hosts in endpoints that do not resolve at present.
+
+    They may resolve later, for example once mDNS runs. Blocks.
+    """
     found = []
     for endpoint in endpoints:
         protocol, _, rest = endpoint.partition("/")
@@ -260,7 +263,7 @@ def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False, needs
 
 
 def configured(options: NetworkOptions) -> Config:
-    """Return Zenoh's configuration from the file and the options; it listens only if either requests that."""
+    """Return Zenoh's configuration from the file and the options. It listens only if the file or an option requests that."""
     zenoh = importlib.import_module("zenoh")
     default: Config = zenoh.Config()
     config: Config = default
@@ -297,7 +300,7 @@ def configured(options: NetworkOptions) -> Config:
         put("mode", "router" if listens else "peer" if options.scouts else "client")
     mode = json.loads(config.get_json("mode"))
     put("scouting/multicast/enabled", options.scouts)
-    # A gateway that loses its router keeps retrying. A client without a router fails to open, and its caller opens it
+    # A gateway that loses its router keeps retrying. A client without a router fails to open, and the caller opens it
     # again.
     for key, value in (
         ("connect/timeout_ms", _CONNECT_MS if mode == "client" else -1),
@@ -305,7 +308,8 @@ def configured(options: NetworkOptions) -> Config:
         ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
         ("transport/unicast/max_sessions", _SESSIONS),
         ("transport/unicast/accept_pending", 1000),
-        # Keep-alives per 10 s lease. TCP retransmits lost data, so one fewer than Zenoh's default is enough.
+        # Keep-alive messages per 10 s lease. One fewer than Zenoh's default is enough, because TCP retransmits lost
+        # data.
         ("transport/link/tx/keep_alive", 3),
         # Data in the kernel's buffer is sent before any data of higher priority: at 4 Mbit/s this takes some 0.3 s
         # instead of 1.3 s.

@@ -1,9 +1,9 @@
 """Remove SO_LINGER from Zenoh's TCP links, so that closing them does not block.
 
 Zenoh sets SO_LINGER to 10 s on each link: if the peer is lost, closing the link blocks one of Zenoh's threads for 10 s,
-and other threads wait for it. A router that lost 1,000 robots together spent minutes closing their links, and read
-nothing from half of the robots that had reconnected (eclipse-zenoh 1.10.2, which has no option to change this). Without
-SO_LINGER the kernel sends the remaining data after the close.
+and other threads wait for that thread. A router that lost 1,000 robots together spent minutes closing their links, and
+read nothing from half of the robots that had reconnected (eclipse-zenoh 1.10.2, which has no option to change this).
+Without SO_LINGER the kernel sends the remaining data after the close.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _LINGER = struct.Struct("ii")
 _ZENOHS = _LINGER.pack(1, 10)
 _NONE = _LINGER.pack(0, 0)
 _LOOKS = 10
-"""Number of polls that examine a new file: Zenoh sets SO_LINGER only after it has created and connected the socket."""
+"""Number of polls in which to examine a new file descriptor: Zenoh sets SO_LINGER only after it has connected the socket."""
 
 
 class LingerRemover:
@@ -31,7 +31,7 @@ class LingerRemover:
 
     def __init__(self) -> None:
         self._looks: dict[tuple[int, int], int] = {}
-        """Number of polls that have examined each open file."""
+        """Dict from open file to the number of polls that have examined it."""
 
     def look(self) -> int:
         """Remove SO_LINGER from new links; return the number of links changed. Does nothing on Windows."""
@@ -41,7 +41,7 @@ class LingerRemover:
         count = 0
         with contextlib.suppress(OSError):
             for name in os.listdir(_OPEN_FILES):
-                # Other threads open and close files meanwhile.
+                # Ignore errors, because other threads open and close files at the same time.
                 with contextlib.suppress(OSError):
                     file = os.fstat(int(name))
                     identity = file.st_dev, file.st_ino

@@ -6,7 +6,7 @@ tab for each line feed inside (`minirospy complete --one-line INDEX WORD...`: wi
 line feeds, words and candidates in PowerShell's syntax). A candidate that ends in ``/`` or ``=`` can be continued; any
 other is followed by a space.
 
-Verbs and options come from the command's own parser, not from a second list. The same applies to the completers for
+Verbs and options are read from the command's own parser, not from a second list, and so are the completers for
 arguments and option values: see minirospy.command.parser.Parser.add_argument. Completion never fails with an error, and
 waits for a master only as long as a user would. Source: http://wiki.ros.org/rosbash#Tab_completion.
 """
@@ -62,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def candidates(
     index: int, words: Sequence[str], *, one_line: bool = False, shell: Shell = POSIX
 ) -> list[str]:
-    """Return the candidates for ``words[index]`` in the form that the shell inserts; ``one_line``: without line feeds."""
+    """Return the candidates for ``words[index]`` as the shell inserts them; ``one_line``: without line feeds."""
     if not 0 < index <= len(words):
         return []
     word = shell.read(words[index] if index < len(words) else "")
@@ -75,7 +75,7 @@ def candidates(
         fitting = (text for text in fitting if not has_controls(text.translate(_SPACES)))
         return [shell.write(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
-        # The package or type is unknown: the command itself will report it.
+        # The package or type is unknown, which the command itself will report.
         return []
 
 
@@ -121,7 +121,7 @@ def _of_parser(parser: Parser, verb: str, before: list[str], word: str) -> Itera
     pending: argparse.Action | None = None
     for each in before:
         if each in options:
-            # An optional option value is a number: do not complete the next word as that value.
+            # If an option's value is optional, it is a number, so do not offer completions for it.
             pending = options[each] if options[each].nargs not in (0, "?") else None
         elif pending is not None:
             pending = pending if pending.nargs in ("+", "*") else None

@@ -31,9 +31,9 @@ __all__ = [
     "topics",
 ]  # fmt: skip
 
-LIVE_SECONDS = 0.8  # timeout for the master and for nodes
+LIVE_SECONDS = 0.8  # timeout in seconds for the master and for nodes
 
-_MAX_LETTERS = 1000  # characters of a parameter's value on a command line
+_MAX_LETTERS = 1000  # maximum characters of a parameter's value on a command line
 
 _LAUNCH = (".launch", ".launch.xml", ".test")
 
@@ -47,7 +47,7 @@ class Cursor(NamedTuple):
 
 
 class Text(str):
-    """A candidate that the user will edit, and which is therefore quoted instead of having a backslash before each blank."""
+    """A candidate that the user will edit. It is quoted, instead of having a backslash before each blank."""
 
     __slots__ = ()
 
@@ -56,7 +56,7 @@ Completer = Callable[[Cursor], Iterable[str]]
 
 
 def nothing(_: Cursor) -> Iterable[str]:
-    """Return no candidates: the argument is a number, an expression or a new name."""
+    """Return no candidates, because the argument is a number, an expression or a new name."""
     return ()
 
 
@@ -82,7 +82,7 @@ def build_targets(cursor: Cursor) -> Iterable[str]:
 
 
 def package_folders(cursor: Cursor) -> Iterable[str]:
-    """Return ``pkg/``, then ``pkg/folder/``; for roscd, also the log and test result folders."""
+    """Return ``pkg/``, then ``pkg/folder/``; for roscd, also the folders of logs and test results."""
     if any(not word.startswith("-") for word in cursor.given):
         return []
     package, slash, _ = cursor.word.partition("/")
@@ -171,9 +171,9 @@ def _entries(folder: Path, *, hidden: bool) -> list[str]:
 
 
 def rosrun_words(cursor: Cursor) -> Iterable[str]:
-    """Return rosrun's options, packages, and the chosen package's programs.
+    """Return rosrun's options and packages, then the chosen package's programs.
 
-    Then files and remappings for the program's arguments.
+    For the program's arguments, return files and remappings.
     """
     given = list(cursor.given)
     while given and given[0].startswith("-"):
@@ -228,7 +228,7 @@ def _pack_words(cursor: Cursor, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
 def launch_words(cursor: Cursor) -> Iterable[str]:
     """Yield packages, launch files in the chosen package, or paths.
 
-    Then ``arg:=`` for each argument that the file declares.
+    After the launch file, yield ``arg:=`` for each argument that it declares.
     """
     if ":=" not in cursor.word:
         if not cursor.given:
@@ -307,7 +307,7 @@ def _as_typed(names: Iterable[str], word: str) -> list[str]:
 
 
 def topics(cursor: Cursor) -> Iterable[str]:
-    """Return the topics; for echo and type, also the fields of a topic's messages."""
+    """Return the topics; for echo and type, also the fields of their messages."""
     from minirospy.introspect.topics import find_topic, topic_names
 
     fields = cursor.verb in ("echo", "type") and "/" in cursor.word[1:]
@@ -364,8 +364,8 @@ def parameter_value(cursor: Cursor) -> Iterable[str]:
         return []
     ask = cursor.given[0]
     found = _live(lambda graph: [format_value(get_parameter(graph, graph.resolve(ask))).removesuffix("\n")])
-    # Lists and dictionaries can be written on one line. Skip long values: nobody edits a whole robot description on a
-    # command line.
+    # Lists and dictionaries can be written on one line. Skip long values, because nobody edits a whole robot
+    # description on a command line.
     return [on_one_line(Text(text)) for text in found if len(text) <= _MAX_LETTERS]
 
 
@@ -395,7 +395,10 @@ def _catalogue() -> Catalogue:
 
 
 def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
-    """Return ``pkg/``, then ``pkg/Type``, because a list of all types would be too long; for `rosmsg show` also bare names."""
+    """Return ``pkg/``, then ``pkg/Type``, because a list of all types would be too long.
+
+    For `rosmsg show`, also return type names without the package.
+    """
     from minirospy.introspect.interfaces import Interfaces, Kind
 
     package, slash, _ = cursor.word.partition("/")
@@ -428,7 +431,7 @@ def prototype_types(cursor: Cursor) -> Iterable[str]:
 
 
 def topic_type(cursor: Cursor) -> Iterable[str]:
-    """Return the topic's type, or all types if it has none, for `rostopic pub TOPIC`."""
+    """Return the topic's type, or all types if the topic has none, for `rostopic pub TOPIC`."""
     if not cursor.given:
         return message_types(cursor)
 
@@ -469,7 +472,7 @@ def _text(spec: MessageSpec, catalogue: Catalogue) -> Text:
 
 
 def _fields(type_: str, path: str) -> list[str]:
-    """Return the fields of the field ``path`` of a message type."""
+    """Return the names of the fields inside the field ``path`` of a message type."""
     catalogue = _catalogue()
     spec = catalogue.message(type_)
     for step in filter(None, path.split("/")):
@@ -519,7 +522,7 @@ def pins(cursor: Cursor) -> Iterable[str]:
 
 
 def dashboard_views(_: Cursor) -> Iterable[str]:
-    """Return the dashboard's views, and those layouts whose names differ from all views."""
+    """Return the dashboard's views, and the layouts that do not have the name of a view."""
     from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
     return dict.fromkeys((*VIEWS, *LAYOUTS))

@@ -28,7 +28,7 @@ class Word(NamedTuple):
 
 
 class Shell(NamedTuple):
-    """A shell's syntax: functions that read a word and write a candidate for a word."""
+    """A shell's syntax: a function that reads a word, and one that writes a candidate for a word."""
 
     read: Callable[[str], Word]
     write: Callable[[str, Word], str]
@@ -91,7 +91,7 @@ def _escaped(text: str) -> str:
 
 
 def _read_powershell(word: str) -> Word:
-    """Return a word without its quotes; ``quote`` is the quote at the word's start, whether it is closed or not."""
+    """Return a word without its quotes; ``quote`` is the quote at the word's start, even if it is closed."""
     text = ""
     quote = ""
     read = 0

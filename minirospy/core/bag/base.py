@@ -29,8 +29,8 @@ class StoredMessage(NamedTuple):
 class Block(NamedTuple):
     """Consecutive messages from one chunk, in time order.
 
-    ``found`` contains for each message its time, rank (the index of its connection among the requested ones), record offset,
-    and start and end of the body in ``data``. ``chunk`` is the chunk's position, or None in bags of version 1.2.
+    ``found`` contains a tuple for each message: time, rank (the index of its connection among the requested ones), record
+    offset, and start and end of the body in ``data``. ``chunk`` is the chunk's position, or None in bags of version 1.2.
     """
 
     chunk: int | None
@@ -42,7 +42,7 @@ class BagReader(ABC):
     """The common interface of the readers for all versions."""
 
     version: int  # 200 means 2.0
-    indexed = True  # the bag has an index, or one was rebuilt
+    indexed = True  # False if the bag has no index and none was rebuilt
     stream: BinaryIO
     connections: dict[int, Connection]
     chunks: Sequence[ChunkInfo]  # the chunks in file order; empty in bags of version 1.2
@@ -87,7 +87,7 @@ class BagReader(ABC):
 
     @abstractmethod
     def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
-        """Return the indexes of these connections, reading those that have not been read yet.
+        """Return the indexes of these connections; read from the file those that are not in memory yet.
 
         Raise BagFormatError if the bag is damaged.
         """
@@ -100,7 +100,7 @@ class BagReader(ABC):
         return [array("Q", index.times) for index in self.index(connections)]
 
     def chunk_headers(self) -> dict[int, StoredChunk]:
-        """Return chunk position -> the chunk's header. Raise BagUnindexedError if a header is damaged."""
+        """Return a dict from chunk position to chunk header. Raise BagUnindexedError if a header is damaged."""
         return {}
 
     def size(self) -> int:
@@ -113,8 +113,8 @@ class BagReader(ABC):
 
 
 class ScannedReader(BagReader):
-    """A reader whose bag may lack an index, and is scanned instead."""
+    """A reader for bags that may lack an index, and are then scanned."""
 
     @abstractmethod
     def scan(self) -> Iterator[int]:
-        """Read the whole bag, and make its index; yield the positions that are read, to show the progress."""
+        """Build the index by reading the whole bag; yield the positions that are read, to show the progress."""

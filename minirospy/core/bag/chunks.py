@@ -1,4 +1,4 @@
-"""A bag's chunks: their headers, their decompressed data, and the messages in it.
+"""A bag's chunks: headers, decompressed data, and the messages in that data.
 
 Messages are found by scanning a chunk's data, not by its index records: that costs no more, and a damaged index cannot
 lead to a wrong message. Threads decompress the next chunks in advance, because bz2 and lz4 release the GIL.
@@ -64,7 +64,7 @@ class _Ahead:
         return self._future.result()
 
     def cancel(self) -> None:
-        """Let the thread stop soon."""
+        """Tell the thread to stop soon."""
         self._is_cancelled = True
         self._future.cancel()
 
@@ -116,7 +116,8 @@ class ChunkStream:
     ) -> tuple[bytes, list[Found]] | None:
         """Return the bodies and locations of a few requested messages in a chunk, without reading the rest of the chunk.
 
-        ``known``: see :func:`scan`. Return None if scanning is cheaper or an index is damaged: then scan the chunk.
+        ``known``: see :func:`scan`. Return None if the caller should scan the chunk, because that is cheaper or an index
+        is damaged.
         """
         chunk, data_position = header = self.header(info.position)
         wanted = sum(count for number, count in info.counts.items() if ranks.get(number) is not None)
@@ -168,7 +169,7 @@ class ChunkStream:
     def _entries(
         self, header: StoredChunk, info: ChunkInfo, ranks: Ranks
     ) -> tuple[list[tuple[int, int, int, int]], list[array[int]]]:
-        """Return offset, time, rank and connection for the requested messages, from a chunk's index records.
+        """Return offset, time, rank and connection for each requested message, read from a chunk's index records.
 
         Also return the offsets of all messages, by connection.
         """
@@ -195,7 +196,7 @@ class ChunkStream:
     ) -> None:
         """Compare each connection's record, which precedes its first message, with the record in the bag's index.
 
-        This is done once per connection. Raise BagFormatError if they differ, or if the chunk's index is wrong.
+        This is done once per connection. Raise BagFormatError if the records differ, or if the chunk's index is wrong.
         """
         limit = size_of(self.stream)
         for first, _, _, number in entries:
@@ -252,23 +253,28 @@ class ChunkStream:
 
 
 THREADS = max(1, min(4, (os.cpu_count() or 1) - 1))
-"""Number of threads that decompress in advance, and of chunks in advance; one core remains for the reader's thread."""
+"""Number of threads that decompress chunks in advance, which is also the maximum number of such chunks; one core remains for
+the reader's thread.
+"""
 
 
-# bytes; larger chunks are not decompressed in advance, because several of them would be in memory
+# Maximum size in bytes; larger chunks are not decompressed in advance, because several of them would be in memory
 _MAX_AHEAD = 64 * 1024 * 1024
 
-# Chunk bytes per requested message; above this, only the requested messages are read, not the whole chunk
+# Chunk bytes per requested message; above this, read only the requested messages, not the whole chunk
 PICK_SIZE = 32 * 1024
 
 
 def size_of(stream: BinaryIO) -> int:
-    """Return a stream's size in bytes. Changes the stream's position."""
+    """Return a stream's size in bytes. Moves the stream's position."""
     return stream.seek(0, os.SEEK_END)
 
 
 class _Layout(NamedTuple):
-    """The layout of a message's header, whose field order depends on the writer: 46 bytes with two constant parts."""
+    """The layout of a message's header.
+
+    The header has 46 bytes, two parts of which are constant; the field order depends on the writer.
+    """
 
     form: struct.Struct
     first: bytes
@@ -285,9 +291,9 @@ _STAMP_AND_SIZE = struct.Struct("<III")
 
 
 def scan(data: bytes, ranks: Ranks, known: Mapping[int, Connection]) -> list[Found]:
-    """Return the messages in a chunk's data on connections that have ``ranks``, in the order in the data.
+    """Return the messages in a chunk's data on connections that have ``ranks``, in the order in which the data contains them.
 
-    ``known`` are all connections in the bag's index. Raise BagFormatError if a message has another connection, or if a
+    ``known`` contains all connections in the bag's index. Raise BagFormatError if a message has an unknown connection, or if a
     connection in the data has a different topic or type: the bag is then damaged.
     """
     found: list[Found] = []
@@ -307,7 +313,7 @@ def scan_into(
 ) -> int:
     """Add the messages in a chunk's data to ``found``, and the connections to ``connections``; return the data's size.
 
-    Raise BagFormatError if a record is damaged; the error's position is the end of the complete records.
+    Raise BagFormatError if a record is damaged; the position in the error is that of the end of the complete records.
     """
     add = found.append
     end, last_head = len(data), len(data) - _HEAD
@@ -355,7 +361,7 @@ _COMPARED = ("type", "md5sum", "message_definition")
 
 
 def _check_connection(stored: Connection, known: Mapping[int, Connection]) -> None:
-    """Raise BagFormatError if the index has another topic or type for a connection found in a chunk."""
+    """Raise BagFormatError if the index contains a different topic or type for a connection found in a chunk."""
     indexed = known.get(stored.id, stored)
     if indexed.topic == stored.topic and all(
         indexed.header.get(name) == stored.header.get(name) for name in _COMPARED

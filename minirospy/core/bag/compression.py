@@ -1,4 +1,4 @@
-"""Chunk compression by the name in a chunk's header (none, bz2, lz4; in MCAP files zstd): bytes in, bytes out.
+"""Chunk compression by the name in a chunk's header (none, bz2 or lz4; in MCAP files also zstd): bytes in, bytes out.
 
 An LZ4 frame is written as ROS's own reader (roslz4) requires: independent blocks of at most 1 MiB, a content
 checksum, neither block checksums nor the content size. Every standard frame can be read. lz4 is imported when a chunk
@@ -35,7 +35,7 @@ COMPRESSIONS = (NONE, BZ2, LZ4)  # in the order in which rosbag lists them
 MAX_CHUNK_SIZE = 1088 * 1024 * 1024
 """Maximum bytes in a compressed chunk's data: a 1 GiB message, the limit for a connection, and the records before it."""
 
-_MAX_LZ4 = 256  # maximum ratio of the data's size to that of its LZ4 block
+_MAX_LZ4 = 256  # maximum ratio of decompressed to compressed size of an LZ4 block
 _MAX_STREAMS = 20_000  # bz2 streams per chunk; parallel compressors write one per 100 kB
 _PIECE = 16 * 1024 * 1024  # bytes to decompress at a time; Ctrl-C takes effect only in between
 _INPUT = 256 * 1024  # bytes of compressed data to pass to a library at a time
@@ -61,8 +61,8 @@ def decompress(name: str, data: bytes, size: int, is_cancelled: Callable[[], boo
     """Return a chunk's data, which must have ``size`` bytes after decompression.
 
     Allocates at most ``size`` bytes and one piece. ``is_cancelled`` is polled between pieces, possibly in another
-    thread than the caller's. Raise BagFormatError if the data is damaged, has another size or is cancelled,
-    BagCompressionError if the compression is unknown or its library is missing.
+    thread than the caller's. Raise BagFormatError if the data is damaged, if its size is not ``size``, or after a
+    cancellation, and BagCompressionError if the compression is unknown or its library is missing.
     """
     return _decompressed(_choose(_DECOMPRESS, name), name, data, size, is_cancelled)
 
@@ -134,8 +134,8 @@ def _compress_lz4(data: Buffer) -> bytes:
 class _Output:
     """Collects decompressed data; ``size`` bytes are expected. Raise BagFormatError if there are more.
 
-    Large data is decompressed in pieces: a library would need twice the memory to join its own pieces, and Ctrl-C would not
-    take effect meanwhile.
+    Large data is decompressed in pieces, because a library would need twice the memory to join its own pieces, and Ctrl-C
+    would have no effect until it finishes.
     """
 
     def __init__(self, size: int, is_cancelled: Callable[[], bool]) -> None:

@@ -137,7 +137,7 @@ def encode_index_data(connection: int, entries: Sequence[tuple[int, int]]) -> by
 
 
 def encode_chunk_info(info: ChunkInfo) -> bytes:
-    """Return a chunk's info record."""
+    """Return the record of a chunk's info."""
     fields = {
         "op": bytes((OP_CHUNK_INFO,)),
         "ver": _UINT32.pack(1),

@@ -33,7 +33,7 @@ class Entry(NamedTuple):
 
 
 class ConnectionIndex:
-    """The entries of one connection, in time order."""
+    """The index entries for one connection, in time order."""
 
     __slots__ = ("_chunks", "_offsets", "_places", "times")
 
@@ -57,7 +57,7 @@ class ConnectionIndex:
         return map(self.__getitem__, reversed(range(len(self.times))))
 
     def extend(self, times: Iterable[int], offsets: Iterable[int], chunk: int | None = None) -> None:
-        """Append the entries for a chunk, or for a bag without chunks."""
+        """Append the entries for a chunk, or for the whole bag if it has no chunks."""
         times = list(times)
         count = len(times)
         if not count:
@@ -103,7 +103,7 @@ class ConnectionIndex:
 
 
 def read_entries(stream: BinaryIO, record: Record) -> tuple[array[int], array[int]]:
-    """Read the data of an index record in version 2.0: times and offsets. The stream is then after the record.
+    """Read the data of an index record in version 2.0: times and offsets. Leaves the stream at the end of the record.
 
     The data's size is computed from the number of entries, because ROS C Turtle wrote a wrong length. Raise BagFormatError
     if the record is damaged.

@@ -47,7 +47,7 @@ class Topic(NamedTuple):
 
 
 class Stored(NamedTuple):
-    """The number of chunks in a bag with one compression, and their bytes before and after compression."""
+    """The number of chunks in a bag with the same compression, and their total size in bytes before and after compression."""
 
     compression: str
     chunks: int
@@ -129,7 +129,7 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
 
 
 def compression_of(reader: BagReader) -> list[Stored]:
-    """Return the compressions of a bag's chunks, the most frequent one first."""
+    """Return the compressions used for a bag's chunks, the most frequent one first."""
     found: dict[str, list[int]] = {}
     for header in reader.chunk_headers().values():
         sums = found.setdefault(header.chunk.compression, [0, 0, 0])
@@ -209,9 +209,9 @@ def as_yaml(summary: Summary) -> str:
 
 
 def value_of(text: str, key: str) -> str:
-    """Return a key's value from the output of :func:`as_yaml` as -k prints it; keys are such as ``start`` or ``topics[0].type``.
+    """Return a key's value from the output of :func:`as_yaml`, as `rosbag info -k` prints it.
 
-    Raise LookupError if the key does not exist.
+    Keys are, for example, ``start`` or ``topics[0].type``. Raise LookupError if the key does not exist.
     """
     if not re.fullmatch(r"[A-Za-z_]\w*(\[-?\d+\])*(\.[A-Za-z_]\w*(\[-?\d+\])*)*", key):
         raise LookupError(key)
@@ -319,7 +319,7 @@ def _topic_lines(topics: Sequence[Topic], widest_type: int) -> Iterable[str]:
 
 
 def _listed(name: str, lines: Iterable[str]) -> list[tuple[str, str]]:
-    """Return rows; only the first one contains the name."""
+    """Return table rows, of which only the first one contains the name."""
     return [("" if number else name, line) for number, line in enumerate(lines)]
 
 
@@ -350,7 +350,7 @@ def _local_time(stamp: float) -> str:
     try:
         return time.strftime("%b %d %Y %H:%M:%S", time.localtime(stamp)) + fraction
     except (OSError, OverflowError, ValueError):
-        # The time is outside of the system calendar's range, for example in a damaged bag.
+        # The time is outside the range of the system calendar, for example in a damaged bag.
         return f"{stamp:.2f}"
 
 

@@ -102,7 +102,10 @@ class McapReader(BagReader):
     def messages(
         self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
     ) -> Iterator[StoredMessage]:
-        """See :meth:`BagReader.messages`. If the file is damaged, raise BagFormatError after the messages before the damage."""
+        """See :meth:`BagReader.messages`.
+
+        If the file is damaged, raise BagFormatError after yielding the messages before the damage.
+        """
         chosen = self.connections if connections is None else connections
         wanted = {number: self.connections[number] for number in chosen}
         first = 0 if start is None else start
@@ -187,7 +190,7 @@ class McapReader(BagReader):
 
 
 class _ChunkHeader(NamedTuple):
-    """The fields before a chunk's data, and the data's position."""
+    """The header fields before a chunk's data, and the data's position."""
 
     start: int
     compression: str
@@ -197,14 +200,14 @@ class _ChunkHeader(NamedTuple):
 
 
 class _Selection(NamedTuple):
-    """The messages that a caller requests."""
+    """The criteria for the messages that a caller requests."""
 
     known: Collection[int]
     """The channels in the summary; a message on another channel means that the file is damaged."""
     wanted: Collection[int]
     first: int
     last: int
-    """Times in nanoseconds, both included."""
+    """Last time in nanoseconds; the first and the last time are both included."""
 
 
 class _Run:
@@ -257,7 +260,7 @@ class _Run:
 
 
 class _Loose(_Run):
-    """The messages outside of chunks; ``places`` are the positions and lengths of their records."""
+    """The messages outside of chunks; ``places`` contains the positions and lengths of their records."""
 
     def __init__(self, position: int, start: int) -> None:
         super().__init__(position, start)
@@ -359,7 +362,7 @@ def _connection(channel: Channel, schema: Schema) -> Connection:
 
 
 def _chunk_infos(summary: Summary) -> list[ChunkInfo]:
-    """Return the chunks; each has the counts for the whole file, because the summary has none per chunk."""
+    """Return the chunks; each contains the message counts of the whole file, because the summary has none per chunk."""
     assert summary.statistics is not None
     counts = dict(summary.statistics.channel_message_counts)
     infos = []

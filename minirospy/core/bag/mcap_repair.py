@@ -36,7 +36,8 @@ MAGIC = b"\x89MCAP0\r\n"  # the first and the last bytes of a file
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQ")  # the start of a message: its channel, sequence and time
 
-_Entries = dict[int, list[tuple[int, int]]]  # channel -> times and offsets of a chunk's messages
+# dict from channel to the times and offsets of a chunk's messages
+_Entries = dict[int, list[tuple[int, int]]]
 
 
 @contextlib.contextmanager
@@ -50,8 +51,8 @@ def mcap_faults() -> Iterator[None]:
     except (McapError, ZstdError, struct.error, LookupError, StopIteration, UnicodeDecodeError) as error:
         raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
     except (EOFError, OSError, ValueError, RuntimeError, ArithmeticError, MemoryError, TypeError) as error:
-        # These are raised by decompressors, for lengths that exceed the memory, and for a seek before the start of a
-        # short file.
+        # Decompressors raise these for lengths that exceed the memory; a seek before the start of a short file raises
+        # them too.
         raise BagFormatError(f"not a whole MCAP file: {error}") from error
 
 
@@ -77,8 +78,8 @@ class _Recovered(NamedTuple):
 class McapRepair:
     """Rebuilds an MCAP file's summary, in place. The library must be installed.
 
-    ``limit``: bytes in the stream that are known to be written, if not all are. After :meth:`run`, ``problems`` contains
-    lines about data that could not be recovered.
+    ``limit``: number of bytes in the stream that are known to be written, if that is not the whole stream. After
+    :meth:`run`, ``problems`` contains lines about data that could not be recovered.
     """
 
     def __init__(self, stream: BinaryIO, limit: int | None = None) -> None:
@@ -254,7 +255,7 @@ class McapRepair:
             self._entries = {}
 
     def _message_indexes(self) -> bytes:
-        """Return message indexes for a last chunk whose own are incomplete, and add them to its chunk index."""
+        """Return message indexes for a last chunk whose own indexes are incomplete, and add them to its chunk index."""
         from mcap.data_stream import RecordBuilder
         from mcap.records import MessageIndex
 

@@ -27,9 +27,9 @@ __all__ = [
 ]
 
 CHUNK_SIZE = 4 * 1024 * 1024
-"""Bytes per chunk before compression, as in the MCAP tools; the summary that `rosbag info` reads has one record per chunk."""
+"""Bytes per chunk before compression, as in the MCAP tools. `rosbag info` reads a summary that has one record per chunk."""
 
-# Name of a chunk compression -> the library's name
+# Dict from chunk compression to the library's name for it
 COMPRESSIONS = {"none": "NONE", "lz4": "LZ4", "zstd": "ZSTD"}
 
 SCHEMA_FIELDS = ("type", "message_definition")
@@ -58,7 +58,7 @@ def check_mcap_compression(name: str) -> None:
 class McapWriter:
     """Writes an MCAP file to a binary stream, which it does not close; like :class:`minirospy.core.bag.writer.BagWriter`.
 
-    ``compression``: none, lz4 or zstd. Raise BagCompressionError if it is another, BagError if the extra is missing.
+    ``compression``: none, lz4 or zstd. Raise BagCompressionError if it is none of these, BagError if the extra is missing.
     """
 
     def __init__(self, stream: BinaryIO, *, compression: str = "none", chunk_size: int = CHUNK_SIZE) -> None:

@@ -1,4 +1,4 @@
-"""Bags of versions before 2.0: the one place that names their reader, which is imported when such a bag is opened."""
+"""Bags of versions before 2.0: the only module that names their reader, which is imported when such a bag is opened."""
 
 from __future__ import annotations
 
@@ -13,20 +13,23 @@ from minirospy.core.bag.base import BagReader, ScannedReader
 __all__ = ["open_old_bag", "unindexed_old_bag"]
 
 _READERS = {1: "minirospy.core.bag.reader12"}
-"""Major version -> a module with ``open_bag12`` and ``unindexed_bag12``."""
+"""Dict from major version to a module with ``open_bag12`` and ``unindexed_bag12``."""
 
 
 def open_old_bag(stream: BinaryIO, version: int) -> BagReader:
-    """Return a reader of the bag whose first line has been read.
+    """Return a reader for the bag whose first line has been read.
 
-    Raise BagVersionError for a version that is not read, and what the version's reader raises.
+    Raise BagVersionError if the version is not supported, BagUnindexedError if the bag's index is missing or damaged.
     """
     reader: BagReader = _module(version).open_bag12(stream, version)
     return reader
 
 
 def unindexed_old_bag(stream: BinaryIO) -> ScannedReader:
-    """Return a reader of the bag at the stream's position, which is to be scanned. Raise BagFormatError, BagVersionError."""
+    """Return a reader for the bag at the stream's position, for scanning the bag.
+
+    Raise BagFormatError if it is not a bag, BagVersionError if its version is not supported.
+    """
     start = stream.tell()
     version = records.read_version(stream)
     stream.seek(start)

@@ -1,8 +1,8 @@
 """Read bags: a seekable binary stream in, connections and messages in time order out.
 
-Opening a bag of version 2.0 reads its first record, and its connections and chunk infos at the end. Messages are read chunk
-by chunk; where chunks overlap in time they are merged. Memory: the chunk infos, and a few chunks.
-Source: http://wiki.ros.org/Bags/Format/2.0; for version 1.2: `minirospy.core.bag.old_formats`.
+Opening a bag of version 2.0 reads its first record, and its connections and chunk infos at the end. Messages are read
+chunk by chunk; chunks that overlap in time are merged. Memory use: the chunk infos, and a few chunks. Source:
+http://wiki.ros.org/Bags/Format/2.0; for version 1.2: `minirospy.core.bag.old_formats`.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def open_bag(stream: BinaryIO) -> BagReader:
 class ChunkedReader(BagReader):
     """A bag of version 2.0. ``connections`` and ``chunks`` may grow, because a bag can be read while it is written.
 
-    ``headers``: chunk position -> header, for chunks whose header in the file is incomplete.
+    ``headers``: a dict from chunk position to header, for chunks whose header in the file is incomplete.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class ChunkedReader(BagReader):
 
     @classmethod
     def open(cls, stream: BinaryIO, version: int = 200) -> ChunkedReader:
-        """Read the bag's header, connections and chunk infos; the stream must be after the first line."""
+        """Read the bag's header, connections and chunk infos; the stream's position must be after the first line."""
         position = stream.tell()
         try:
             limit = size_of(stream)
@@ -156,7 +156,7 @@ class ChunkedReader(BagReader):
     def chunk_headers(self) -> dict[int, StoredChunk]:
         """See :meth:`BagReader.chunk_headers`.
 
-        Raise BagUnindexedError if a header is damaged, because the index is then wrong.
+        Raise BagUnindexedError if a header is damaged, because that means that the index is wrong.
         """
         try:
             return {chunk.position: self._chunks.header(chunk.position) for chunk in self.chunks}
@@ -229,7 +229,7 @@ class _Merge:
 
     def blocks(self) -> Iterator[Block]:
         """Yield the blocks in order."""
-        # The run's number decides between runs whose next messages have equal time, connection and offset.
+        # The run's number is the tie-breaker between runs whose next messages have equal time, connection and offset.
         heap: list[tuple[int, int, int, int, _Run]] = []
         number, count = 0, len(self._chunks)
         while heap or number < count:
@@ -307,7 +307,7 @@ def _start_time(chunk: ChunkInfo) -> int:
 def _check_index(
     stream: BinaryIO, limit: int, connections: Mapping[int, Connection], chunks: Sequence[ChunkInfo]
 ) -> None:
-    """Raise BagFormatError if the index does not match the bag header, because messages would be missing silently."""
+    """Raise BagFormatError if the index does not match the bag header. Otherwise messages would be missing silently."""
     positions: set[int] = set()
     for chunk in chunks:
         if chunk.position in positions:

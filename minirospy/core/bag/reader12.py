@@ -186,9 +186,9 @@ class Reader12(ScannedReader):
 
 
 def open_bag12(stream: BinaryIO, version: int) -> Reader12:
-    """Return a reader for the bag; its first line must have been read.
+    """Return a reader for the bag whose first line has been read.
 
-    A bag without a bag header has no index, and is scanned when it is read. Raise BagUnindexedError if there is a bag
+    A bag without a bag header has no index, and must be scanned before it is read. Raise BagUnindexedError if there is a bag
     header but no index.
     """
     start = stream.tell()
@@ -201,7 +201,7 @@ def open_bag12(stream: BinaryIO, version: int) -> Reader12:
 
 
 def unindexed_bag12(stream: BinaryIO) -> Reader12:
-    """Return a reader for the bag at the stream's position, which must then be scanned.
+    """Return a reader for the bag at the stream's position, for scanning the bag.
 
     Raise BagFormatError if it is not a bag of this version.
     """

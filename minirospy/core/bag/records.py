@@ -4,7 +4,7 @@ A record is a header (its length, then fields ``name=value``, each with a length
 bytes). The field ``op`` specifies the kind of record. All numbers are little-endian; times are nanoseconds since 1970
 here, and 32-bit seconds and nanoseconds in the file. Source: http://wiki.ros.org/Bags/Format/2.0.
 
-Fields may be in any order, and unknown fields and records are skipped. The inverse: `minirospy.core.bag.encoding`.
+Fields may be in any order, and unknown fields and records are skipped. `minirospy.core.bag.encoding` is the inverse.
 """
 
 from __future__ import annotations
@@ -62,7 +62,9 @@ OP_CHUNK_INFO = 6
 OP_CONNECTION = 7
 
 BAG_HEADER_SIZE = 4096
-"""Bytes of the bag header's fields and padding together; constant, because the header is overwritten when the bag is closed."""
+"""Total size in bytes of the bag header's fields and padding; constant, because the header is overwritten when the bag is
+closed.
+"""
 
 # maximum bytes in a record's header, which contains definitions in bags of version 1.2
 MAX_HEADER = 16 * 1024 * 1024
@@ -166,7 +168,7 @@ class Chunk(NamedTuple):
 
 
 class ChunkInfo(NamedTuple):
-    """A chunk's info: its position, the times of its first and last message, and the number of messages per connection."""
+    """A chunk's info: its position, the times of its first and last message, and its number of messages per connection."""
 
     position: int
     start_time: int
@@ -189,15 +191,15 @@ class Record(NamedTuple):
         return self.data_position + self.data_size
 
     def uint32(self, name: str) -> int:
-        """Return a field's 32-bit number. Raise BagFormatError if it is missing or has another size."""
+        """Return a field's 32-bit number. Raise BagFormatError if the field is missing or does not have 4 bytes."""
         return int(self._number(name, _UINT32))
 
     def uint64(self, name: str) -> int:
-        """Return a field's 64-bit number. Raise BagFormatError if it is missing or has another size."""
+        """Return a field's 64-bit number. Raise BagFormatError if the field is missing or does not have 8 bytes."""
         return int(self._number(name, _UINT64))
 
     def time(self, name: str) -> int:
-        """Return a field's time in nanoseconds. Raise BagFormatError if it is missing or has another size."""
+        """Return a field's time in nanoseconds. Raise BagFormatError if the field is missing or does not have 8 bytes."""
         value = self.field(name)
         if len(value) != 8:
             raise BagFormatError(f'error reading field "{name}": it has {len(value)} bytes', self.position)
@@ -301,7 +303,7 @@ def parse_records(buffer: bytes, position: int = 0) -> Iterator[Record]:
 def parse_fields(header: bytes, position: int | None = None) -> Fields:
     """Return the fields of a header without its length prefix.
 
-    Raise BagFormatError, which contains ``position``, if a field is damaged.
+    Raise BagFormatError if a field is damaged; the error contains ``position``.
     """
     fields: Fields = {}
     at, end = 0, len(header)

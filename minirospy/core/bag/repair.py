@@ -39,7 +39,10 @@ class _Content(NamedTuple):
 
     @property
     def has_wrong_time(self) -> bool:
-        """True if a message has a time that no index can contain: over 999,999,999 nanoseconds in the last 32-bit second."""
+        """True if a message has a time that no index can contain.
+
+        Such a time has more than 999,999,999 nanoseconds in the last second of the 32-bit range.
+        """
         return any(each[0] >= _END_OF_TIME for each in self.messages)
 
     def info(self, position: int) -> ChunkInfo:
@@ -65,7 +68,7 @@ class _Edit(NamedTuple):
 
 
 class _Rewriting:
-    """Applies edits to a file, in order and in place; buffers output that would overwrite bytes that are not read yet."""
+    """Applies edits to a file, in order and in place; buffers output that would overwrite bytes that have not been read yet."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
@@ -88,7 +91,7 @@ class _Rewriting:
             self._put(block)
 
     def replace(self, edit: _Edit) -> None:
-        """Write the edit's bytes instead of those at its position."""
+        """Write the edit's replacement instead of the bytes in its range."""
         self._read = edit.end
         self._put(edit.data)
 
@@ -230,7 +233,7 @@ class Repair:
         return self._add(record, content, limit)
 
     def _check_connections(self, content: _Content) -> None:
-        """Raise BagFormatError if a connection differs from the one in previous chunks, so that this chunk cannot be trusted."""
+        """Raise BagFormatError if a connection differs from the same one in previous chunks, so that the chunk is unreliable."""
         for number, connection in content.connections.items():
             known = self.connections.get(number, connection)
             if (known.topic, known.type, known.md5sum) != (
@@ -257,7 +260,7 @@ class Repair:
         return self.end
 
     def _keep_index(self, record: Record, content: _Content, limit: int) -> int:
-        """Schedule a chunk's index records to be rewritten if they are damaged; return the position after them."""
+        """Schedule a chunk's index records for rewriting if they are damaged; return the position after them."""
         end, entries = _read_index(self._stream, record.end, limit)
         is_whole = entries == content.entries
         if is_whole and is_record(self._stream, end, limit):
@@ -277,7 +280,7 @@ class Repair:
         return following
 
     def _go_on(self, position: int, error: BagFormatError, limit: int) -> int:
-        """Return the position of the next chunk after damage, or ``limit`` if there is none."""
+        """Return the position of the next chunk after the damage, or ``limit`` if there is none."""
         following = next_chunk(self._stream, position + 1, limit)
         end = limit if following is None else following
         is_saved = self._read_partial(position, end, limit)
@@ -293,8 +296,8 @@ class Repair:
     def _read_partial(self, position: int, end: int, limit: int) -> bool:
         """Recover the messages in an uncompressed chunk whose size is wrong; return whether there are any.
 
-        At the end of the file recover every complete message; elsewhere recover all messages or none, checked against the
-        chunk's index records.
+        At the end of the file, recover every complete message. Elsewhere, check the messages against the chunk's index
+        records, and recover all of them or none.
         """
         record = _partial_chunk(self._stream, position, limit)
         if record is None:
@@ -308,7 +311,8 @@ class Repair:
         data_end = record.data_position + content.end
         _, entries = _read_index(self._stream, data_end, limit)
         if end < limit and _times(entries) != _times(content.entries):
-            return False  # if only the offsets are wrong, accept the entries: the index is rewritten
+            # if only the offsets are wrong, accept the entries, because the index is rewritten
+            return False
         self._add_connections(content)
         self.chunks.append(content.info(position))
         self.end = end
@@ -324,7 +328,7 @@ class Repair:
         return True
 
     def _report_lost(self) -> None:
-        """Report the number of missing messages if the bag's own index still contains the total."""
+        """Report the number of missing messages, if the bag's own index still contains the total number."""
         lost = self._total - sum(sum(chunk.counts.values()) for chunk in self.chunks)
         if self._infos_left == 0 and lost > 0:
             self.problems.append(f"{lost} of {self._total} messages are lost")
@@ -389,7 +393,7 @@ class _Any:
 
 
 def _partial_chunk(stream: BinaryIO, position: int, limit: int) -> Record | None:
-    """Return the record of an uncompressed chunk whose data is truncated, or None if the record is something else."""
+    """Return the record of an uncompressed chunk whose data is truncated, or None if the record is not such a chunk."""
     try:
         stream.seek(position)
         head = stream.read(min(4096, limit - position))

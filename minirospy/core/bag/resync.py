@@ -12,7 +12,7 @@ __all__ = ["is_record", "next_chunk"]
 _BLOCK = 1024 * 1024
 _MARK = b"\x04\0\0\0op=\x05"  # the field ``op`` in a chunk's header
 
-# Possible lengths of the fields that a writer may have put before ``op``: size, compression, or both
+# Possible total lengths of the fields that a writer may have put before ``op``: size, compression, or both
 _BEFORE = (0, 13, 19, 20, 32, 33)
 
 
@@ -39,7 +39,8 @@ def next_chunk(stream: BinaryIO, start: int, limit: int) -> int | None:
             at = block.find(_MARK, at + 1)
         if position + len(block) >= limit:
             return None
-        # Let the blocks overlap: the mark may cross the block's end, and the header starts before the mark.
+        # Let the blocks overlap, because the mark may cross the end of the block, and the header starts before the
+        # mark.
         position += max(len(block) - len(_MARK) - 4 - _BEFORE[-1], 1)
     return None
 

@@ -31,7 +31,10 @@ class TopicTimes(NamedTuple):
 
 
 class Timeline:
-    """A bag's index by topic. ``topics``: name -> topics that have messages. Raise BagFormatError if the index is damaged."""
+    """A bag's index by topic. ``topics`` maps the name of each topic that has messages to its times.
+
+    Raise BagFormatError if the index is damaged.
+    """
 
     def __init__(self, reader: BagReader) -> None:
         self._reader = reader
@@ -52,7 +55,7 @@ class Timeline:
         return (min(times[0] for times in every), max(times[-1] for times in every)) if every else None
 
     def density(self, topic: str, start: int, end: int, bins: int) -> list[int]:
-        """Return how many messages a topic has in each of ``bins`` equal parts from ``start`` to ``end``, both included."""
+        """Return a topic's message counts in ``bins`` equal parts of the time from ``start`` to ``end``, both included."""
         counts = [0] * bins
         borders = [start + (end + 1 - start) * number // bins for number in range(bins + 1)]
         for times in self.topics[topic].times:

@@ -91,7 +91,7 @@ class _Stream:
 
 
 class _Complete(NamedTuple):
-    """A complete chunk to be written: functions that return its data, its size, and the contents of its index."""
+    """A complete chunk to be written: functions that return its data, the data's size, and the contents of the chunk's index."""
 
     is_ready: Callable[[], bool]
     data: Callable[[], list[Buffer]]
@@ -113,10 +113,10 @@ class Continued(NamedTuple):
 class BagWriter:
     """Writes a bag of version 2.0 to a binary stream, which it does not close. Use it in one thread at a time.
 
-    ``chunk_threshold``, in bytes, may be changed at any time. ``executor`` compresses chunks in parallel; without
-    one, the calling thread does. If more than ``most_waiting`` chunks are queued for compression, :meth:`write` blocks.
-    ``continued``: append to the bag in the stream, overwriting its index. Raise BagCompressionError if the compression
-    is unknown or its library is missing.
+    ``chunk_threshold``, in bytes, may be changed at any time. ``executor`` compresses chunks in parallel; without one,
+    the calling thread compresses them. If more than ``most_waiting`` chunks are queued for compression, :meth:`write`
+    blocks. ``continued``: append to the bag in the stream, overwriting its index. Raise BagCompressionError if the
+    compression is unknown or its library is missing.
 
     After the stream has raised OSError, for example on a full disk, :meth:`salvage` turns the written part into a readable
     bag; this requires an unbuffered stream. Buffering gains nothing here, because each chunk is written in one piece.
@@ -140,7 +140,8 @@ class BagWriter:
         self._streams: dict[int, _Stream] = {}
         self._next_id = 0
         self._complete: deque[_Complete] = deque()
-        self._waiting = 0  # bytes in the complete chunks that are not written yet, before compression
+        # total size before compression of the complete chunks that have not been written yet, in bytes
+        self._waiting = 0
         self._written = (0, 0)  # bytes of data in the written chunks: before compression, and as stored
         self._closed = False
         self._small = bytearray()
@@ -299,9 +300,9 @@ class BagWriter:
     def salvage(self, written: int | None = None) -> int:
         """Close a bag whose stream has failed; return the number of lost messages.
 
-        Removes incomplete chunks, and as many before them as necessary to free space for the index. ``written``: bytes of the
-        bag that are known to have reached the disk, if not everything written before the error has. Raise OSError if even an
-        empty bag does not fit.
+        Removes incomplete chunks, and as many before them as necessary to free space for the index. ``written``: number
+        of the bag's bytes that are known to have reached the disk, if that is not everything written before the error.
+        Raise OSError if even an empty bag does not fit.
         """
         lost = sum(len(one.entries) // _ENTRY.size for one in self._used)
         lost += sum(sum(one.counts.values()) for one in self._complete)
@@ -391,7 +392,7 @@ class BagWriter:
         return future.done, (lambda: [future.result()])
 
     def _write_complete(self, left: int) -> None:
-        """Write the complete chunks that are ready, and wait for others until at most ``left`` remain."""
+        """Write the complete chunks that are ready, then wait for the other chunks until at most ``left`` remain."""
         while self._complete:
             chunk = self._complete[0]
             if len(self._complete) <= left and not chunk.is_ready():

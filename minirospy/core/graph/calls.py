@@ -46,11 +46,14 @@ Answer = list[object]  # ``[status code, message, value]``
 _MAX_CHARACTERS = 4096  # maximum length of a name, a type or a URI
 
 _MAX_URIS = 20_000
-"""Maximum URIs per list; checking them takes some milliseconds, which block the node. No master has as many for a topic."""
+"""Maximum number of URIs in a list, because checking them blocks the node for some milliseconds.
+
+No master has as many for a topic.
+"""
 
 
 class CallRefused(MinirospyError):
-    """An argument is not acceptable; ``str()`` is the message in the response."""
+    """An argument is invalid; ``str()`` is the message in the response."""
 
 
 class Parameter(NamedTuple):
@@ -61,7 +64,7 @@ class Parameter(NamedTuple):
 
 
 class Method(NamedTuple):
-    """A method: the function to call with the caller_id and the arguments, and the value in a response that refuses the call."""
+    """A method: the function to call with the caller_id and the arguments, and the value to return if the call is refused."""
 
     function: Callable[..., Answer | Steps[Answer]]
     refused: object

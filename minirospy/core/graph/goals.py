@@ -26,7 +26,7 @@ __all__ = [
 
 
 class GoalState(IntEnum):
-    """A goal's status as the server publishes it, with the numbers in actionlib_msgs/GoalStatus."""
+    """A goal's status as the server publishes it. The numbers are those in actionlib_msgs/GoalStatus."""
 
     PENDING = 0
     ACTIVE = 1
@@ -63,7 +63,7 @@ class SimpleState(IntEnum):
 
 
 class GoalEvent(Enum):
-    """A server's action on a goal, or a request for one. The value describes the resulting state, for messages."""
+    """A server's action on a goal, or a request for one. The value describes the resulting state, for use in messages."""
 
     ACCEPT = "an active state"
     CANCEL_REQUEST = "a cancel requested state"
@@ -183,10 +183,10 @@ CLIENT_STEPS: Mapping[int, _Steps] = {
     },
     _C.DONE: _ENDED,
 }
-"""The client's transitions: the states that it passes through, in order, when it receives a goal's status.
+"""The client's transitions: the states that the client passes through, in order, when it receives a goal's status.
 
-A client may miss a status, because each list replaces the previous one, so a status may lead through several states.
-A status that is not listed is invalid in that state.
+A client may miss a status, because each published status list replaces the previous one. Therefore a status may lead
+through several states. A status that is not listed is invalid in that state.
 """
 
 _NONE: Mapping[int, SimpleStep] = dict.fromkeys(ClientState, SimpleStep.NONE)
@@ -207,7 +207,7 @@ SIMPLE_STEPS: Mapping[int, Mapping[int, SimpleStep]] = {
         _C.DONE: SimpleStep.WRONG,
     },
 }
-"""The simple client's transitions: its state -> the client's new state -> the effect."""
+"""The simple client's transitions: a dict from its state and the client's new state to the effect."""
 
 _VISIBLE: Mapping[int, GoalState] = {_G.PREEMPTING: _G.ACTIVE, _G.RECALLING: _G.PENDING}
 
@@ -215,7 +215,7 @@ _VISIBLE: Mapping[int, GoalState] = {_G.PREEMPTING: _G.ACTIVE, _G.RECALLING: _G.
 def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
     """Return the states that a client in ``state`` passes through on receiving ``status``, or None if the status is invalid.
 
-    Raise KeyError if servers never publish the status.
+    Raise KeyError if the status is one that servers never publish.
     """
     if status not in CLIENT_STEPS[_C.WAITING_FOR_GOAL_ACK]:
         raise KeyError(status)
@@ -223,9 +223,10 @@ def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
 
 
 def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -> bool:
-    """Return whether a cancel request applies to a goal: by id, by a stamp up to the request's, or to all (neither given).
+    """Return whether a cancel request applies to a goal.
 
-    Stamps are in nanoseconds; zero means none.
+    It applies to the goal with its id, to goals whose stamp is not later than its stamp, or, without id and stamp, to all
+    goals. Stamps are in nanoseconds; zero means none.
     """
     if not cancel_id and not cancel_stamp:
         return True

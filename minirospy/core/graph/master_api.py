@@ -46,9 +46,9 @@ __all__ = ["PARAMETERS", "MasterApi", "Notice", "key_of_node", "nothing"]
 
 _log = logging.getLogger(__name__)
 
-_FEW = 200  # nodes to notify in one step
+_FEW = 200  # maximum number of nodes to notify in one step
 
-_ROWS = 500  # rows of a table to collect in one step
+_ROWS = 500  # maximum number of table rows to collect in one step
 
 PARAMETERS = ""  # represents parameters in :meth:`MasterApi.defer`; no topic has this name
 
@@ -63,7 +63,8 @@ class MasterApi(ABC):
         self.registry = Registry()
         self.parameters = ParameterTree()
         self.log: Callable[[str], object] = nothing  # called with a line for each registration
-        self.record: Callable[..., object] = nothing  # called with each change, as the journal stores it
+        # called for each change, with the record that the journal stores
+        self.record: Callable[..., object] = nothing
         self.store: Callable[[object], Steps[int]] = _store_nothing
         """Writes a large value to the journal, and returns the number by which a change refers to it."""
 
@@ -178,7 +179,7 @@ class MasterApi(ABC):
     def collect_system_state(self) -> Steps[Answer]:
         """Return the response to :meth:`get_system_state`, in steps."""
         if self.registry.is_large:
-            # Build one list at a time, so that there is not one in memory for each waiting client.
+            # Build one list at a time, so that there is not one in memory for each client that waits for a response.
             yield ALONE
         publishers = yield from _collect(self.registry.publisher_rows())
         subscribers = yield from _collect(self.registry.subscriber_rows())
@@ -386,7 +387,7 @@ class MasterApi(ABC):
     # --- helpers
 
     def _run(self, steps: Steps[Answer], actions: int) -> Answer | Steps[Answer]:
-        """Return the response immediately if it needs few actions, otherwise the steps that compute it."""
+        """Return the response immediately if it requires only a few actions, otherwise the steps that compute it."""
         return finish(steps) if actions <= _FEW else steps
 
     def _act_first(self, actions: Iterable[Notice]) -> Iterator[Notice]:
@@ -413,7 +414,7 @@ class MasterApi(ABC):
 
 
 def _collect(rows: Iterator[tuple[object, ...]]) -> Steps[list[list[object]]]:
-    """Return a table's rows as lists."""
+    """Return a table's rows, each as a list."""
     table: list[list[object]] = []
     while found := [list(row) for row in islice(rows, _ROWS)]:
         table += found

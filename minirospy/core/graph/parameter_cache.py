@@ -45,7 +45,7 @@ class ParameterCache:
             self._values[key] = value
 
     def changed(self, key: str) -> None:
-        """Invalidate the values that a change of ``key`` affects: itself, those below it, and the namespaces that contain it."""
+        """Invalidate the values of ``key``, of the keys below it, and of the namespaces that contain it."""
         changed = _with_slash(key)
         self._changes += 1
         for known in list(self._values):

@@ -19,7 +19,7 @@ from minirospy.core.graph.shares import Excess, Shares, holder_of
 
 __all__ = ["ParameterTree", "ParameterUpdate", "ParametersFullError", "weigh_in_steps"]
 
-# levels of namespaces and dictionaries; together with the response, they must fit into XML-RPC's 64 levels
+# Maximum nesting of namespaces and dictionaries; together with the response, they must fit into XML-RPC's 64 levels
 _MAX_DEPTH = 56
 
 _MAX_INT = 2**31
@@ -54,7 +54,7 @@ class ParametersFullError(MinirospyError):
 
 
 class ParameterUpdate(NamedTuple):
-    """Notify the node at ``uri`` of the value of ``key`` (which ends in a slash), {} if it is not set."""
+    """Notify the node at ``uri`` that ``key`` (which ends in a slash) has this value, or {} if it is not set."""
 
     uri: str
     key: str
@@ -79,10 +79,10 @@ class ParameterTree:
         # changed.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
-        # The subscribed keys, sorted, so that those below a namespace are adjacent.
+        # The subscribed keys, sorted, so that the keys below a namespace are adjacent.
         self._keys: list[str] = []
         self._shares = Shares(MAX_SUBSCRIPTIONS, MAX_OF_ONE, FEW_RESERVE, FEW)
-        # A node's URI -> its keys, each with the number of node names that subscribed to it.
+        # Dict from a node's URI to its keys, each with the number of node names that subscribed to it.
         self._keys_of: dict[str, dict[str, int]] = {}
         self._most = most
         self._reserve = reserve
@@ -109,7 +109,7 @@ class ParameterTree:
 
     @property
     def is_large(self) -> bool:
-        """Return whether a list of all names uses so much memory that only one should be built at a time."""
+        """Return whether a list of all names would use so much memory that only one should be built at a time."""
         return self._bytes > _MANY_BYTES
 
     def is_small_at(self, key: str, most: int = SMALL_ITEMS) -> bool:
@@ -124,7 +124,10 @@ class ParameterTree:
         return self._most if weight <= SMALL else self._most - self._reserve
 
     def make_room(self, weight: int) -> Steps[None]:
-        """Recount the memory, because replaced values are still counted. Raise ParametersFullError if it does not suffice."""
+        """Recalculate the memory in use, because it may include replaced values.
+
+        Raise ParametersFullError if there is still too little.
+        """
         if not self.has_room(weight):
             before = self._bytes
             counted = yield from weigh_in_steps("/", self.get("/"))
@@ -133,10 +136,10 @@ class ParameterTree:
                 raise ParametersFullError(f"no more than {self._most_for(weight) // 1024**2} MiB in memory")
 
     def set(self, key: str, value: object, caller_id: str, weight: int = 0) -> Iterator[ParameterUpdate]:
-        """Set a value of ``weight`` bytes; a dictionary replaces the namespace.
+        """Set a value of ``weight`` bytes; a dictionary replaces the whole namespace.
 
-        If a parameter has the name of a namespace in ``key``, the namespace replaces it. Raise ValueError if the root
-        would not be a dictionary.
+        If ``key`` is below an existing parameter that is not a namespace, a new namespace replaces that parameter. Raise
+        ValueError if the root would not be a dictionary.
         """
         path = _split(key)
         if path:
@@ -204,7 +207,7 @@ class ParameterTree:
         return found
 
     def subscribe(self, key: str, caller_id: str, uri: str) -> object:
-        """Notify the node at ``uri`` of changes at, below or above ``key``; return its value, {} if it is not set.
+        """Subscribe the node at ``uri`` to changes at, below or above ``key``; return the key's value, {} if it is not set.
 
         Raise ParametersFullError if there are too many subscriptions.
         """
@@ -325,7 +328,7 @@ _UNSET = object()
 def weigh_in_steps(key: str, value: object) -> Steps[int]:
     """Return approximately how many bytes of memory a value uses.
 
-    Raise ValueError if no response could contain the value: it would make the namespaces above ``key`` unreadable.
+    Raise ValueError if no response could contain the value, because it would make the namespaces above ``key`` unreadable.
     """
     if not _split(key) and not isinstance(value, dict):
         raise ValueError("cannot set root of parameter tree to non-dictionary")

@@ -32,7 +32,7 @@ _FEW_BYTES, _MANY_BYTES = 50_000, 2_000_000
 
 
 class PublisherUpdate(NamedTuple):
-    """Send the subscriber at ``uri`` the complete list of a topic's publishers, as it is at the time of sending."""
+    """Send the subscriber at ``uri`` the complete list of a topic's publishers, as the list is at the time of sending."""
 
     uri: str
     topic: str
@@ -57,7 +57,7 @@ class Registered(NamedTuple):
 
 
 class _NodeEntry:
-    """A node's name and URI, and its registrations: name -> kinds of registration, as bits."""
+    """A node's name and URI, and its registrations: a dict from name to kinds of registration, as bits."""
 
     __slots__ = ("entries", "holder", "name", "size", "uri")
 
@@ -94,7 +94,7 @@ class Registry:
     """
 
     def __init__(self, shares: Shares | None = None) -> None:
-        """Create an empty registry; ``shares`` limits the bytes that the nodes on each host and port may use."""
+        """Create an empty registry; ``shares`` limits how many bytes the nodes on each host and port may use."""
         self.changes = 0  # increases whenever publishers, subscribers or services may have changed
         self._shares = shares or registry_limits.new_shares()
         self._nodes: dict[str, _NodeEntry] = {}
@@ -127,7 +127,10 @@ class Registry:
         return self._updates(topic)
 
     def register_subscriber(self, node: str, topic: str, type_: str, uri: str) -> Registered:
-        """Register ``node`` as a subscriber to ``topic``; type "*" matches any type and does not become the topic's type."""
+        """Register ``node`` as a subscriber to ``topic``.
+
+        The type "*" matches any type, and is not stored as the topic's type.
+        """
         actions = self._claim(node, uri, topic, SUBSCRIBES, type_)
         entry = self._enter(node, topic, SUBSCRIBES)
         _row(self._subscribers, topic)[entry.name] = entry.uri
@@ -198,7 +201,7 @@ class Registry:
 
     @property
     def is_large(self) -> bool:
-        """Return whether a list of all registrations uses so much memory that only one should be built at a time."""
+        """Return whether a list of all registrations would use so much memory that only one should be built at a time."""
         return self._shares.total > _MANY_BYTES
 
     @property
@@ -212,7 +215,7 @@ class Registry:
         return entry.uri if entry else None
 
     def nodes(self) -> dict[str, str]:
-        """Return node -> URI of its Slave API, for all nodes."""
+        """Return a dict from each node to the URI of its Slave API."""
         return {name: entry.uri for name, entry in self._nodes.items()}
 
     def service_uri(self, service: str) -> str | None:
@@ -303,7 +306,7 @@ class Registry:
     def _claim(self, node: str, uri: str, name: str, kind: int, text: str = "") -> Iterable[Action]:
         """Record that ``node`` at ``uri`` registers ``name`` with a type or a service URI.
 
-        If the node name is registered from another address, remove those registrations and stop that node. Raise
+        If the same node name is registered from another address, remove those registrations and stop the node there. Raise
         RegistryFullError if a limit is exceeded.
         """
         entry = self._nodes.get(node)
@@ -390,7 +393,7 @@ class Registry:
             self._types.leave(topic, entry.name, others)
 
     def _updates(self, *topics: str) -> Iterator[Action]:
-        """Yield an update for each subscriber to the topics, with the publishers at the time of yielding."""
+        """Yield an update for each subscriber to the topics, with the list of publishers at the time of yielding."""
         for topic in topics:
             for uri in list(self._subscribers.get(topic, {}).values()):
                 yield PublisherUpdate(uri, topic)

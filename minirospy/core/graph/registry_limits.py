@@ -1,6 +1,6 @@
-"""The registry's limits: the memory that registrations use, and the share for the nodes on one host and port.
+"""The registry's limits: the memory for all registrations, and the share of it for the nodes on one host and port.
 
-Pure. Sizes are those in 64-bit CPython: a registered name is in up to four tables.
+Pure. Sizes are those in 64-bit CPython; each registered name is in up to four tables.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class RegistryFullError(MinirospyError):
 
 
 def new_shares() -> Shares:
-    """Return the shares of registration memory for each host and port, with none of the memory in use."""
+    """Return empty shares of the registration memory, for each host and port."""
     return Shares(MAX_BYTES, MAX_OF_ONE, RESERVE, FEW_OF_ONE)
 
 
@@ -84,7 +84,7 @@ def node_cost(name: str, uri: str) -> int:
 
 
 def name_cost(name: str, kind: int, kinds: int) -> int:
-    """Return the bytes for registering a name as ``kind`` if it is already registered as ``kinds``."""
+    """Return the number of bytes for registering a name as ``kind`` that is already registered as ``kinds``."""
     if kinds & kind:
         return 0
     text = text_cost(name)

@@ -13,7 +13,7 @@ __all__ = ["MAX_PUBLISHERS", "Connect", "Disconnect", "SubscriptionPlan"]
 
 MAX_PUBLISHERS = 1000  # maximum publishers of one topic that a node connects to
 
-# New publishers to connect to together, and the seconds between groups, so that not all refusals arrive at once
+# New publishers to connect to at a time, and seconds between these groups, so that not all refusals arrive together
 _CONNECTS_AT_ONCE, _CONNECT_PAUSE = 100, 0.01
 
 _FIRST_DELAY = 0.1
@@ -36,11 +36,11 @@ class Disconnect:
 
 
 class SubscriptionPlan:
-    """The publishers in the master's list, and each one's number of failures.
+    """The publishers in the master's list, each with its number of failures.
 
-    A link that closes while the master still lists its publisher is retried, with pauses that double: the master reports
-    unregistered publishers, but not broken cables. A publisher that refused is called again at the topic's next
-    update, because it may publish another type by then.
+    If a link closes while the master still lists the publisher, the node reconnects, with pauses that double: the master
+    reports unregistered publishers, but not broken cables. A publisher that refused the connection is called again when the
+    topic's publishers next change, because it may publish another type by then.
     """
 
     def __init__(self) -> None:
@@ -49,7 +49,7 @@ class SubscriptionPlan:
         self._refusals: set[str] = set()
 
     def publishers_changed(self, uris: Iterable[str], *, keep: bool = False) -> list[Connect | Disconnect]:
-        """Apply the master's list: the complete list, or with ``keep`` one that lacks some existing publishers.
+        """Apply the master's list of publishers. It is complete, or, with ``keep``, lacks some existing publishers.
 
         Publishers beyond MAX_PUBLISHERS are ignored, because any process may send a list.
         """
@@ -64,7 +64,7 @@ class SubscriptionPlan:
         return [*map(Disconnect, gone), *map(Connect, new, delays)]
 
     def failures(self, uri: str) -> int:
-        """Return how often the link to ``uri`` has failed in a row."""
+        """Return how many times in a row the link to ``uri`` has failed."""
         return self._failures.get(uri, 0)
 
     def worked(self, uri: str) -> None:
@@ -73,12 +73,12 @@ class SubscriptionPlan:
             self._failures[uri] = 0
 
     def refused(self, uri: str) -> None:
-        """Record that the publisher at ``uri`` refuses this subscriber, so that it is not retried with the same result."""
+        """Record that the publisher at ``uri`` refused this subscriber, and would do so again if retried."""
         if uri in self._failures:
             self._refusals.add(uri)
 
     def lost(self, uri: str) -> Connect | None:
-        """Return the next attempt to connect to ``uri`` after its link has closed, or None if it is no longer listed."""
+        """Return the next attempt to connect to ``uri``, whose link has closed, or None if the publisher is no longer listed."""
         if uri not in self._failures:
             return None
         failures = self._failures[uri]

@@ -1,6 +1,6 @@
 """The types of topics: of registered topics and, as in rosmaster, of some that are no longer registered.
 
-Pure. The memory for a type in use is counted for one of the nodes that register its topic.
+Pure. The memory for a type in use counts towards the share of one of the nodes that register its topic.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from minirospy.core.graph.registry_limits import text_cost
 
 __all__ = ["TopicTypes"]
 
-_MAX_OLD = 10_000  # maximum unregistered topics whose types are stored
+_MAX_OLD = 10_000  # maximum number of unregistered topics whose types are stored
 _MAX_OLD_BYTES = 4 * 1024 * 1024  # memory limit for these types
 
 _TYPE_BYTES = 100  # approximate size of a type without its string
@@ -33,7 +33,7 @@ class TopicTypes:
     def __init__(self, count: Callable[[str, int], object]) -> None:
         self._count = count
         self._types: dict[str, _Type] = {}
-        # The unregistered topics, the latest last, and the bytes that their types use.
+        # The unregistered topics, the most recent last, and the bytes that their types use.
         self._old: dict[str, None] = {}
         self._old_bytes = 0
 
@@ -53,7 +53,7 @@ class TopicTypes:
         return iter([(topic, type_.text) for topic, type_ in self._types.items()])
 
     def cost(self, topic: str, type_: str) -> int:
-        """Return the bytes for a type, minus those of the type that it replaces, for a node that registers the topic."""
+        """Return the bytes for a type, minus those of the type that it replaces, to count for a node that registers the topic."""
         before = self._types.get(topic)
         if before and before.node:
             return max(0, text_cost(type_) - text_cost(before.text))
@@ -78,7 +78,7 @@ class TopicTypes:
             self.set(topic, before.text if before else type_, node)
 
     def keep(self, topic: str, type_: str) -> None:
-        """Store the type of a topic that is no longer registered, as the most recent of those."""
+        """Store the type of a topic that is no longer registered, as the most recent one."""
         before = self._types.get(topic)
         if before and before.node:
             return

@@ -27,7 +27,7 @@ _KEPT = {"uint8", "char", "string", "time", "duration"}
 
 
 def arrays_from_bytes(message: Message, numpy: ModuleType) -> Message:
-    """Convert the number arrays in a message that was just deserialized to numpy arrays; return the message."""
+    """Convert the number arrays in a message that was just deserialized into numpy arrays; return the message."""
     raw = getattr(message, "_raw", {})
 
     for name, base, is_array in _fields(_class_of(message)):

@@ -37,11 +37,11 @@ __all__ = [
 CDR_HEADER = bytes((0, 1, 0, 0))
 """The encapsulation of plain CDR version 1, little-endian; the last two bytes are options, which readers ignore."""
 
-_SPARE = 10_000  # elements that take no bytes, in addition to one for each byte of the message
+_SPARE = 10_000  # number of zero-size elements allowed, in addition to one element per message byte
 
 
 class Side(Enum):
-    """The messages that have an item. If one lacks it, it is skipped when read, or written as zeros."""
+    """The messages that contain an item: both, or only one. In the other direction the item is skipped, or written as zeros."""
 
     BOTH = 0
     ROS1 = 1
@@ -63,7 +63,7 @@ class Text(NamedTuple):
 
 
 class Sequence(NamedTuple):
-    """Elements that each have the layout ``items``; ``length`` is None if it varies."""
+    """Elements that each have the layout ``items``; ``length`` is None if their number varies."""
 
     items: tuple[Item, ...]
     length: int | None = None
@@ -102,7 +102,7 @@ def make_transcoder(name: str, layout: Layout) -> Transcoder:
                 f"{name}: these bytes are not plain CDR version 1: they start with {bytes(data[:4]).hex()}"
             )
         if not big:
-            # From a machine with the other byte order, which is rare, so this is generated on first use.
+            # Converts messages from a machine with the other byte order; these are rare, so generate it on first use.
             generated = _Generator(is_cdr_source=True, swaps=True).function(layout)
             big.append(_compiled(f"{name} from big-endian CDR", generated))
         return big[0](data)
@@ -146,7 +146,7 @@ _UNKNOWN = _Position(1, 0)
 
 
 class _Walk:
-    """Computes positions through layouts; caches the results, since layouts are nested."""
+    """Computes positions through layouts; caches the results, because layouts are nested."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[int, _Position], _Position] = {}
@@ -192,7 +192,7 @@ class Block(NamedTuple):
 
 
 def _is_nothing(item: Item) -> bool:
-    """Return whether an item has no bytes in either message: an array of length 0."""
+    """Return whether an item has no bytes in either message, because it is an array of length 0."""
     return (isinstance(item, Fixed) and not item.number) or (isinstance(item, Sequence) and item.length == 0)
 
 
@@ -204,7 +204,7 @@ def block_of(layout: Layout) -> Block | None:
             return None
         width = max(width, item.width)
         offset += item.width * item.number
-    # Padding depends on the first member; only if it is the widest one, the elements need no padding in between.
+    # Padding depends on the first member: unless it is the widest one, elements may need padding in between.
     if not offset or offset % width or not isinstance(layout[0], Fixed) or layout[0].width != width:
         return None
     return Block(width, offset)
@@ -260,14 +260,17 @@ class _Constant(NamedTuple):
 
 
 class _Length(NamedTuple):
-    """A length that is read into a local variable, and the expression that is written; none if it is not written."""
+    """A length: the local variable to read it into, and the expression to write.
+
+    The expression is None if the length is not written.
+    """
 
     local: str
     written: str | None
 
 
 _Token = Union[_Copy, _Swap, _Skip, _Zeros, _Constant, _Length]  # noqa: UP007 - evaluated
-"""What the generated function does with the next bytes. Do not compare tokens: named tuples of two classes may be equal."""
+"""The generated function's operation on the next bytes. Do not compare tokens: named tuples of two classes may be equal."""
 
 
 class _Generator:
@@ -280,7 +283,8 @@ class _Generator:
         self._absent = Side.ROS1 if is_cdr_source else Side.ROS2  # items missing in the source message
         self._walk = _Walk()
         self._position = _Position(8, 0)
-        self._tokens: list[_Token] = []  # pending: merged and written as few lines by _flush()
+        # pending items, which _flush() merges and writes in as few lines as possible
+        self._tokens: list[_Token] = []
 
     def function(self, layout: Layout) -> str:
         line = self._source.line
@@ -345,7 +349,7 @@ class _Generator:
             self._align(4)
             self._position = _UNKNOWN
         if not self._is_read(item):
-            # An empty string; in CDR it consists of a NUL.
+            # Write an empty string, which in CDR consists of a NUL.
             self._tokens.append(_Zeros(4) if self._is_cdr_source else _Constant(b"\1\0\0\0\0"))
             return
 
@@ -439,7 +443,7 @@ class _Generator:
             return
         last = self._tokens[-1] if self._tokens else None
         if isinstance(last, _Zeros) and last.size == 1:
-            # The NUL of a string, and the padding after it.
+            # Remove the tokens of a string's NUL, and of the padding after it.
             self._tokens.pop()
             self._flush()
             self._source.line(f"add(_NUL[~at & {mask}])")
@@ -450,9 +454,9 @@ class _Generator:
         self._source.line(f"at += -at & {mask}")
 
     def _length(self, side: Side, *, is_text: bool) -> str:
-        """Read a length after the pending tokens, and write it if both messages have it; return its local name.
+        """Generate code that reads a length after the pending tokens; return its local name.
 
-        The length of a text includes the trailing NUL in CDR.
+        The code writes the length if both messages have it. In CDR a string's length includes the trailing NUL.
         """
         count = self._source.local("count")
         if side is not Side.BOTH:
@@ -563,7 +567,7 @@ _PADDING = tuple(bytes(count) for count in range(8))
 
 
 def _compiled(name: str, source: str) -> Callable[..., bytes]:
-    """Execute the source of a function, which contains no text of a definition, only sizes and names generated here."""
+    """Execute the source of a function, which contains only sizes and names generated here, no text from a definition."""
     file = f"<generated {name}>"
     names: dict[str, object] = {
         "DeserializationError": DeserializationError,

@@ -1,9 +1,9 @@
 """Generate a message's ``serialize`` and ``deserialize`` as straight-line Python code.
 
 The fields are in byte order, with nested messages expanded. Consecutive fixed-size values, and the length of the
-following field, share one compiled ``struct``; an array of fixed-size messages is one ``iter_unpack``. Reading never goes
-beyond the data: ``struct`` raises, a slice that is too short is detected at the end, and the number of elements that
-consist of slices, or of no bytes, is checked before the loop.
+following field, share one compiled ``struct``; an array of fixed-size messages is one ``iter_unpack``. Reading never
+goes beyond the data: ``struct`` raises, a slice that is too short is detected at the end, and the number of elements is
+checked before the loop if they consist of slices or have no bytes.
 """
 
 from __future__ import annotations
@@ -19,12 +19,15 @@ from minirospy.core.idl.spec import PRIMITIVES, Field, FieldType, MessageSpec
 __all__ = ["keeps_buffer", "lazy_arrays", "write_deserialize", "write_serialize"]
 
 _BYTES = {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8}
-_SPARE = 10_000  # maximum elements without bytes, in addition to one per byte in the message
+_SPARE = 10_000  # maximum number of elements without bytes, in addition to one per byte in the message
 _TIMES = {"time": "_Time", "duration": "_Duration"}
 
 
 class _Leaf(NamedTuple):
-    """A field; fields are in the order of their bytes. ``path`` is the Python expression that it is read from or assigned to."""
+    """A field of a basic type; leaves are in the order of their bytes.
+
+    ``path`` is the Python expression for reading or assigning it.
+    """
 
     path: str
     type: FieldType
@@ -377,9 +380,9 @@ class _Reader:
     def _fields(
         self, chunks: list[_Chunk], names: dict[str, str], lazy: dict[str, str] | None = None
     ) -> dict[str, str]:
-        """Generate code that reads the chunks, but of lazy arrays only the bytes.
+        """Generate code that reads the chunks, but only slices out the bytes of lazy arrays.
 
-        Return field name -> local name of its bytes.
+        Return a dict from field name to the local name of its bytes.
         """
         raw: dict[str, str] = {}
         for chunk in chunks:
@@ -400,7 +403,7 @@ class _Reader:
         return f"{names.get(owner, owner)}{dot}{name}"
 
     def _run(self, chunk: _Chunk, names: dict[str, str], arguments: str) -> str:
-        """Generate code that reads a run and the following length; return the length's local name, or the length itself."""
+        """Generate code that reads a run and the length that follows; return the length's local name, or the length itself."""
         letters = "".join(leaf.letters for leaf in chunk.run)
         targets = []
 
@@ -435,7 +438,10 @@ class _Reader:
         return count
 
     def _slice(self, size: str, whole: bool = False) -> str:
-        """Return an expression for the next bytes. ``whole``: the bytes are stored, so they must not reference the buffer."""
+        """Return an expression for the next bytes.
+
+        ``whole``: the message stores the bytes, so they must not reference the buffer.
+        """
         self._slices = True
         part = f"data[end : (end := end + {size})]"
         return f"bytes({part})" if whole and self._keeps_buffer else part
@@ -469,7 +475,7 @@ class _Reader:
         spec = None if type_.is_primitive else self._lookup(type_.base)
         least = _least_size(spec, self._lookup) if spec else 0
         if spec and not least:
-            # The elements have no bytes: without this limit a short message could contain any number of them.
+            # The elements have no bytes, so without this limit a short message could claim any number of them.
             self._line(f"spare -= {count}")
             with self._source.block("if spare < 0:"):
                 self._line('raise genpy.DeserializationError("a length is longer than the message")')

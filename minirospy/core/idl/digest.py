@@ -12,7 +12,8 @@ from minirospy.core.idl.spec import MessageSpec, ServiceSpec
 from minirospy.core.idl.validate import MAX_LEVELS
 
 try:
-    # Like hashlib without OpenSSL: loading OpenSSL takes 2 ms, and it refuses MD5 in FIPS mode.
+    # Use the same module as hashlib without OpenSSL, because loading OpenSSL takes 2 ms, and it refuses MD5 in FIPS
+    # mode.
     from _md5 import md5  # type: ignore[import-not-found]
 except ImportError:
     from hashlib import md5
@@ -65,7 +66,7 @@ def dependencies(spec: MessageSpec, lookup: Lookup) -> list[str]:
 
 
 def full_text(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return a message's text and the texts of all types that it uses, each after a line of 80 ``=``."""
+    """Return a message's full text: its definition, and those of all types that it uses, each after a line of 80 ``=``."""
     return joined_texts(spec.text, ((name, lookup(name).text) for name in dependencies(spec, lookup)))
 
 
@@ -82,7 +83,7 @@ def _md5(text: str) -> str:
 def _md5_text(
     spec: MessageSpec, lookup: Lookup, around: tuple[str, ...], known: dict[str, str] | None = None
 ) -> str:
-    """Return the text for the md5sum; ``around``: the messages that contain this one; ``known``: md5sums computed so far."""
+    """Return the text for the md5sum. ``around``: the messages that contain this one; ``known``: md5sums computed so far."""
     if spec.full_name in around:
         raise DefinitionError(around[0], 1, f"[{spec.full_name}] contains itself")
     if len(around) > MAX_LEVELS:

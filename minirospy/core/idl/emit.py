@@ -93,7 +93,7 @@ _HELPERS = {
         "            return value",
     ],
 }
-"""Helper functions in a module: name -> lines, in the order in which they are emitted."""
+"""Helper functions in a module: a dict from name to lines, in the order in which they are emitted."""
 
 
 def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
@@ -125,7 +125,7 @@ def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
 
 
 def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[str] = ("",)) -> str:
-    """Return the ``__init__`` for a package's msg or srv folder. Module ``_Name`` has ``Name`` with each suffix in ``parts``.
+    """Return the ``__init__`` for a package's msg or srv folder. Module ``_Name`` defines ``Name`` with each suffix in ``parts``.
 
     Each module is loaded when one of its names is first used. Raise DefinitionError if a name is not legal in Python.
     """
@@ -191,7 +191,7 @@ class _Module:
 
     @property
     def classes(self) -> dict[str, str]:
-        """The classes of the fields: ``pkg/Name`` -> name in the module."""
+        """The classes of the fields: a dict from ``pkg/Name`` to the name in the module."""
         return dict(self._source.classes)
 
     def source(self, messages: list[MessageSpec], service: ServiceSpec | None, origin: str) -> str:
@@ -328,10 +328,10 @@ class _Module:
 
 
 def _is_even(letters: str) -> bool:
-    """Return whether ``struct`` adds no padding between these format characters, some of which are floats.
+    """Return whether ``struct`` adds no padding between these format characters, which include floats.
 
-    Return False for 32-bit floats: in native byte order a value that is too large would become infinity and not raise
-    OverflowError.
+    Return False for 32-bit floats, because in native byte order a value that is too large would become infinity instead of
+    raising OverflowError.
     """
     kinds = {letter for letter in letters if letter.isalpha()}
     return "d" in kinds and kinds <= set("dqQ")

@@ -49,7 +49,7 @@ _SEPARATOR = "=" * 80
 
 
 class Catalogue:
-    """The definitions in some packages: package name -> its folder. Each spec is parsed once.
+    """The definitions in some packages, from a dict of package name to folder. Each spec is parsed once.
 
     A package's definitions are the files in its folders msg, srv and action, or, if ``definitions`` contains the package,
     only the files listed there.
@@ -78,7 +78,7 @@ class Catalogue:
         return cls(found)
 
     def files(self, package: str, kind: str) -> Mapping[str, Path]:
-        """Return a package's definitions of one kind (msg, srv, action): name -> file."""
+        """Return a package's definitions of one kind (msg, srv, action), as a dict from name to file."""
         if package in self._definitions:
             return self._definitions[package][kind]
         return {path.stem: path for path in sorted((self.packages[package] / kind).glob(f"*.{kind}"))}
@@ -164,7 +164,7 @@ _OF_OTHER_LANGUAGES = {
     "double": "float64",
     "str": "string",
     "boolean": "bool",
-}  # name of a type in C++ or Python -> ROS type
+}  # dict from the name of a type in C++ or Python to the ROS type
 
 
 def read_definition(path: Path) -> str:
@@ -176,7 +176,7 @@ def read_definition(path: Path) -> str:
 
 
 def compile_package(catalogue: Catalogue, package: str) -> dict[str, str]:
-    """Compile a package's definitions to Python: file below the package's folder (``msg/_Bool.py``) -> its text.
+    """Compile a package's definitions to Python; return a dict from file path in the package (``msg/_Bool.py``) to source text.
 
     The result includes stubs with the types of fields and constructors, and the empty ``py.typed``, which makes mypy use
     them (PEP 561). Raise DefinitionError if a definition is invalid, NotFoundError if one uses a type that does not exist.
@@ -229,7 +229,7 @@ def _on_demand(sources: dict[str, str]) -> dict[str, str]:
     kept = {name: text for name, text in sources.items() if not _is_module(name)}
     for name, text in kept.items():
         if name.endswith("__init__.py"):
-            # This replaces the code that emit_package generates, which would be repeated in each such file.
+            # These lines replace the code that emit_package generates, which would be repeated in each such file.
             names = " ".join(sorted(_module_name(each) for each in sources if _is_in(each, name)))
             kept[name] = (
                 f"{text.partition('import importlib')[0]}from minirospy.core.idl.on_demand import load_package\n\n"
@@ -254,8 +254,8 @@ def _is_module(name: str) -> bool:
 def write_if_changed(path: Path, text: str) -> bool:
     """Write a file unless it already has this text; return whether it was written.
 
-    The new modification time is at least a second later than before, because Python recognizes an outdated compiled module by
-    the source's size and its time in seconds.
+    The new modification time is at least a second later than the old one, because Python recognizes an outdated
+    compiled module by the source's size and its time in seconds.
     """
     data = text.encode()
     earliest = 0
@@ -308,7 +308,7 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
     if len(text) > MAX_TEXT:
         raise DefinitionError(full_name, 1, f"its definition has more than {MAX_TEXT} characters")
     specs: dict[str, MessageSpec] = {}
-    # The separator includes the newline before it, so a text without a trailing newline does not get one.
+    # The separator includes the newline before it, so do not add one to a text without a trailing newline.
     for number, part in enumerate(text.split(f"\n{_SEPARATOR}\n")):
         name, body = full_name, part
         if number:
@@ -375,7 +375,7 @@ def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> 
     try:
         exec(compile(source, file, "exec"), module.__dict__)
     except (SyntaxError, RecursionError, MemoryError, OverflowError, struct.error) as error:
-        # Python has its own limits, for example on nested loops: arrays of arrays of arrays.
+        # Python has its own limits, for example on nested loops, which nested arrays generate.
         raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
     found: type[Message] = module.__dict__[name.partition("/")[2]]
     # Use genpy's naming, because programs that read bags look for `_sensor_msgs__Image`.
@@ -387,18 +387,18 @@ def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> 
     return found
 
 
-# Id -> class created at run time, so that unpickling a message finds its class
+# Dict from id to a class created at run time, so that unpickling a message finds its class
 _running: weakref.WeakValueDictionary[int, type[Message]] = weakref.WeakValueDictionary()
 
 
 def _reduced(message: Any) -> tuple[Any, ...]:
-    """Return how pickle and copy should recreate a message whose class is in no module: from the class's full text."""
+    """Return how pickle and copy can recreate a message whose class is in no module: from the class's full text."""
     kind = type(message)
     return _unpickled, (id(kind), kind._type, kind._full_text), message.__getstate__()
 
 
 def _unpickled(key: int, type_: str, text: str) -> Message:
-    """Return a new message whose class was created at run time; in another process, create the class again."""
+    """Return a new message whose class was created at run time. In another process, create the class again."""
     found = _running.get(key)
     if found is None or (found._type, found._full_text) != (type_, text):
         found = class_from_text(type_, text)

@@ -124,7 +124,10 @@ class Message:
         return self._slot_types
 
     def _check_types(self, exc: Exception | None = None) -> None:
-        """Raise SerializationError for the first field with an invalid value, or for ``exc`` if there is no such field."""
+        """Raise SerializationError for the first field with an invalid value.
+
+        If there is no such field, raise it for ``exc``, if given.
+        """
         # After an error, find the field that cannot be written; otherwise check everything that genpy checks.
         checks = _STRICT_CHECKS if exc is None else _CHECKS
         for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
@@ -188,8 +191,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
     if len(args) == 1:
         only = args[0]
         if isinstance(only, data_class) or getattr(only, "_md5sum", None) == data_class._md5sum:
-            # The class comes from another generator, or was created from another text, but the serialized bytes are
-            # the same.
+            # The class comes from another generator or another text, but its serialized bytes are the same.
             return cast("_M", only)
         if isinstance(only, Message) and len(data_class.__slots__) >= 1 and not _takes(data_class, only):
             raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")
@@ -200,7 +202,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
 
 
 def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] | None = None) -> None:
-    """Fill ``msg`` from values as YAML represents them: a list of its field values, or a list with one dictionary of them.
+    """Fill ``msg`` from values parsed from YAML: a list of its field values, or a list with one dictionary of them.
 
     ``keys`` are words that represent values ("now", "auto"). Raise MessageException if a name or the number
     of values does not match, ValueError if a value cannot be assigned to its field.
@@ -252,7 +254,7 @@ def strify_message(
 ) -> str:
     """Return a value as YAML text, in the format that `rostopic echo` prints.
 
-    ``field_filter`` selects the fields of a message; ``fixed_numeric_width`` pads numbers;
+    ``field_filter`` selects the fields of a message; ``fixed_numeric_width`` pads numbers to that width;
     ``time_offset`` is subtracted from times.
     """
     if isinstance(val, bool) or val is None:
@@ -328,7 +330,7 @@ def _number(value: object, width: int | None) -> str:
 
 
 def _number_or_text(value: object, width: int | None) -> str:
-    """Return an item as text, for a list whose first item is a number but which may also contain strings."""
+    """Return an item as text; the list's first item is a number, but the list may also contain strings."""
     if isinstance(value, str):
         return repr(value) if width is None else _quoted(value)
     return _number(value, width)
@@ -382,7 +384,7 @@ def _check_message_type(name: str, expected: str, found: str) -> None:
 
 
 def _is_array(value: object) -> bool:
-    """Return whether a value is a numpy array and not a number."""
+    """Return whether a value is a numpy array, as opposed to a number."""
     return getattr(value, "ndim", 0) != 0
 
 
@@ -423,7 +425,7 @@ _CHECKS: dict[str, _Check] = {
     "time": _check_time,
     "duration": _check_time,
     **dict.fromkeys(_INTEGERS, _check_integer),
-}  # check whether a value can be written
+}  # functions that check whether a value can be written
 
 
 def _check_strict_integer(name: str, type_: str, value: object) -> None:
@@ -456,7 +458,7 @@ _STRICT_CHECKS: dict[str, _Check] = {
     **dict.fromkeys(("float32", "float64"), _check_strict_float),
     **dict.fromkeys(("time", "duration"), _check_strict_time),
     **dict.fromkeys(_INTEGERS, _check_strict_integer),
-}  # checks like genpy's that also accept numpy's numbers, which genpy's messages can contain anyway
+}  # checks that are like genpy's but also accept numpy's numbers, which genpy's messages can contain anyway
 
 
 def _check_array(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> None:
@@ -539,7 +541,7 @@ def _filled_array(name: str, type_: str, values: object, words: Mapping[str, obj
     filled = []
     for value in values:
         element = element_class()
-        # The path in genpy's errors starts at the element.
+        # In genpy's errors, the path starts at the element.
         _fill(element, value, words, "")
         filled.append(element)
     return filled

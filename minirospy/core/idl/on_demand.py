@@ -33,7 +33,7 @@ def load_package(
     """Make the modules in ``pkg.msg`` or ``pkg.srv`` importable.
 
     Return the package's ``__getattr__``, ``__dir__`` and ``__all__``. ``names``: its messages or services, separated by
-    spaces. ``fingerprint`` differs if the text of any of its modules differs.
+    spaces. ``fingerprint`` changes if the source of any of its modules changes.
     """
     if _FINDER not in sys.meta_path:
         sys.meta_path.append(_FINDER)
@@ -54,7 +54,7 @@ def load_package(
 
 
 class _Finder:
-    """The last entry in ``sys.meta_path``, so that a module that exists as a file is found first."""
+    """The last finder in ``sys.meta_path``, so that a module that exists as a file is found first."""
 
     def __init__(self) -> None:
         self.packages: dict[str, int] = {}
@@ -82,7 +82,7 @@ class _Loader(SourceFileLoader):
         self._fingerprint = fingerprint
 
     def path_stats(self, path: str | bytes) -> dict[str, int]:
-        """Return the values that Python compares a cached module with; the source's size is not known in advance."""
+        """Return the values with which Python compares a cached module; the source's size is not known in advance."""
         return {"mtime": self._fingerprint, "size": 0}
 
     def set_data(self, path: str, data: ReadableBuffer, *, _mode: int = 0o666) -> None:

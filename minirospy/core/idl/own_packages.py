@@ -1,4 +1,4 @@
-"""The message packages included in minirospy: their folder, and those compiled in advance in the wheel."""
+"""The message packages included in minirospy: their folder, and which of them the wheel contains in compiled form."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ COMPILED_AHEAD = frozenset(
         "visualization_msgs",
     ]
 )
-"""Packages whose modules are files in the wheel: those of ROS itself and of the workshop, which most programs import."""
+"""Packages whose modules are files in the wheel: the packages of ROS itself and of the workshop, which most programs import."""
 
 _OURS = Path(__file__).parents[2]
 

@@ -68,7 +68,7 @@ def parse_action(text: str, package: str, name: str, where: str = "") -> ActionS
 
     lines = {"Goal": parts[0][1], "Result": parts[1][1], "Feedback": parts[2][1]}
     messages = tuple(
-        # Add this line at the start as genaction.py does, so that full texts equal those in real ROS.
+        # Add this line at the start, as genaction.py does, so that full texts equal those in real ROS.
         _parse(_GENERATED + body, package, name + suffix, where, lines.get(suffix, 1) - 1)
         for suffix, body in texts.items()
     )
@@ -155,7 +155,7 @@ def _parse_constant(type_: FieldType, rest: str, line: str, where: str, number: 
     if type_.is_array or type_.base in ("time", "duration") or not type_.is_primitive:
         raise DefinitionError(where, number, f"a constant cannot be of type [{type_}]")
     if type_.base == "string":
-        # A string constant is the rest of its line, including comment characters.
+        # The value of a string constant is the rest of its line, including comment characters.
         text = line.split("=", 1)[1].strip()
         return Constant(name, type_.base, text, text)
     text = rest.split("=", 1)[1].strip()
@@ -180,5 +180,5 @@ def _constant_value(type_: str, text: str) -> bool | int | float:
 
 
 def _cut(text: str) -> str:
-    """Return a text shortened and escaped for a one-line error."""
+    """Return a string shortened and escaped for a one-line error."""
     return escaped(text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "...")

@@ -122,7 +122,7 @@ class ActionGoal(Stamped, Protocol):
 
 
 class ActionResult(Stamped, Protocol):
-    """The message that an action server sends at the end of a goal."""
+    """The message that an action server sends when a goal ends."""
 
     @property
     def status(self) -> GoalStatus:
@@ -134,7 +134,7 @@ class ActionResult(Stamped, Protocol):
 
 
 class ActionFeedback(Stamped, Protocol):
-    """The message that an action server sends during a goal."""
+    """The message that an action server sends while it executes a goal."""
 
     @property
     def status(self) -> GoalStatus:

@@ -13,10 +13,10 @@ __all__ = ["to_response"]
 def to_response(response_class: type[Message], returned: object) -> Message:
     """Return a response of ``response_class`` created from a handler's return value.
 
-    That may be a response, a dictionary of some of its fields, a list or tuple of all its field values, or the value of its
-    only field. If the value does not match, raise ServiceException with rospy's message.
+    The handler may return a response, a dictionary of some of its fields, a list or tuple of all its field values, or the
+    value of its only field. If the value does not match, raise ServiceException with rospy's message.
     """
-    # The same type may have another class, from a reloaded module or a third-party generator.
+    # The same type may have a different class, from a reloaded module or a third-party generator.
     if getattr(type(returned), "_type", None) == response_class._type:
         return cast("Message", returned)
     if returned is None:

@@ -24,8 +24,8 @@ class Source:
     def __init__(self) -> None:
         self.lines: list[str] = []
         self.structs: dict[str, str] = {}
-        """Format characters for ``struct`` -> name of the compiled struct in the module."""
-        self.classes: dict[str, str] = {}  # ``pkg/Name`` -> name of the class in the module
+        """Dict from format characters for ``struct`` to the name of the compiled struct in the module."""
+        self.classes: dict[str, str] = {}  # dict from ``pkg/Name`` to the name of the class in the module
         self.helpers: set[str] = set()  # names of the helpers in ``emit`` that the module needs
         self._indent = ""
         self._taken: set[str] = set()
@@ -64,14 +64,14 @@ class Source:
         """Return the name of a message's class, which is unique within the module."""
         if full_name not in self.classes:
             name = "_" + full_name.replace("/", "_")
-            # Otherwise a/b_C and a_b/C would have equal names, and struct/I that of a compiled struct.
+            # Otherwise a/b_C and a_b/C would have the same name, and struct/I the name of a compiled struct.
             while name in self.classes.values() or (name.startswith("_struct_") and name[-1] != "_"):
                 name += "_"
             self.classes[full_name] = name
         return self.classes[full_name]
 
     def local(self, stem: str) -> str:
-        """Return a local name that is unused in this function. It ends in a digit, so that it hides no other name."""
+        """Return a local name that is unused in this function. The name ends in a digit, so that it hides no other name."""
         number = self._last.get(stem, 0) + 1
         while f"{stem}{number}" in self._taken:
             number += 1

@@ -24,7 +24,7 @@ PRIMITIVES = {
     "duration": "ii",
     "string": "",
 }
-"""Primitive type -> its format characters for ``struct``; a string has none."""
+"""Dict from primitive type to its format characters for ``struct``; a string has none."""
 
 
 class FieldType(NamedTuple):

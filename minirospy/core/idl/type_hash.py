@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 __all__ = ["Fields", "type_hash"]
 
 Fields = Mapping[str, str]
-"""Field name -> type: ``uint8``, ``double[3]``, ``sequence<std_msgs/Header>``, ``sequence<float64, 3>``."""
+"""Dict from field name to type: ``uint8``, ``double[3]``, ``sequence<std_msgs/Header>``, ``sequence<float64, 3>``."""
 
 _IDS = {
     "int8": 2, "uint8": 3, "int16": 4, "uint16": 5, "int32": 6, "uint32": 7, "int64": 8, "uint64": 9, "float32": 10,
@@ -23,10 +23,10 @@ _EMPTY = {"structure_needs_at_least_one_member": "uint8"}
 
 
 def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
-    """Return ``RIHS01_`` and 64 digits for a type.
+    """Return the hash of a type: ``RIHS01_`` and 64 digits.
 
     ``name`` and the types of fields are ``pkg/Name`` for messages, else ``pkg/srv/Name_Request`` and similar; ``fields``
-    returns a type's fields, and may raise. Raise ValueError if a field's type cannot occur in messages.
+    returns a type's fields; its exceptions are passed on. Raise ValueError if a field's type cannot occur in messages.
     """
     known: dict[str, object] = {}
 
@@ -63,7 +63,7 @@ def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
 
 
 def _described(text: str) -> tuple[int, int, str]:
-    """Return a field's type: its number, its maximum number of elements, and the message name, if it is a message."""
+    """Return a field's type as type number, maximum number of elements, and message name, or "" if it is not a message."""
     added, capacity, base = 0, 0, text
     if text.startswith("sequence<"):
         base, _, bound = text[len("sequence<") : -1].partition(",")

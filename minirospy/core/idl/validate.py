@@ -21,9 +21,10 @@ from minirospy.core.idl.spec import PRIMITIVES, MessageSpec
 
 __all__ = ["MAX_LEVELS", "MAX_TEXT", "check_spec", "check_type_name", "check_types", "is_type_name"]
 
-MAX_TEXT = 1 << 20  # characters in a full text; the largest ones in real packages have some 30,000
+# maximum number of characters in a full text; the largest ones in real packages have some 30,000
+MAX_TEXT = 1 << 20
 
-MAX_LEVELS = 50  # levels of nested messages
+MAX_LEVELS = 50  # maximum depth of nested messages
 
 # Maximum fields per message, including those of inner messages, which the generated source expands
 _MAX_FIELDS = 4_000
@@ -31,7 +32,7 @@ _MAX_FIELDS = 4_000
 # Maximum fields in all types that a message uses; the largest message in MoveIt has some 17,000
 _MAX_FIELDS_IN_ALL = 32_000
 
-_MAX_BYTES = 1 << 27  # memory limit for a message's fixed-length arrays
+_MAX_BYTES = 1 << 27  # maximum total size in bytes of a message's fixed-length arrays in memory
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _SHOWN = 80
@@ -94,7 +95,7 @@ def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list
     try:
         order = list(TopologicalSorter(needed).static_order())
     except CycleError as error:
-        # In graphlib's list of the cycle, the first name appears twice.
+        # In graphlib's list of the cycle, the first name is repeated at the end.
         around = spec.full_name if spec.full_name in error.args[1] else error.args[1][0]
         raise DefinitionError(spec.full_name, 1, f"[{around}] contains itself") from None
 
@@ -142,7 +143,7 @@ def _check_size(where: str, size: _Size) -> None:
 
 
 def _shown(text: str) -> str:
-    """Return a peer's text for a one-line error, printable and shortened."""
+    """Return a peer's text for a one-line error: printable and shortened."""
     text = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
     # Escape non-ASCII letters, because a letter in another script may look like an ASCII letter.
     return text if text.isascii() and text.isprintable() else ascii(text)[1:-1]

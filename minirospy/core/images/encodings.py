@@ -51,7 +51,7 @@ def _type(depth: str, channels: int) -> int:
 
 
 def is_converted_by_opencv(source: str, wanted: str) -> bool:
-    """Return whether a conversion needs OpenCV, which is the case from a Bayer pattern or YUV to colors."""
+    """Return whether a conversion needs OpenCV: only conversions from a Bayer pattern or YUV to colors do."""
     return (
         _kind(source) in ("bayer", _YUV)
         and _kind(wanted) == "color"
@@ -102,7 +102,7 @@ def _kind(encoding: str) -> str:
 
 
 def _recolored(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Return an image with another encoding's channels, but its own depth."""
+    """Return an image with another encoding's channels, but the depth unchanged."""
     import numpy as np
 
     if source == _YUV and wanted.startswith("mono"):
@@ -129,7 +129,7 @@ def _recolored(image: Pixels, source: str, wanted: str) -> Pixels:
 
 
 def _of_depth(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Return an image with another depth: 8 and 16 bits are scaled, other depths are rounded and clipped."""
+    """Return an image converted to another depth: 8 and 16 bits are scaled, other depths are rounded and clipped."""
     import numpy as np
 
     depths = list(DEPTHS)

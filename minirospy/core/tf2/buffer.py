@@ -77,7 +77,7 @@ class TransformBuffer(FrameTree):
         return StampedTransform(second.stamp, *compose(second[1:], first[1:]))
 
     def why_not(self, target: str, source: str, time: int) -> str | None:
-        """Return None if :meth:`lookup` would succeed, else the message from tf2's can_transform.
+        """Return None if :meth:`lookup` would succeed, else the error message that tf2's can_transform gives.
 
         Raise InvalidArgumentException if a frame name is invalid.
         """
@@ -93,7 +93,7 @@ class TransformBuffer(FrameTree):
     def why_not_full(
         self, target: str, target_time: int, source: str, source_time: int, fixed: str
     ) -> str | None:
-        """Return None if :meth:`lookup_full` would succeed, else the message from tf2's can_transform.
+        """Return None if :meth:`lookup_full` would succeed, else the error message that tf2's can_transform gives.
 
         Raise InvalidArgumentException if a frame name is invalid.
         """
@@ -103,7 +103,8 @@ class TransformBuffer(FrameTree):
         target_frame, source_frame = self._frames.get(target), self._frames.get(source)
         fixed_frame = self._frames.get(fixed)
         if target_frame is None or source_frame is None:
-            # Report the fixed frame as missing if the source frame is, as tf2 does, which tests the wrong frame.
+            # If the source frame is missing, report the fixed frame as missing, as tf2 does, which tests the wrong
+            # frame.
             missing = "" if source_frame else f" fixed_frame: {fixed}does not exist."
             return self._unknown(target, source) + missing
         if fixed_frame is None:
@@ -181,8 +182,8 @@ class TransformBuffer(FrameTree):
     def _walk(self, time: int, target: Frame, source: Frame) -> _Walk:
         """Return the samples from the source and from the target up to their common ancestor; the frames must differ.
 
-        Both paths lead up to the root, or to a frame for which the source's path has no data: the part above the common
-        ancestor cancels out. Raise the same exceptions as :meth:`lookup`.
+        Both paths lead up to the root, or to a frame for which the source's path has no data. The parts above the common
+        ancestor are omitted, because they cancel out. Raise the same exceptions as :meth:`lookup`.
         """
         if time == 0:
             time = self._common_time(target, source)

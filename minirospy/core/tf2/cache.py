@@ -12,12 +12,12 @@ from minirospy.core.tf2.rotation import slerp
 
 __all__ = ["Frame", "Misfit", "Sample", "StaticCache", "TimeCache", "seconds"]
 
-# Maximum expired samples before the lists are shortened, so that not every insertion moves all samples
+# Maximum number of expired samples before the lists are shortened, so that not every insertion moves all samples
 _COMPACT_ABOVE = 32
 
 
 def seconds(nanoseconds: int) -> float:
-    """Return a time in seconds, rounded as in C++; for current times this determines the last digits that are printed."""
+    """Return a time in seconds, rounded as in C++; for present-day times the rounding determines the last printed digits."""
     whole, rest = divmod(nanoseconds, 1_000_000_000)
     return whole + 1e-9 * rest
 
@@ -30,7 +30,7 @@ class Misfit(Enum):
 
 
 class Frame:
-    """A frame that occurs in a transform: its cache (None if it is only a parent), and the sender of its last sample."""
+    """A frame that occurs in a transform: its cache (None if it is only a parent), and the authority of its last sample."""
 
     __slots__ = ("authority", "cache", "name", "settled")
 
@@ -121,7 +121,7 @@ class TimeCache:
         )
 
     def latest(self) -> tuple[int, Frame] | None:
-        """Return the newest stamp and its parent, or None if there are no samples."""
+        """Return the stamp and parent frame of the newest sample, or None if there are no samples."""
         return (self._stamps[-1], self._samples[-1][0]) if self._stamps else None
 
     def why_not(self, time: int) -> str:

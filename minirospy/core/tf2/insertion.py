@@ -14,7 +14,7 @@ from minirospy.core.tf2.rotation import Quaternion, Vector
 
 __all__ = ["Refusal", "RefusalLog", "faults_of", "misfit_refusal"]
 
-_TOLERANCE = 0.01  # maximum difference of a quaternion's squared length from 1
+_TOLERANCE = 0.01  # maximum deviation of a quaternion's squared length from 1
 _PAUSE = 1.0
 _MAX_KEYS = 1000
 
@@ -25,13 +25,13 @@ class Refusal(NamedTuple):
     frame: str
     kind: str
     text: str
-    is_error: bool  # the transform itself is invalid; otherwise it is only too late, or a duplicate
+    is_error: bool  # True if the transform itself is invalid; False if it is only too late, or a duplicate
 
 
 def faults_of(
     parent: str, child: str, translation: Vector, rotation: Quaternion, authority: str
 ) -> list[Refusal]:
-    """Return all reasons why tf2 would reject this transform, independent of other data, in tf2's order."""
+    """Return all reasons why tf2 would reject this transform regardless of other transforms, in tf2's order."""
     found = []
 
     def add(kind: str, text: str) -> None:

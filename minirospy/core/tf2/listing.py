@@ -1,6 +1,6 @@
 """Lists of a buffer's frames: YAML that view_frames can parse, and a graph in graphviz's language.
 
-Source: http://wiki.ros.org/tf2/view_frames; the text equals that from tf2's BufferCore, byte for byte, except that
+Source: http://wiki.ros.org/tf2/view_frames; the text equals the output of tf2's BufferCore, byte for byte, except that
 quotation marks and backslashes in names are escaped in the graph, as graphviz requires.
 """
 
@@ -62,7 +62,7 @@ def _edge(frame: Frame, now: int) -> str:
 
 
 def _root(frame: Frame, now: int) -> str:
-    """Return the legend at a frame without a parent; if the frame has never had one, only if ``now`` is given."""
+    """Return the graph's legend for a frame without a parent; without ``now``, only if the frame once had a parent."""
     is_root = bool(now) if frame.cache is None else frame.cache.at(0) is None
     if not is_root:
         return ""

@@ -22,7 +22,7 @@ _COUNT = struct.Struct("<I")
 _HEAD = struct.Struct("<4I")
 _STAMP = struct.Struct("<2I")
 _BODY = struct.Struct("<7d")
-_BLOCK = 64  # messages after which a layout drops expired ones, in blocks of this size
+_BLOCK = 64  # number of messages in a block; a layout drops expired messages in blocks of this size
 _MAX_MESSAGES = 16_384
 _MAX_LAYOUTS = 16_384
 _MAX_SAME_LENGTH = 8
@@ -64,21 +64,21 @@ def read_transforms(data: bytes) -> list[TransformSample]:
 
 
 class Layout:
-    """The messages with the same frames in the same order."""
+    """The messages that contain the same frames in the same order."""
 
     def __init__(self, found: list[_Offsets]) -> None:
         self._offsets = found
         self._index = {offsets.child: index for index, offsets in enumerate(found)}
         self._arrivals: list[Arrival] = []
         self._dropped = 0  # number of messages before the first one in the list
-        # Per transform: number of messages decoded, counted from the first one ever received
+        # Per transform: index of the next message to decode, counted from the first one ever received
         self._decoded = [0] * len(found)
         # Per transform: the newest stamp when expired messages were last dropped
         self._newest = [0] * len(found)
 
     @property
     def children(self) -> list[str]:
-        """The child frames, in the order in the messages."""
+        """The child frames, in message order."""
         return [offsets.child for offsets in self._offsets]
 
     def keep(self, arrival: Arrival, span: int) -> list[str]:
@@ -87,7 +87,7 @@ class Layout:
         return [] if len(self._arrivals) % _BLOCK else self._drop_expired(span)
 
     def take(self, child: str) -> Iterator[tuple[int, str, TransformSample]]:
-        """Decode a frame's messages since the last call: yield (arrival number, authority, sample)."""
+        """Decode a frame's messages received since the last call: yield (arrival number, authority, sample)."""
         index = self._index[child]
         start = max(0, self._decoded[index] - self._dropped)
         self._decoded[index] = self._dropped + len(self._arrivals)
@@ -104,9 +104,9 @@ class Layout:
         """Drop the oldest blocks that no frame needs; return the frames to decode.
 
         A frame does not need messages that it has decoded, or whose samples its cache would have dropped. The cache drops
-        samples that are too old compared with the newest message, if it accepts that message: a valid transform, later
-        than those before. A frame whose newest message would be rejected must be decoded; then its messages can be
-        dropped too.
+        samples that are too old compared with the newest message, if it accepts that message, whose transform must be
+        valid and later than the previous ones. A frame whose newest message would be rejected must be decoded; then its
+        messages can be dropped too.
         """
         newest = [_sample(self._arrivals[-1].data, offsets) for offsets in self._offsets]
         moves_on = [
@@ -142,9 +142,9 @@ class Layouts:
     """All known layouts, looked up by a message's bytes."""
 
     def __init__(self) -> None:
-        # For messages with one transform: the bytes of its names, which are contiguous
+        # For messages with one transform: a dict from the contiguous bytes of its names to the layout
         self._single: dict[bytes, Layout] = {}
-        # Message length -> (mask of the constant bytes, their value, layout)
+        # Dict from message length to (mask of the constant bytes, their value, layout)
         self._several: dict[int, list[tuple[int, int, Layout]]] = {}
         self._count = 0
 
@@ -168,7 +168,7 @@ class Layouts:
         return None
 
     def add(self, data: bytes) -> Layout | None:
-        """Add and return a message's layout; return None if it has no frames, a duplicate, or there are too many layouts."""
+        """Add a layout for a message, and return it; return None if there are no frames, a duplicate, or too many layouts."""
         found = _find_transforms(data)
         children = {offsets.child for offsets in found}
         if not found or len(children) < len(found) or self._count >= _MAX_LAYOUTS:

@@ -78,8 +78,8 @@ def slerp(p: Quaternion, q: Quaternion, ratio: float) -> Quaternion:
 def compose(first: tuple[Vector, Quaternion], second: tuple[Vector, Quaternion]) -> tuple[Vector, Quaternion]:
     """Return the transform that applies ``second`` first, then ``first``.
 
-    It uses rotation matrices, as tf2 does to compose the two halves of a lookup with a fixed frame: they normalize the
-    quaternions and determine the sign of the result.
+    Uses rotation matrices, as tf2 does to compose the two halves of a lookup with a fixed frame. The matrices normalize
+    the quaternions and determine the sign of the result.
     """
     m, n = _matrix(first[1]), _matrix(second[1])
     product = _product(m, n)

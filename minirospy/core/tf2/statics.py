@@ -1,7 +1,7 @@
 """Combine static transforms from many publishers in one latched message. Pure.
 
-A publisher latches only its last message, and the bridge is a single publisher for all publishers in the other ROS.
-Therefore it publishes the newest transform of each frame, as a static transform broadcaster does.
+A publisher latches only its last message, and the bridge is a single publisher that represents all publishers on the
+other side. Therefore it publishes the newest transform of each frame, as a static transform broadcaster does.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ TF_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 
 _LENGTH = struct.Struct("<I")
 _STAMP = 12
-_NUMBERS = 56  # bytes of a header's number and time, and a translation and rotation
+_NUMBERS = 56  # bytes of a header's sequence number and time, and of a translation and rotation
 MAX_FRAMES = 10_000
 MAX_BYTES = 8 << 20
 
 
 class StaticTransforms:
-    """Stores the newest transform to each frame, as bytes: at most :data:`MAX_FRAMES` with :data:`MAX_BYTES` in total."""
+    """Stores the newest transform of each frame, as bytes: at most :data:`MAX_FRAMES` frames and :data:`MAX_BYTES` in total."""
 
     def __init__(self) -> None:
-        self.left_out = 0  # number of transforms to new frames beyond the limit
+        self.left_out = 0  # number of transforms omitted because their frames exceed the limit
         self._by_child: dict[bytes, bytes] = {}
         self._bytes = 0
 

@@ -21,8 +21,8 @@ DEFAULT_CACHE_TIME = 10_000_000_000  # nanoseconds
 class FrameTree:
     """The frame tree over the last ``cache_time`` nanoseconds.
 
-    ``on_refused`` is called with each rejected transform, inside the call that inserts it; for transforms from
-    :meth:`insert_message` this may be when the frame is looked up.
+    ``on_refused`` is called with each rejected transform, inside the call that inserts it. Transforms from
+    :meth:`insert_message` may be inserted only when the frame is looked up.
     """
 
     def __init__(
@@ -32,9 +32,9 @@ class FrameTree:
     ) -> None:
         self.cache_time = cache_time
         self._on_refused = on_refused
-        self._frames: dict[str, Frame] = {}  # in order of first appearance, as in the listings
+        self._frames: dict[str, Frame] = {}  # in order of first appearance
         self._layouts = Layouts()
-        self._lazy: dict[str, list[Layout]] = {}  # child frame -> layouts that contain it
+        self._lazy: dict[str, list[Layout]] = {}  # dict from child frame to the layouts that contain it
         self._arrived = 0
 
     # --- inserting
@@ -52,8 +52,8 @@ class FrameTree:
     ) -> bool:
         """Insert the pose of ``child`` in ``parent`` at ``stamp``; return whether tf2 would accept it.
 
-        One leading slash is removed from names. ``is_static``: the pose is valid at every time, if the frame's first pose was
-        static too.
+        One leading slash is removed from names. ``is_static``: the pose is valid at every time, provided that the frame's
+        first pose was static too.
         """
         return self._insert(
             without_slash(parent), without_slash(child), stamp, translation, rotation, authority, is_static
@@ -104,7 +104,7 @@ class FrameTree:
         return list(self._frames)
 
     def frame_exists(self, name: str) -> bool:
-        """Return whether a transform has contained the frame."""
+        """Return whether any inserted transform contained the frame."""
         return name in self._frames
 
     def frames_as_string(self) -> str:
@@ -130,7 +130,7 @@ class FrameTree:
         authority: str,
         is_static: bool,
     ) -> bool:
-        """Insert a transform after earlier ones for the same frame."""
+        """Insert a transform; earlier ones for the same frame must have been inserted."""
         if child in self._lazy:
             self._settle(self._frames[child])
         return self._take(parent, child, stamp, translation, rotation, authority, is_static)

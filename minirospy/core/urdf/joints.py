@@ -103,7 +103,7 @@ def _link_of(element: Element, tag: str) -> str:
 
 
 def _part(element: Element, tag: str, read: Callable[[Element], _T], context: str) -> _T | None:
-    """Return the result of ``read`` for the first child with this tag, or None if there is none.
+    """Return the result of ``read`` for the first child element with this tag, or None if there is none.
 
     Raise ElementError if the child is invalid.
     """

@@ -29,7 +29,7 @@ _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 class ElementError(ValueError):
-    """An element is invalid: its line, and the messages that ROS prints about it, the cause first."""
+    """An element is invalid. Contains its line, and the messages that ROS prints about it, the cause first."""
 
     def __init__(self, line: int, *trail: str) -> None:
         super().__init__(line, *trail)

@@ -78,7 +78,7 @@ class Sphere(NamedTuple):
 
 
 class Mesh(NamedTuple):
-    """A mesh's file: a path or ``package://PACKAGE/PATH``."""
+    """A mesh file: a path or ``package://PACKAGE/PATH``."""
 
     filename: str
     scale: Vector = (1.0, 1.0, 1.0)
@@ -130,7 +130,7 @@ class Limit(NamedTuple):
 
 
 class Mimic(NamedTuple):
-    """Sets the joint's position to ``multiplier * position of joint + offset``."""
+    """Makes a joint follow another: its position is ``multiplier * position of joint + offset``."""
 
     joint: str
     multiplier: float = 1.0
@@ -138,7 +138,7 @@ class Mimic(NamedTuple):
 
 
 class Safety(NamedTuple):
-    """Limits for a controller, inside the joint's own limits."""
+    """The limits for a controller, inside the joint's own limits."""
 
     k_velocity: float
     k_position: float = 0.0

@@ -24,7 +24,7 @@ Quaternion = tuple[float, float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
 
 _EPSILON = 1e-12
-_POLE = 0.99999  # sine of the pitch above which roll and yaw cannot be distinguished
+_POLE = 0.99999  # sine of the pitch above which roll and yaw cannot be separated
 
 
 class Pose(NamedTuple):

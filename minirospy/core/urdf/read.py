@@ -1,4 +1,4 @@
-"""Parse a robot description into a Robot. As strict as ROS's parser about faults that would make a robot move wrongly.
+"""Parse a robot description into a Robot, as strictly as ROS's parser about faults that would make a robot move wrongly.
 
 If ROS's parser reports a fault and continues (an invalid shape or mass), the part is ignored and recorded in
 :attr:`Robot.problems`. Messages are the same as in ROS's parser; line numbers refer to the description.
@@ -155,7 +155,7 @@ def _find_root(file: str, line: int, links: dict[str, Link], joints: dict[str, J
 
 
 def _suspicions(robot: Robot) -> list[Problem]:
-    """Return the faults that ROS's parser silently accepts, but that a frame tree cannot have."""
+    """Return the faults that ROS's parser silently accepts but that a frame tree cannot contain."""
     found = []
     for joint in robot.joints.values():
         above = robot.parent_joint(joint.child)

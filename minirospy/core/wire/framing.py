@@ -35,7 +35,7 @@ __all__ = [
 
 CHUNK = 64 * 1024  # bytes per receive while messages are small
 
-LENGTH_BYTES = 4  # bytes in the length prefix of a frame or a connection header
+LENGTH_BYTES = 4  # bytes in the length prefix of a frame or of a connection header
 
 MAX_FRAME = 1024 * 1024 * 1024  # bytes; a longer frame is rejected as invalid
 
@@ -57,13 +57,13 @@ def parse_length(data: bytes) -> int:
 
 
 class LargeFrame(NamedTuple):
-    """A message to send that is too large to be joined: the pieces, in order, and their total size."""
+    """A message to send whose pieces are too large to be joined: the pieces, in order, and their total size."""
 
     pieces: tuple[bytes, ...]
     size: int
 
     def buffers(self, *, split: bool) -> list[bytes]:
-        """Return the buffers to send, as a split frame if that is requested and possible for this message."""
+        """Return the buffers to send: a split frame if ``split`` is set and this message can be split, else a normal frame."""
         first, *others = self.pieces
         if split and len(others) == 1 and may_split(first, len(others[0])):
             return [_TWO_LENGTHS.pack(self.size | SPLIT, len(others[0])) + first, *others]
@@ -71,7 +71,7 @@ class LargeFrame(NamedTuple):
 
 
 class Pieces(list[Any]):
-    """The target for a message's ``serialize``: joins small byte strings once, and large ones never."""
+    """The target for a message's ``serialize``: joins small byte strings once, and does not join large ones."""
 
     __slots__ = ()
     write = list.append
@@ -84,7 +84,7 @@ class Pieces(list[Any]):
             frame = b"".join(self)
             if len(frame) == size + 4:
                 return frame
-            # Join the pieces, because the len() of an array.array is not its number of bytes.
+            # Compute the size from the joined pieces, because the len() of an array.array is not its number of bytes.
             return serialize_frame(frame[4:])
 
         joined: list[bytes] = []
@@ -169,7 +169,7 @@ class FrameReader:
     ) -> None:
         self.skipped = 0  # number of skipped frames
         self.unfinished: tuple[int, bytes] | None = None
-        """The length of a large frame and its first bytes; the caller resets it to None."""
+        """The length of a large frame and its first bytes. The caller resets this to None."""
         self._gathers = gathers
         self._limit = limit
         self._skips = skips
@@ -190,7 +190,7 @@ class FrameReader:
         return self._wanted
 
     def put_back(self, data: bytes) -> None:
-        """Start with these few bytes; the buffer must be empty."""
+        """Store these few bytes as if they were received first; the buffer must be empty."""
         self._end = len(data)
         self._small[: self._end] = data
 
@@ -198,7 +198,7 @@ class FrameReader:
         """Return the memory for the next bytes. It is never empty."""
         if self._large is not None:
             if self._filled == len(self._large):
-                # Grow the buffer with the received bytes, so that a length prefix cannot allocate all the memory in
+                # Grow the buffer as bytes arrive, so that a length prefix alone cannot allocate all the memory in
                 # advance.
                 grown = bytearray(min(self._wanted, 2 * len(self._large)))
                 grown[: self._filled] = self._large

@@ -25,7 +25,7 @@ __all__ = [
     "serialize_response_head",
 ]
 
-MAX_BODY = 64 * 1024 * 1024  # bytes; a parameter may contain a robot's whole description
+MAX_BODY = 64 * 1024 * 1024  # bytes; a parameter may contain a whole robot description
 
 _MAX_HEAD = 64 * 1024
 _SHORT_HEAD = 512
@@ -50,7 +50,7 @@ class HttpHead(NamedTuple):
     headers: dict[str, str]
     method: str  # the method of a request
     keep_alive: bool  # the connection can be used for another request after this one
-    # length of the body if a Content-Length is the only header that specifies it, else -1
+    # the body's length if Content-Length is the only header that specifies it, else -1
     plain_length: int
 
 
@@ -108,11 +108,12 @@ class HttpReader:
         self._buffer = bytearray()
         self._ended = False
         self._in_body = False
-        # The bytes fed so far may contain another message.
+        # True if the bytes fed so far may contain another message.
         self._has_more = False
-        # The part of a chunked body that has been removed from the buffer.
+        # The part of a chunked body received so far, already removed from the buffer.
         self._chunked: bytearray | None = None
-        self.wants_continue = False  # the peer waits for :meth:`continue_line` before it sends its body
+        # True if the peer waits for :meth:`continue_line` before it sends its body
+        self.wants_continue = False
 
     @property
     def is_idle(self) -> bool:
@@ -121,7 +122,7 @@ class HttpReader:
 
     @property
     def in_chunks(self) -> bool:
-        """Return whether the current message has a chunked body, for which a few bytes may contain many chunks."""
+        """Return whether the current message has a chunked body, because even a few bytes of it may contain many chunks."""
         return self._chunked is not None
 
     @property
@@ -196,7 +197,7 @@ class HttpReader:
         return _CONTINUE
 
     def _parse(self, head: HttpHead | None) -> Generator[HttpMessage | None, None, None]:
-        """Yield the messages in the buffer, and None when more bytes are needed; ``head`` has been removed already."""
+        """Yield the messages in the buffer, and None when more bytes are needed; ``head``, if given, has already been removed."""
         while True:
             if head is None:
                 head = _parse_head((yield from self._until(_end_of_head)))
@@ -277,7 +278,7 @@ class HttpReader:
         return whole
 
     def _more(self) -> Generator[None, None, None]:
-        """Wait until the buffer is filled."""
+        """Yield until more data is in the buffer."""
         if self._ended:
             raise RpcProtocolError("the peer ended inside a message")
         yield None

@@ -1,8 +1,8 @@
 """The master's journal as bytes: one record per change, each with a length prefix and a checksum.
 
-Pure. A file is the line ``minirospy journal 1``, then records: length (4 bytes, little-endian), CRC-32 of the
-rest (4 bytes), a msgpack array ``[what, argument, ...]``. Reading stops at an incomplete record, because the bytes after
-it may be inconsistent with the records before it.
+Pure. A file is the line ``minirospy journal 1``, then records: length (4 bytes, little-endian), CRC-32 of the rest (4
+bytes), a msgpack array ``[what, argument, ...]``. Reading stops at an incomplete record, because later bytes may be
+inconsistent with the records before it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _DATE, _DATE_TEXT = 1, 2
 
 
 class Recovered(NamedTuple):
-    """The complete records, their size in bytes including the file's first line, and the fault after them."""
+    """The complete records, their size in bytes including the file's first line, and a description of the fault after them."""
 
     records: list[list[Any]]
     size: int
@@ -46,7 +46,7 @@ def serialize_record(record: list[object]) -> bytes:
 
 
 def pack_in_steps(value: object) -> Iterator[bytes]:
-    """Yield a large value in pieces, which :func:`unpack` accepts joined.
+    """Yield a large value packed in pieces; joined, they can be passed to :func:`unpack`.
 
     Raise ValueError or TypeError if msgpack cannot represent a value.
     """

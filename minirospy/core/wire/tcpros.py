@@ -28,7 +28,7 @@ __all__ = [
 
 _NOT_A_NAME = "field [callerid] contains illegal chars"
 
-ANY = "*"  # type and md5sum of a peer that accepts any type
+ANY = "*"  # type and md5sum that a peer sends if it accepts any type
 
 
 class InterfaceType(NamedTuple):
@@ -47,7 +47,10 @@ class InterfaceType(NamedTuple):
 def subscriber_header(
     topic: str, type_: InterfaceType, caller_id: str, *, tcp_nodelay: bool = False, split_frames: bool = False
 ) -> Header:
-    """Return the header that a subscriber sends first. ``split_frames``: it supports split frames (``core/wire/framing``)."""
+    """Return the header that a subscriber sends first.
+
+    ``split_frames``: the subscriber supports split frames (``core/wire/framing``).
+    """
     return {
         **({"split_frames": "1"} if split_frames else {}),
         "callerid": caller_id,
@@ -64,7 +67,7 @@ def publisher_header(
 ) -> Header:
     """Return the header with which a publisher replies; ``extra`` are the user's fields.
 
-    As in rospy, the user's fields override others: a relay of AnyMsg sends the type of the relayed messages.
+    As in rospy, the user's fields override others: for example, a relay of AnyMsg sends the type of the relayed messages.
     """
     return {
         "callerid": caller_id,
@@ -173,5 +176,8 @@ def _raise_error_field(fields: Header) -> None:
 
 
 def _fits(md5sum: str, type_: InterfaceType) -> bool:
-    """Return whether the md5sum matches the type: a renamed type with the same fields is compatible."""
+    """Return whether the md5sum matches the type.
+
+    The names may differ, because a renamed type with the same fields is compatible.
+    """
     return md5sum == type_.md5sum or ANY in (md5sum, type_.md5sum)

@@ -30,7 +30,7 @@ __all__ = [
     "serialize_response_in_steps",
 ]
 
-_PLAIN_BYTES = 32768  # a plain document up to this length is read in one step
+_PLAIN_BYTES = 32768  # maximum length of a plain document that is read in one step
 
 _STEP_BYTES = 8192
 
@@ -45,7 +45,7 @@ class Call(NamedTuple):
 
 
 class Serialized:
-    """A response that is already XML, in pieces, because joining a long one takes time."""
+    """A response that is already XML, in pieces, because joining the pieces of a long one takes time."""
 
     __slots__ = ("pieces",)
 

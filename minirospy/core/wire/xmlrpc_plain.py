@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 __all__ = ["read_plain"]
 
 _MAX_TAGS = 2_000_000
-# open elements; less than the parser's nesting limit: deeper documents are left to the parser
+# Maximum number of open elements; below the parser's nesting limit, because deeper documents are left to the parser
 _MAX_OPEN = 60
 
 _SPACE = r"[ \t\r\n]*"
-# Excludes references, "]]>", and characters that XML changes or forbids.
+# Characters in text, except references, "]]>", and characters that XML changes or forbids.
 _TEXT = r"[\t\n !-%'-;=?-~]*"
 _STRING = rf"<value>(?:<string>({_TEXT})</string>|({_TEXT}))</value>"
 
@@ -31,7 +31,7 @@ class _Patterns(NamedTuple):
 
 
 def read_plain(body: bytes | bytearray) -> tuple[str | None, list[object]] | None:
-    """Return the method of the call in ``body`` (None for a response), and the parameters; None if it is not plain."""
+    """Return the method of the call in ``body`` (None for a response) and the parameters, or None if the body is not plain."""
     try:
         text = body.decode("ascii")
         if text.count("<") > _MAX_TAGS:
@@ -54,12 +54,13 @@ def _read(tokens: list[tuple[str, str, str, str, str]]) -> list[object] | None:
     Raise ValueError if a number is invalid.
     """
     if tokens and tokens[-1][4] not in {"", "</param>"}:
-        # An unexpected part always becomes the last token.
+        # An unexpected part of the document always becomes the last token.
         return None
 
     params: list[object] = []
     add: Callable[[object], None] = params.append
-    # The open elements: the start of the end tag, the function that adds to the enclosing value, and the contents.
+    # The open elements, each with the start of its end tag, the function that adds it to the enclosing value, and its
+    # contents.
     opened: list[tuple[str, Callable[[object], None], Any]] = []
 
     for text, param_text, bare, param_bare, other in tokens:
@@ -132,7 +133,7 @@ def _patterns() -> _Patterns:
         "</member>",
         "<value><struct>",
         rf"</struct>{_SPACE}</value>",
-        # Unexpected text, with everything after it, becomes an unknown token.
+        # Unexpected text, together with everything after it, becomes an unknown token.
         "(?s:.+)",
     )
 

@@ -17,28 +17,28 @@ from minirospy.base.errors import RpcProtocolError
 __all__ = ["MAX_DEPTH", "DateTime", "Reader", "read_document"]
 
 MAX_DEPTH = 64
-_MAX_ELEMENTS = 1_000_000  # per document; parsing this many takes some seconds
+_MAX_ELEMENTS = 1_000_000  # maximum per document; parsing this many takes some seconds
 
 _MIB = 1024 * 1024
 _MAX_MEMORY = 64 * _MIB  # memory limit for all long strings in one document
 
 _MAX_WIDE = 16 * _MIB
-"""Maximum bytes of one string with a character beyond U+00FF: each of its characters then uses 2 or 4 bytes, and the string
-is copied.
+"""Maximum size in bytes of a string with a character beyond U+00FF: each of its characters then uses 2 or 4 bytes, and the
+string is copied.
 """
 
-_MAX_TOKEN = 65536  # bytes in a tag, a comment or similar
+_MAX_TOKEN = 65536  # maximum size in bytes of a tag, a comment or similar
 
-_MAX_SCALAR = 2048  # characters in a number, a boolean or a date
+_MAX_SCALAR = 2048  # maximum number of characters in a number, a boolean or a date
 
-_LONG_TEXT = 16  # 8-KiB pieces after which a string counts as long
+_LONG_TEXT = 16  # number of 8-KiB pieces above which a string counts as long
 
 _GROWTH_SHIFT = 17
-"""A string's length shifted right by this is a sixteenth of it, in 8-KiB pieces; joining waits until it has grown so much."""
+"""A string's length shifted right by this is a sixteenth of it, in 8-KiB pieces; the next join waits for that much more data."""
 
 
 class DateTime(NamedTuple):
-    """A date, as received, that is not in XML-RPC's format; other implementations accept any text."""
+    """A date, as received, that is not in XML-RPC's format. It may be any text, because other implementations accept it."""
 
     value: str
 

@@ -17,7 +17,8 @@ __all__ = ["Output", "escape", "write", "write_in_steps"]
 _STEP_BYTES = 8192
 _STEP_ITEMS = 300
 _STEP_LETTERS = 65536
-_ALONE_BYTES = 1024 * 1024  # size of a response above which it requests to be written alone
+# size in bytes above which the writer requests that no other response be written at the same time
+_ALONE_BYTES = 1024 * 1024
 
 
 def escape(text: str) -> str:
@@ -119,7 +120,10 @@ class Output:
         self._is_alone = False
 
     def step(self) -> Need | None:
-        """Complete a piece from the current parts; return the value to yield. Raise RpcProtocolError if the limit is exceeded."""
+        """Complete a piece from the current parts; return the value that a step yields.
+
+        Raise RpcProtocolError if the limit is exceeded.
+        """
         piece = "".join(self.parts).encode()
         self.parts.clear()
         self._pieces.append(piece)
@@ -204,7 +208,7 @@ def _write_bytes_in_steps(value: bytes, out: Output) -> Steps[None]:
 
 
 def _writer_of_kin(value: object) -> _Writer:
-    """Return the writer for a subclass of a known type, a date, or one of xmlrpc.client's wrappers."""
+    """Return the writer for a subclass of a known type, for a date, or for one of xmlrpc.client's wrappers."""
     for kind, writer in _WRITERS.items():
         if isinstance(value, kind):
             return writer

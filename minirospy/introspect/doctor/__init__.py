@@ -1,4 +1,4 @@
-"""Checks this machine's ROS installation, network and graph: takes an environment, yields findings.
+"""Check this machine's ROS installation, network and graph: an environment in, findings out.
 
 Source: http://wiki.ros.org/roswtf, http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/Troubleshooting.
 """
@@ -61,7 +61,7 @@ class Examination:
         yield from check_packages(environment)
 
     def listen(self, report: Callable[[Finding], object]) -> bool:
-        """Answer requests from doctors on other machines until the context exits; return False if no master was found."""
+        """Respond to requests from doctors on other machines until the context exits; return False if no master was found."""
         if self._listen is None:
             return False
         self._listen(report)

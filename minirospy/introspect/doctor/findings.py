@@ -9,7 +9,7 @@ __all__ = ["Finding", "Status", "ok", "problem", "warning"]
 
 
 class Status(str, Enum):
-    """The result of a check. A warning may be harmless; a problem is not."""
+    """The result of a check. A warning may be harmless, but a problem is not."""
 
     OK = "ok"
     WARNING = "warning"

@@ -1,4 +1,4 @@
-"""Checks tf frames for duplicate publishers, loops, several trees, and invalid, old or future transforms.
+"""Check tf frames for duplicate publishers, loops, several trees, and invalid, old or future transforms.
 
 Source: http://wiki.ros.org/roswtf ("tf"), http://wiki.ros.org/tf/Errors%20explained.
 """
@@ -22,10 +22,10 @@ from minirospy.runtime.rpc.master_proxy import SystemState
 __all__ = ["Observation", "check_frames", "frame_findings"]
 
 _TOPICS = {"/tf": False, "/tf_static": True}
-_SECONDS = 1.5  # listening time, long enough to receive transforms published at 1 Hz
+_SECONDS = 1.5  # seconds to listen, long enough to receive transforms published at 1 Hz
 _OLD_SECONDS = 1.0
 _AHEAD_SECONDS = 1.1
-"""Tolerance for future stamps:
+"""Tolerance for future stamps, in seconds.
 
 static_transform_publisher stamps each transform one period ahead, in practice at most a second.
 """
@@ -47,7 +47,7 @@ class Observation:
 def check_frames(environment: Environment, state: SystemState) -> Iterator[Finding]:
     """Listen to /tf for _SECONDS if it is published, and yield the problems found in its frames.
 
-    Raise the errors of ToolNode.
+    Raise MasterUnreachableError if no master responds.
     """
     published = [topic for topic in _TOPICS if state.publishers.get(topic)]
     if not published:
@@ -74,7 +74,8 @@ def check_frames(environment: Environment, state: SystemState) -> Iterator[Findi
         yield problem(
             "frames", f"no transforms, but other bytes: {names}", "publish tf2_msgs/TFMessage there"
         )
-    # The workers stopped together with the node. With simulated time, stamps and arrival times cannot be compared.
+    # The workers have stopped together with the node. With simulated time, stamps and arrival times cannot be
+    # compared.
     yield from frame_findings([*seen.values()], is_simulated=bool(state.publishers.get("/clock")))
 
 
@@ -184,7 +185,7 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
 
 
 def _similar(name: str, others: Iterable[str]) -> str:
-    """Return the most similar name, "" if there is none; ignore names that differ only in their digits."""
+    """Return the most similar name, or "" if there is none; ignore names that differ only in their digits."""
 
     def plain(text: str) -> str:
         return text.strip("/").lower().replace("-", "_")

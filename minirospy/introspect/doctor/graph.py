@@ -1,4 +1,4 @@
-"""Checks the graph for nodes that do not respond, publishers and subscribers that do not connect, services that do not respond.
+"""Check the graph for nodes and services that do not respond, and for publishers and subscribers that do not connect.
 
 Source: http://wiki.ros.org/roswtf ("Online checks").
 """
@@ -52,7 +52,7 @@ _SHOWN = 5
 class NodeAnswer:
     """A node's responses to queries; ``trouble`` is set if the node did not respond.
 
-    ``seconds``: duration of the first call; ``stats`` (getBusStats): only if the caller requests them.
+    ``seconds``: duration of the first call; ``stats``: the result of getBusStats, if the caller requested it.
     """
 
     node: NodeAddress
@@ -179,7 +179,7 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
 
 
 def differing_types(state: SystemState, answers: Answers) -> dict[str, dict[str, list[str]]]:
-    """Return the topics for which nodes report different types: topic -> type -> nodes."""
+    """Return the topics for which nodes report different types, as a dict: topic -> type -> nodes."""
     found = {topic: _types(topic, answers) for topic in sorted({*state.publishers, *state.subscribers})}
     return {topic: types for topic, types in found.items() if len(types) > 1}
 
@@ -245,7 +245,7 @@ def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterat
 
     for name, result in zip(names, found, strict=True):
         if isinstance(result, RpcRefused):
-            continue  # the service was unregistered meanwhile
+            continue  # the service was unregistered in the meantime
         if isinstance(result, Exception):
             bad += 1
             trouble = trouble_of(result)
@@ -329,7 +329,7 @@ def _is_connected(pair: _Pair, answers: Answers) -> bool:
 
 
 def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
-    """Return the advice if the publisher's definition of the type differs from this machine's, or "" if the definitions agree."""
+    """Return advice if the publisher's definition of the type differs from this machine's, or "" if the definitions agree."""
     from minirospy.core.idl.load import message_class
 
     uri = answers[pair.publisher].node.uri or ""
@@ -344,9 +344,9 @@ def _definitions_differ(graph: Graph, pair: _Pair, answers: Answers) -> str:
 
 
 def _probe_service(graph: Graph, name: str) -> str:
-    """Return a problem with a service's type, "" if there is none.
+    """Return a problem with a service's type, or "" if there is none.
 
-    Raise the errors of ServiceClient, and RpcRefused if the service was unregistered.
+    Raise OSError or WireError if the connection fails, RpcRefused if the service was unregistered.
     """
     from minirospy.core.idl.load import service_class
     from minirospy.runtime.node.service_client import ServiceClient

@@ -2,8 +2,8 @@
 
 The listener is a service of type std_srvs/Trigger. A client that can call it has reached the listener's machine. The
 response reports whether the listener's machine has reached the client's node, by subscribing to that node's topic and
-receiving a message of 16 KiB. The response's message is JSON: the listener's ``host`` and ``time``, and a failure's
-``fault`` and ``text`` ("" if there was none).
+receiving a message of 16 KiB. The response's message is JSON: the listener's ``host`` and ``time``, and, if the check
+failed, its ``fault`` and ``text`` (otherwise "").
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _PADDING = "x" * 16384
 def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -> None:
     """Start connecting back to each doctor that requests a check; call ``report`` with each result, in a separate thread.
 
-    Raise MasterUnreachableError if no master answers, or RpcError if a call fails.
+    Raise MasterUnreachableError if no master responds, or RpcError if a call fails.
     """
 
     def connect_back(_: memoryview, fields: Header) -> bytes:

@@ -1,4 +1,4 @@
-"""Checks this machine without using the network: Python, environment variables and packages.
+"""Check this machine without using the network: Python, environment variables and packages.
 
 Source: http://wiki.ros.org/ROS/EnvironmentVariables, http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/roswtf.
 """
@@ -33,7 +33,7 @@ _MEANT = (
 
 
 def check_python() -> Iterator[Finding]:
-    """Yield the Python version, and the rospy that programs import."""
+    """Yield findings about the Python version, and about the rospy that programs import."""
     import importlib.util
 
     what = f"{platform.python_version()}, minirospy {minirospy.__version__}"
@@ -97,7 +97,7 @@ def _host_findings(
     own = known[host]
     by_ip, is_address = bool(ip and not hostname), _is_address(host)
     if by_ip and own and not is_address:
-        # Strings such as `192.168.1` resolve too: to 192.168.0.1.
+        # Strings such as `192.168.1` resolve too, here to 192.168.0.1.
         is_name = not ip.replace(".", "").isdigit()
         yield warning(
             "variables",
@@ -179,7 +179,10 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
 
 
 def check_packages(environment: Environment, here: Path | None = None) -> Iterator[Finding]:
-    """Yield findings about ROS_PACKAGE_PATH: duplicates, unreadable packages, missing dependencies; ``here``: a workspace."""
+    """Yield findings about ROS_PACKAGE_PATH: duplicates, unreadable packages, missing dependencies.
+
+    ``here``: the current workspace.
+    """
     from minirospy.workspace.packages import Packages, built_in_roots
 
     found: list[Finding] = []
@@ -192,7 +195,7 @@ def check_packages(environment: Environment, here: Path | None = None) -> Iterat
                 f"source {workspace / 'devel' / 'setup.bash'}",
             )
         )
-    # A sourced workspace adds minirospy's packages to the path: skip those packages. The user's packages may replace
+    # A sourced workspace adds minirospy's packages to the path: skip those, because the user's packages may replace
     # them.
     mine = Packages.below(*(path for path in environment.package_path if path not in built_in_roots()))
     copies = mine.copies()

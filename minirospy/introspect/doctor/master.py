@@ -1,4 +1,4 @@
-"""Checks the master: whether it responds, which machine is at fault if it does not, and how far its clock is off."""
+"""Check the master: whether it responds, which machine is at fault if it does not, and how far its clock is off."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["check_clock", "check_master", "clock_finding"]
 
-_FEEL_SECONDS = 0.1  # clock difference above which tf is affected
+_FEEL_SECONDS = 0.1  # clock difference in seconds above which tf is affected
 
 _WRONG_SECONDS = 1.0
 
@@ -41,7 +41,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
     try:
         pid = f", pid {master.get_pid()}"
     except RpcFault:
-        pid = ""  # this master is another implementation, which lacks the call
+        pid = ""  # this master is another implementation, which does not support the call
     except (MasterUnreachableError, RpcError) as error:
         yield _unreachable(master.uri, place, trouble_of(error))
         return
@@ -54,7 +54,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
 
 
 def check_clock(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
-    """Yield a finding on the difference between the master's clock and the local one; nothing if the master is local."""
+    """Yield a finding on the difference between the master's clock and the local one; yield nothing if the master is local."""
     if place.is_local:
         return
     before = time.time()

@@ -1,6 +1,6 @@
-"""The doctor's own node: checks whether other machines, the master's first, reach nodes on this machine.
+"""The doctor's own node, for checking whether other machines, the master's first, reach nodes on this machine.
 
-It is a normal node of the graph while the doctor runs: peers that reach it also reach the user's nodes.
+It is a normal node in the graph while the doctor runs: peers that reach it also reach the user's nodes.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ __all__ = ["PREFIX", "DoctorNode", "check_own_address", "check_way_back", "unrea
 PREFIX = "/minirospy_doctor"  # prefix of the doctors' node names
 
 _LETTER_BYTES = 16 * 1024
-"""Message size, larger than one packet: some tunnels drop all packets that exceed their limit."""
+"""Message size in bytes. It is larger than one packet, because some tunnels drop all packets above their limit."""
 
 _log = logging.getLogger(__name__)
 
@@ -80,16 +80,16 @@ class DoctorNode:
         self._loop.close()
 
     def register(self) -> None:
-        """Register the node's topics: its own message's topic, and /rosout, which every node publishes.
+        """Register the node's topics: the one for its own message, and /rosout, which every node publishes.
 
-        Raise MasterUnreachableError if no master answers, or RpcError if the call fails.
+        Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
         self._loop.run(self._register())
 
     def serve(self, name: str, handler: Handler) -> None:
         """Provide a std_srvs/Trigger service.
 
-        Raise MasterUnreachableError if no master answers, or RpcError if the call fails.
+        Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
         type_ = service_class("std_srvs/Trigger")
         server = self.node.make_service(
@@ -137,7 +137,7 @@ class DoctorNode:
 
 
 class _NotifiedNode(Node):
-    """A node that records that the master has called it."""
+    """A node that records that the master has called its Slave API."""
 
     def __init__(self, name: str, environment: Environment, notified: threading.Event) -> None:
         super().__init__(name, environment)

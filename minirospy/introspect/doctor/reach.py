@@ -1,4 +1,4 @@
-"""Checks whether a host and port can be reached, and names the fault if not.
+"""Check whether a host and port can be reached, and name the fault if not.
 
 Every function blocks the calling thread for a bounded time; :func:`in_parallel` makes many calls at the same time.
 """
@@ -53,7 +53,7 @@ CONNECT_SECONDS = 1.5
 RESUME = "it is busy, or suspended: after Ctrl-Z, `fg` in its terminal continues it"
 """Advice for :attr:`Fault.LATE`."""
 
-LOOK_UP_SECONDS = 2.0  # for a name server's response
+LOOK_UP_SECONDS = 2.0  # seconds to wait for a name server's response
 
 _MAX_THREADS = 32
 _MAX_BYTES = 1024 * 1024
@@ -95,12 +95,12 @@ class MasterLocation(NamedTuple):
 
     @property
     def own_address(self) -> str:
-        """Return this machine's address as seen from the master's machine; "" if there is no route."""
+        """Return this machine's address as seen from the master's machine, or "" if there is no route."""
         return own_address_towards(self.addresses[0]) if self.addresses else ""
 
 
 def trouble_of(error: Exception) -> Trouble:
-    """Classify an error of a call, a connection or a name lookup."""
+    """Classify an error from a call, a connection or a name lookup."""
     text = str(error)
     if isinstance(error, MasterUnreachableError) and isinstance(error.__cause__, RpcUnreachable):
         error = error.__cause__
@@ -134,7 +134,7 @@ def trouble_of(error: Exception) -> Trouble:
 
 
 def addresses(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
-    """Return the addresses of a host name, IPv4 first; [] if it does not resolve in time."""
+    """Return the addresses of a host name, IPv4 first, or [] if it does not resolve in time."""
     try:
         return look_up(host, timeout)
     except OSError:
@@ -153,7 +153,7 @@ def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict
 def look_up(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
     """Look up a name as :func:`addresses` does, but raise OSError on failure.
 
-    Needed because the system's own timeout is half a minute.
+    This is needed because the system's own timeout is half a minute.
     """
     (found,) = in_parallel(_ask_resolver, [host], timeout)
     if isinstance(found, Exception):
@@ -173,7 +173,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_own_address(address: str) -> bool:
-    """Return whether an address belongs to this machine: other addresses cannot be bound."""
+    """Return whether an address belongs to this machine. It does if a socket can be bound to it."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -184,7 +184,7 @@ def is_own_address(address: str) -> bool:
 
 
 def own_address_towards(address: str) -> str:
-    """Return this machine's address on the route to another address; "" if there is no route. Sends no packets."""
+    """Return this machine's address on the route to another address, or "" if there is no route. Sends no packets."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -250,9 +250,10 @@ def _receive(sock: socket.socket, most: int) -> bytes:
 def in_parallel(
     function: Callable[[_A], _R], arguments: Iterable[_A], timeout: float
 ) -> list[_R | Exception]:
-    """Return the result of ``function``, or its exception, for each argument, or TimeoutError for a call that takes too long.
+    """Call ``function`` for each argument in parallel; return the results or exceptions.
 
-    Runs in daemon threads: a name lookup cannot be cancelled, and must not prevent the program from exiting.
+    For a call that takes too long, the exception is TimeoutError. Runs in daemon threads: a name lookup cannot be
+    cancelled, and must not prevent the program from exiting.
     """
     waiting = list(enumerate(arguments))
     results: list[_R | Exception] = [TimeoutError("timed out")] * len(waiting)

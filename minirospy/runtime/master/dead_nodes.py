@@ -1,4 +1,4 @@
-"""Find the dead nodes of a nearly full master: nodes whose port refuses connections."""
+"""Find the dead nodes, whose port refuses connections, for a master that is nearly full."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ _SECONDS = 3.0
 
 
 async def find_dead(rpc: AsyncRpcClient, nodes: Mapping[str, str]) -> AsyncIterator[tuple[str, str]]:
-    """Yield (name, URI) of each node in ``nodes`` (name -> URI) that refuses connections. Connect to each host and port once.
+    """Yield (name, URI) of each node in ``nodes`` (a dict from name to URI) that refuses connections.
 
-    A node that does not respond is not reported: it may be slow, or its network may be down.
+    Connect to each host and port once. A node that does not respond is not reported, because it may be slow, or its network
+    may be down.
     """
     names: dict[str, list[str]] = {}
     for name, uri in nodes.items():

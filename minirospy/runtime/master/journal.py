@@ -1,4 +1,4 @@
-"""The master's journal on disk: the state from which another master continues if this one is killed.
+"""The master's journal on disk, from which another master restores the state if this one is killed.
 
 There is one file per user and port, ``ROS_HOME/master/journal-PORT``. Each record is written, without fsync, before
 the caller gets its response, so kill -9 loses nothing that was confirmed. A power cut may lose the last seconds, but it
@@ -50,7 +50,7 @@ class JournalBusyError(Exception):
 
 
 class Left(NamedTuple):
-    """The state in a killed master's journal; ``age``: seconds since its last write.
+    """The state in a killed master's journal. ``age``: seconds since its last write.
 
     ``copy`` is the path of the copy of a damaged journal, or None if copying failed.
     """
@@ -62,7 +62,7 @@ class Left(NamedTuple):
 
 
 class Journal:
-    """An open journal. ``snapshot`` returns the records that make up the current state, for a rewrite.
+    """An open journal. For a rewrite, ``snapshot`` returns the records that describe the current state.
 
     Call :meth:`lock`, :meth:`read`, :meth:`start`, then :meth:`append`, in this order. If the disk fails at any step,
     the master runs without a journal: ``trouble`` is the reason, and a complete rewrite is retried every half minute.
@@ -91,10 +91,10 @@ class Journal:
         # The numbers of the large values that are being stored, and the last number used.
         self._stored: set[int] = set()
         self._number = 0
-        # During a rewrite in steps: the records appended since it started, and the new file.
+        # During an incremental rewrite: the records appended since it started, and the new file.
         self._since: list[bytes] | None = None
         self._second: int | None = None
-        # Counts the rewrites in steps that finished or were abandoned, so that a rewrite can see that it was
+        # Counts the incremental rewrites that finished or were abandoned, so that a rewrite can detect that it was
         # abandoned.
         self._rewrites = 0
 
@@ -170,8 +170,8 @@ class Journal:
         try:
             if record[0] == "put":
                 if record[2] not in self._stored:
-                    # The disk failed meanwhile, and the parts of the value were lost with the old file, so write
-                    # everything again.
+                    # The disk failed in the meantime, and the parts of the value were lost with the old file, so
+                    # write everything again.
                     self.rewrite()
                     return
                 self._stored.discard(record[2])
@@ -285,7 +285,7 @@ class Journal:
         self.trouble = ""
 
     def _abandon(self) -> None:
-        """Abandon a rewrite in steps. Idempotent."""
+        """Abandon an incremental rewrite. Idempotent."""
         self._rewrites += 1
         self._since = None
         if self._second is not None:
@@ -303,7 +303,7 @@ class Journal:
                 _log.warning("the journal %s is written again", self.path)
 
     def touch(self) -> None:
-        """Record that this master is alive; :meth:`read` computes the age from this."""
+        """Record that this master is alive; :meth:`read` uses the time of this record to compute the journal's age."""
         if self._lock is None:
             return
         with contextlib.suppress(OSError):
@@ -377,7 +377,7 @@ def _pieces_of(records: Iterable[list[object]]) -> Iterator[bytes]:
     written: list[bytes] = []
     for number, record in enumerate(records):
         if record[0] == "set" and not is_small(record[2]):
-            # Use negative numbers, since values stored later get positive ones.
+            # Use negative numbers, because values stored later get positive ones.
             for piece in pack_in_steps(record[2]):
                 yield serialize_record(["part", -number - 1, piece])
             written.append(serialize_record(["put", record[1], -number - 1]))

@@ -20,12 +20,15 @@ from minirospy.base.escape import escaped
 __all__ = ["LogFile", "LogFileHandler"]
 
 _SECONDS = 0.5
-# maximum characters to collect: writing megabytes in one call would block the master
+# Maximum number of characters to collect, because writing megabytes in one call would block the master
 _MAX_PENDING = 64 * 1024
 
 
 class LogFileHandler(RotatingFileHandler):
-    """A logging handler that does not follow symbolic links, since another user could predict the log file's name."""
+    """A logging handler that does not follow symbolic links.
+
+    Otherwise another user could predict the log file's name and create a link there.
+    """
 
     def __init__(self, path: Path, most_bytes: int = 0, older_files: int = 0) -> None:
         """Open ``path``; ``most_bytes`` 0 means no limit. Raise OSError if it cannot be opened."""
@@ -123,7 +126,7 @@ class LogFile(LogFileHandler):
 
 
 class _Formatter(logging.Formatter):
-    """Formats records like the other lines; caches the formatted time of the current second."""
+    """Formats records like the file's other lines; caches the formatted time of the current second."""
 
     def __init__(self, stamp: Callable[[float], str]) -> None:
         super().__init__("[%(name)s][%(levelname)s] %(asctime)s: %(message)s")

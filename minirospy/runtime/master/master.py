@@ -1,4 +1,4 @@
-"""The master: its server, its calls to nodes, its journal, and the check of a killed master's nodes.
+"""The master: its server, its calls to nodes, its journal, and, after a killed master, the check whether nodes still exist.
 
 ``core/graph/master_api.py`` computes the responses.
 """
@@ -49,7 +49,8 @@ _MAX_CONCURRENT_CHECKS = 100
 _QUICK_CHECK_SECONDS = 1.0
 _TOUCH_SECONDS = 30.0
 _LOCK_SECONDS = 3.0
-# Seconds between attempts: the system may release a killed master's port before its journal's lock
+# Seconds between attempts to lock the journal: the system may release a killed master's port before the journal's
+# lock
 _LOCK_PAUSE = 0.02
 
 _RESTART_SECONDS = 600.0  # maximum age of a killed master's journal for its session to be continued
@@ -60,8 +61,8 @@ _COLLECT = (2000, 5, 1_000_000_000)
 collected automatically.
 """
 
-_SWEEP_SECONDS = 10.0  # between the checks for dead nodes if the master is nearly full
-_MAX_FORGOTTEN_PER_ITERATION = 20  # dead nodes to forget per loop iteration
+_SWEEP_SECONDS = 10.0  # seconds between the checks for dead nodes if the master is nearly full
+_MAX_FORGOTTEN_PER_ITERATION = 20  # maximum number of dead nodes to forget per loop iteration
 
 _OWN_NODE = "/rosout"
 
@@ -83,17 +84,19 @@ class Master(MasterApi):
         same_host: bool = True,
         owns_process: bool = False,
     ) -> None:
-        """Create the master. ``journal`` is the file that stores its state (None: no file); ``fresh`` empties the file.
+        """Create the master.
 
-        ``timeout``: seconds that a node has to respond to a call. ``same_host``: use Unix sockets for connections from and to
-        processes on this machine. ``owns_process``: the process runs only the master, which may tune the garbage collector.
+        ``journal`` is the file that stores its state (None: no file); ``fresh`` discards the state in it. ``timeout``:
+        seconds that a node has to respond to a call. ``same_host``: use Unix sockets for connections from and to
+        processes on this machine. ``owns_process``: the process runs only the master, which may tune the garbage
+        collector.
         """
         super().__init__()
         self.host = host
         self.calls = 0
         # The serialized response to getSystemState, and the registry's change count when it was serialized.
         self._state = (-1, Serialized(()))
-        # Messages for the user about the start: what was recovered, and what could not be recovered
+        # Messages for the user about the start: what was recovered, and what could not be recovered.
         self.news: list[str] = []
         self._started = time.monotonic()
         self._journal_path = journal
@@ -201,7 +204,7 @@ class Master(MasterApi):
         if self.registry.is_large:
             yield ALONE
         if self._state[0] == self.registry.changes:
-            # Another client's request serialized the state while this client waited.
+            # Another client's request serialized the state while this one was queued.
             return self._state[1]
 
         changes = self.registry.changes
@@ -354,7 +357,7 @@ class Master(MasterApi):
         self.news.append(f"journal: recovered {what}")
 
     def _collect(self) -> None:
-        """Restrict the garbage collector to the youngest objects; collect all objects now and then if there are few.
+        """Restrict the garbage collector to the youngest objects. If there are few objects, occasionally collect all of them.
 
         Examining all objects would block a master with many registrations, which hardly ever has cyclic garbage.
         """
@@ -403,9 +406,9 @@ class Master(MasterApi):
         _log.warning("of %s %d answer, the others are forgotten", _many(found, "recovered node"), sum(found))
 
     async def _sweep(self) -> None:
-        """Forget the nodes whose port refuses connections whenever the registrations are nearly full.
+        """When the registrations are nearly full, forget the nodes whose port refuses connections.
 
-        Without this they would stay full, because this master, like rosmaster, keeps a killed node's registrations.
+        Otherwise they would stay full, because this master, like rosmaster, keeps a killed node's registrations.
         """
         while True:
             await asyncio.sleep(_SWEEP_SECONDS)
@@ -448,7 +451,7 @@ async def _lock(journal: Journal) -> None:
 
 
 async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries: int = 1) -> bool:
-    """Return whether the node is still at its URI. Any response counts, unless it contains another node's name."""
+    """Return whether the node still responds at its URI. Any response counts, unless it contains another node's name."""
     for _ in range(tries):
         try:
             answer = await rpc.call(uri, "getName", "/master", timeout=timeout)

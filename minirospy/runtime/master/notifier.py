@@ -35,18 +35,19 @@ _TICK = 0.001
 _HOLD_SECONDS = 0.02
 _HOLD_TICK = 0.01
 
-_SECONDS_PER_TURN = 0.003  # time limit per loop iteration for starting calls
+_SECONDS_PER_TURN = 0.003  # time limit in seconds per loop iteration for starting calls
 
-# Pending parameter notifications per node; if there are more, one notification per subscribed key replaces them
+# Maximum pending parameter notifications per node; beyond that, one notification per subscribed key replaces them
 _MAX_PARAMETERS = 32
 
-_LARGE_BYTES = 32 * 1024 * 1024  # maximum total size of large calls in progress; the next one is queued
+# maximum total size in bytes of large calls in progress; further ones are queued
+_LARGE_BYTES = 32 * 1024 * 1024
 
-_MAX_ANSWER = 65536  # maximum bytes of a node's response to a notification; the response is ignored
+_MAX_ANSWER = 65536  # maximum size in bytes of a node's response to a notification, which is ignored
 
 
 class State(Protocol):
-    """The graph and the parameters at the time when a node is called."""
+    """The graph and the parameters when a node is called."""
 
     def publisher_uris(self, topic: str) -> list[str]:
         """Return the URIs of a topic's publishers."""
@@ -60,12 +61,12 @@ class State(Protocol):
 
 @dataclass(eq=False, slots=True)
 class _Backlog:
-    """One node's pending notifications: only the newest for each topic and parameter."""
+    """A node's pending notifications: only the newest for each topic and parameter."""
 
     uri: str
     notices: dict[object, Notice] = field(default_factory=dict)
     parameters: int = 0  # number of pending parameter notifications
-    # Topic -> earliest time at which its next notification may be sent
+    # Dict from topic to the earliest time at which its next notification may be sent
     pauses: dict[object, float] = field(default_factory=dict)
     timer: asyncio.TimerHandle | None = None
 
@@ -94,9 +95,11 @@ class Notifier:
         self._rpc = AsyncRpcClient(same_host=same_host, max_answer=_MAX_ANSWER)
 
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
-        """URI of a node on this loop -> function to call with a topic and its publishers, instead of an XML-RPC call."""
+        """Dict from the URI of a node on this loop to the function to call with a topic and its publishers, instead of an
+        XML-RPC call.
+        """
         self._nodes: dict[str, _Backlog] = {}
-        # (URI, topic) -> earliest time at which its next notification may be sent, earliest first.
+        # Dict from (URI, topic) to the earliest time at which its next notification may be sent, earliest first.
         self._held: dict[tuple[str, str], float] = {}
 
         self._line = _Line(_MAX_CONCURRENT_CALLS)
@@ -118,8 +121,7 @@ class Notifier:
     def defer(self, uri: str, topic: str) -> None:
         """Delay notifications to a node whose pending response contains the current state of a topic, or of PARAMETERS.
 
-        If a rospy node received the update first and then the response, it would apply the response, which is the older of the
-        two.
+        Otherwise a rospy node might receive the update first and then the response, and apply the response, which is older.
         """
         now = asyncio.get_running_loop().time()
         while self._held and next(iter(self._held.values())) <= now:
@@ -129,7 +131,7 @@ class Notifier:
         self._held[uri, topic] = (now // _HOLD_TICK + 1) * _HOLD_TICK + _HOLD_SECONDS
 
     def send(self, notice: Notice) -> None:
-        """Call the node that the notification is for, soon."""
+        """Send a notification to its node soon."""
         key: object = object()
         end: float | None = None
 
@@ -227,7 +229,7 @@ class Notifier:
     def _call_later(
         self, node: _Backlog, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
     ) -> None:
-        """Send a large notification as soon as the memory limit allows."""
+        """Send a large notification as soon as the limit on large calls allows."""
 
         def start() -> None:
             self._turns.start(self._call_in_steps(node, line, notice, count))
@@ -276,7 +278,7 @@ class Notifier:
     def _called(
         self, node: _Backlog, line: _Line, notice: Notice, count: int, size: int, answer: Body | RpcError
     ) -> None:
-        """Continue after a call whose notification listed ``count`` publishers; ``size`` is its bytes if it was large."""
+        """Continue after a call whose notification listed ``count`` publishers; ``size`` is its size in bytes if it was large."""
 
         line.under_way -= 1
         self._large_bytes -= size
@@ -303,7 +305,7 @@ class Notifier:
             self._start_soon()
 
     def _go_on(self, node: _Backlog) -> None:
-        """Queue the node if it has a notification to send; otherwise wait for the end of its first pause, if any."""
+        """Queue the node if it has a notification to send; otherwise set a timer for the end of its first pause, if any."""
         if node.timer:
             node.timer.cancel()
             node.timer = None

@@ -28,7 +28,7 @@ class Replay:
         self._parts: dict[int, list[bytes]] = {}
 
     def apply(self, what: str, *args: Any) -> None:
-        """Apply one change. Nodes that were notified when it happened are not notified again.
+        """Apply one change, without repeating the notifications that were sent when it happened.
 
         Raise TypeError, ValueError, KeyError or MinirospyError if the record is invalid.
         """

@@ -31,9 +31,11 @@ __all__ = ["Node"]
 
 _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
-_MAX_IDLE = 200  # idle connections to the Slave API; a graph has about as many as this node has peers
+# maximum idle connections to the Slave API; a graph has about as many as this node has peers
+_MAX_IDLE = 200
 
-_STALE_SECONDS = 5.0  # during which the master may still send lists of publishers after an unsubscription
+# seconds after an unsubscription in which the master may still send lists of publishers
+_STALE_SECONDS = 5.0
 
 _REQUEST_AGAIN_SECONDS = 0.5
 
@@ -65,7 +67,8 @@ class Node:
         self.publications: dict[str, Publication] = {}
         self.subscriptions: dict[str, Subscription] = {}
         self.services: dict[str, ServiceServer] = {}
-        self._left: dict[str, asyncio.TimerHandle] = {}  # topics unsubscribed from recently
+        # topics unsubscribed from recently, each with its timer
+        self._left: dict[str, asyncio.TimerHandle] = {}
         # Topics whose publishers will be requested from the master again
         self._requesting: dict[str, asyncio.TimerHandle] = {}
 
@@ -87,7 +90,10 @@ class Node:
         self.parameters = self._registrations.parameters
         """The parameters that this node has subscribed to at the master; the subscribing code adds them."""
         self.when_registered_again = self._registrations.when_registered_again
-        """Functions that register further state; called in workers after the master has lost this node's registrations."""
+        """Functions that register further state.
+
+        They are called in workers when the node registers again with a master that had lost it.
+        """
 
         self._server: RpcServer | None = None
         self._access = Access.parse(environment.allow) if environment.allow else None
@@ -95,7 +101,7 @@ class Node:
         self._unix_listener = tcp.Listener(self._accept)
         # The value of :func:`local.this_host` if this node also uses Unix sockets, else ""
         self.this_host = ""
-        # name of the Unix socket that serves topics to processes on this machine, or ""
+        # Name of the Unix socket that serves topics to processes on this machine, or "".
         self.unix_name = ""
 
         self._closed = False
@@ -108,7 +114,7 @@ class Node:
 
     @property
     def is_sending(self) -> bool:
-        """Return whether a thread is publishing, and so holds a lock. Thread-safe."""
+        """Return whether a thread is publishing, and therefore holds a lock. Thread-safe."""
         return any(publication.is_sending for publication in list(self.publications.values()))
 
     async def start(self, xmlrpc_port: int = 0, tcpros_port: int = 0) -> None:
@@ -145,7 +151,7 @@ class Node:
         """Leave the graph: unregister from the master, flush the links, close everything. Idempotent.
 
         Waits for the master as :meth:`Registrations.close` does, or until :meth:`stop_unregistering` is called. If the master
-        does not respond, the remaining registrations stay in it. ``announces``: whether to log a line when this takes long.
+        does not respond, the remaining registrations stay in it. With ``announces``, a line is logged if this takes long.
         """
         if self._closed:
             return
@@ -283,7 +289,7 @@ class Node:
         if subscription:
             subscription.publishers_changed(uris)
             if topic in self._left and topic not in self._requesting:
-                # The list may have been meant for the previous subscription, because rosmaster queues its updates.
+                # The list may be for the previous subscription, because rosmaster queues its updates.
                 loop = asyncio.get_running_loop()
                 self._requesting[topic] = loop.call_later(_REQUEST_AGAIN_SECONDS, self._request_again, topic)
 

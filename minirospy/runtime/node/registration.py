@@ -1,4 +1,4 @@
-"""A node's registrations: those in the master, and those that should be there.
+"""A node's registrations: the actual ones in the master, and those that the node needs.
 
 Registrations are ordered, retried until the master accepts them, repeated after it has restarted, and removed when the
 node closes. Source: http://wiki.ros.org/ROS/Master_API.
@@ -32,27 +32,28 @@ from minirospy.runtime.transport.workers import InOrder, Workers
 __all__ = ["Registrations"]
 
 _log = logging.getLogger(__name__)
-# Time limit for a call; long, because many nodes that start together on a small computer delay each other
+# Time limit in seconds for a call. It is long, because many nodes that start together on a small computer delay each
+# other
 _CALL_SECONDS = 30.0
 
-# time limit for the check whether this node is registered; short, because the check is repeated soon
+# Time limit in seconds for the check whether this node is registered. It is short, because the check is repeated soon
 _LOOK_SECONDS = 5.0
 
 _SILENT_SECONDS, _STILL_SILENT_SECONDS = 10.0, 2.0
 """A closing node gives up if the master sends no response for this many seconds; the shorter limit applies if the master
-was already silent before. The total time is not limited: the node waits for a busy master that continues to respond.
+was already silent before. The total time is not limited, because the node waits for a busy master that still responds.
 """
 
 _CLOSING_CALL_SECONDS = 3600.0
-_PROBE_SECONDS = 3.0  # between a closing node's checks whether the master still responds
+_PROBE_SECONDS = 3.0  # seconds between a closing node's checks whether the master still responds
 
-_NOTICE_SECONDS = 3.0  # before a closing node logs that it is still waiting for the master
+_NOTICE_SECONDS = 3.0  # seconds before a closing node logs that it is still waiting for the master
 
-_MAX_CALLS_PER_MULTICALL = 100  # unregistrations per system.multicall
+_MAX_CALLS_PER_MULTICALL = 100  # maximum number of unregistrations per system.multicall
 
 _Part: TypeAlias = Publication | Subscription | ServiceServer
 _Key: TypeAlias = tuple[str, str]
-"""The kind of a registration, as in the names of the master's methods ("Publisher"), and the topic or name."""
+"""The kind of a registration, as in the names of the master's methods ("Publisher"), and the topic or service name."""
 _Call: TypeAlias = tuple[str, tuple[object, ...]]
 """A method of the Master API, and its arguments after the caller id."""
 
@@ -69,7 +70,7 @@ class Registrations:
         workers: Workers,
         watch_seconds: float,
     ) -> None:
-        """Register the entries of ``tables``: kind ("Publisher") -> name -> publication, subscription or service.
+        """Register the entries of ``tables``, a dict: kind ("Publisher") -> name -> publication, subscription or service.
 
         Every ``watch_seconds`` :meth:`watch` checks whether the node is still registered with the master.
         """
@@ -78,7 +79,10 @@ class Registrations:
         """The address of the node's services; like the Slave API's address, it is set before the first registration."""
         self.parameters: set[str] = set()  # the parameters that the node has subscribed to
         self.when_registered_again: list[Callable[[], object]] = []
-        """Functions that register further state; called in workers after the master has lost the node's registrations."""
+        """Functions that register further state.
+
+        They are called in workers when the node registers again with a master that had lost it.
+        """
 
         self._name = name
         self._environment = environment
@@ -102,10 +106,10 @@ class Registrations:
         self._watching = asyncio.ensure_future(self._watch_master())
 
     async def close(self, *, announces: bool) -> None:
-        """Unregister everything, and register nothing more; the first call is sent before anything else is done.
+        """Unregister everything, and register nothing more. The first call is sent before anything else is done.
 
         Waits while the master continues to respond; does not wait if it refuses connections, and gives up if it sends no
-        response for ``_SILENT_SECONDS``. ``announces``: whether to log a line when this takes long.
+        response for ``_SILENT_SECONDS``. With ``announces``, a line is logged if this takes long.
         """
         self._closed = True
         if self._watching:
@@ -113,7 +117,7 @@ class Registrations:
         await self._unregister_all(announces=announces)
 
     async def cancel(self) -> None:
-        """Cancel the calls that have no response yet."""
+        """Cancel the calls that have not received a response yet."""
         tasks = [*self._registering, *([self._watching] if self._watching else [])]
         for task in tasks:
             task.cancel()
@@ -152,7 +156,7 @@ class Registrations:
             raise asyncio.CancelledError
 
     def request_again(self, topic: str) -> None:
-        """Register a subscription again, since the master's last list of publishers may be outdated."""
+        """Register a subscription again, because the master's last list of publishers may be outdated."""
         key = ("Subscriber", topic)
         if self._known.get(key):
             self._known[key] = None
@@ -182,7 +186,8 @@ class Registrations:
     def _has_registered(self, task: asyncio.Task[None]) -> None:
         self._registering.discard(task)
         if not task.cancelled():
-            # Retrieve the error: a waiting caller receives it; without one it is ignored, since the call is retried.
+            # Retrieve the error: a waiting caller receives it. Without a caller it is ignored, because the call is
+            # retried.
             task.exception()
 
     async def _register_in_turn(self, key: _Key, *, again: bool) -> None:
@@ -221,8 +226,8 @@ class Registrations:
     async def _register_subscription(self, subscription: Subscription) -> list[str]:
         """Register a subscription; return its publishers.
 
-        A publisherUpdate arrives on another connection and may overtake the response, whose list is then the older one.
-        If an update arrived meanwhile, the call is repeated.
+        A publisherUpdate arrives on another connection and may overtake the response, whose list is then older. Therefore
+        the call is repeated if an update has arrived in the meantime.
         """
         while True:
             lists = subscription.lists
@@ -236,9 +241,9 @@ class Registrations:
     async def _watch_master(self) -> None:
         """Detect that the master has restarted and lost this node, and register again.
 
-        Looks up one of this node's services, if it has any: the node's name may be in a restarted master already, from a topic
-        registered later. The master's process id proves nothing: in containers it is always the same, and a master may recover
-        its tables.
+        Looks up one of this node's services, if it has any: the node's name may be in a restarted master already, from
+        a topic registered later. The master's process id proves nothing, because it is always the same in containers,
+        and a restarted master may have recovered its tables.
         """
         failures = 0
         while not self._closed:
@@ -260,7 +265,7 @@ class Registrations:
                     _log.warning("%s. What is connected goes on; will keep trying.", error)
                 continue
             except RpcRefused:
-                # An entry that was unregistered meanwhile is expected to be missing, and an illegal name is always
+                # An entry that has been unregistered since is expected to be missing, and an illegal name is always
                 # refused.
                 if asked and (asked[0] == "Service" or is_legal_name(self._name)):
                     has_forgotten = self._known.get(asked) is not None
@@ -278,8 +283,8 @@ class Registrations:
                 for function in self.when_registered_again:
                     self._again.start(function)
             elif has_forgotten:
-                # Log this only once per master: after this, it no longer counts as a master that had registered this
-                # node.
+                # Log this only once per master: from now on, the master no longer counts as one that had registered
+                # this node.
                 _log.warning("the master does not know this node, and refuses to")
 
     async def _register_all(self, *, again: bool = False) -> None:
@@ -311,10 +316,10 @@ class Registrations:
             await asyncio.gather(*tasks, return_exceptions=True)
 
     async def _wait_for_answers(self, tasks: Sequence[asyncio.Task[None]], *, announces: bool) -> None:
-        """Wait for the last calls to the master while it responds to anything.
+        """Wait for the last calls to the master to finish, but give up if it stops responding.
 
-        If many nodes shut down together, each is queued at the master. A short call, which a busy master handles in between,
-        shows that the master is alive.
+        If many nodes shut down together, the calls of each are queued at the master. The master's response to a short
+        call, which even a busy master handles quickly, shows that it is alive.
         """
         loop = asyncio.get_running_loop()
         uri = self._environment.master_uri
@@ -344,7 +349,7 @@ class Registrations:
             await self._call_master("getPid", self._name)
 
     async def _call_all(self, calls: Sequence[_Call]) -> None:
-        """Make all calls, ignoring their results; batch them if the master has system.multicall (not all masters do).
+        """Make all calls, ignoring their results; batch them if the master supports system.multicall (not all do).
 
         Raise MasterUnreachableError if the master does not respond.
         """

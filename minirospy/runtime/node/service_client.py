@@ -48,7 +48,7 @@ class ServiceClient:
         waits: bool = True,
         same_host: bool = True,
     ) -> None:
-        """Connect to ``uri`` (rosrpc://host:port), with ``same_host`` through a Unix socket if possible, and exchange headers.
+        """Connect to ``uri`` (rosrpc://host:port) and exchange headers. With ``same_host`` use a Unix socket if possible.
 
         With ``waits`` false, the caller can do something else before it calls :meth:`finish` to receive the server's header.
         Raise HandshakeRefused if the server refuses, OSError or WireError if communication fails.
@@ -83,8 +83,8 @@ class ServiceClient:
         responses need only one wait. If the server sends no header, it has not started to process the request.
         """
         try:
-            # Do this only on a Unix socket, which only minirospy serves: rospy may lose data that arrives together
-            # with a header.
+            # Only a Unix socket allows this, because only minirospy serves those: rospy may lose data that arrives
+            # together with a header.
             if request is not None and len(request) < _RECEIVE and self._sock.family not in sockets.FAMILIES:
                 self._send(request)
                 self._is_asked = True
@@ -195,11 +195,11 @@ class Reader:
         return data[:count]
 
     def _some(self, count: int, flags: int = 0) -> bytes:
-        """Return up to ``count`` bytes, or b"" if the peer has closed."""
+        """Receive and return up to ``count`` bytes, or b"" if the peer has closed."""
         try:
             return self._receive(min(count, _MOST), flags)
         except ConnectionResetError:
-            # The peer closed with unread data, which counts as end of file too.
+            # The peer closed a connection with unread data, which counts as end of file too.
             return b""
 
     def _take_large(self, data: bytes, count: int) -> bytes:
@@ -231,7 +231,7 @@ def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> 
         sockets.tune(sock)
         return sock
 
-    # Most service URIs contain an IP address, which needs no resolver.
+    # Do this first, because most service URIs contain an IP address, which needs no resolver.
     sock = socket.socket()
     try:
         sockets.tune(sock)

@@ -119,7 +119,7 @@ class ServiceServer:
             sock.close()
 
     def close(self) -> None:
-        """Stop serving: clients with a call in progress still get their responses, the others are disconnected."""
+        """Stop serving: clients with a call in progress still get their responses, all other clients are disconnected."""
         with self._lock:
             self._closed = True
             for connection in self._open:
@@ -248,11 +248,11 @@ class LoopServiceServer(ServiceServer):
         try:
             return serialize_response(await self._async_handler(request, fields))
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the edge to user code: the client waits for an answer
-            # asyncio would end the loop, and so all that the node does, with a task that raises SystemExit.
+            # asyncio would end the loop, and with it everything that the node does, if a task raised SystemExit.
             return self._failure(error)
         except asyncio.CancelledError:
-            # Either this task was cancelled, or something that the handler awaited was; only Python 3.11 and later
-            # can distinguish the two.
+            # Either this task was cancelled, or something that the handler awaited; only Python 3.11 and later can
+            # distinguish the two.
             if not self._closed:
                 _log.error("service %s: the handler of a call was cancelled", self.name)
                 with contextlib.suppress(OSError):

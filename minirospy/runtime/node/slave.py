@@ -164,7 +164,10 @@ class SlaveApi:
         return [SUCCESS, "subscriptions", rows]
 
     def param_update(self, caller_id: str, key: str, value: object) -> Answer:
-        """Accept a new value for a parameter that this node subscribed to, for its namespace, or for a parameter below it."""
+        """Accept a new value for a subscribed parameter.
+
+        The key may be the parameter itself, its namespace, or a parameter below it.
+        """
         self._node.parameter_changed(key, value)
         changed = names.canonicalize(key).rstrip("/") + "/"
         known = (f"{each.rstrip('/')}/" for each in list(self._node.parameters))
@@ -226,6 +229,6 @@ def _refusal_before_tcpros(protocols: object) -> Answer | None:
 
 
 def connection_text(link: InLink | OutLink) -> str:
-    """Return a connection's description, whose numbers `rosnode info` prints; a Unix socket has no port."""
+    """Return a connection's description, whose numbers `rosnode info` prints. For a Unix socket it contains no port."""
     on = f" on port {link.local_port}" if link.transport == "TCPROS" else ""
     return f"{link.transport} connection{on} to [{link.address} on socket {link.number}]"

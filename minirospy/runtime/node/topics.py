@@ -50,27 +50,31 @@ __all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription", "Unrea
 
 _log = logging.getLogger(__name__)
 
-_SETTLE_SECONDS = 10.0  # within which all nodes register again with a master that has lost its state
+# seconds within which all nodes register again with a master that has lost its state
+_SETTLE_SECONDS = 10.0
 
-# Failures before reporting a publisher that refuses; a publisher that is shutting down has exited by then
+# Failures before a publisher that refuses is reported: a publisher that is shutting down has exited by then
 _WARN_AFTER = 3
 
-_REFUSALS_LOGGED = 10  # log lines about publishers with invalid responses; further ones are only counted
+# maximum number of log lines about publishers with invalid responses; further ones are only counted
+_REFUSALS_LOGGED = 10
 
-TOGETHER_SECONDS = 0.25  # within which one publisher's unreachable topics are combined in one log line
-MAX_TOPICS_SHOWN = 5  # topics named in such a log line
+# seconds within which a publisher's unreachable topics are combined in one log line
+TOGETHER_SECONDS = 0.25
+MAX_TOPICS_SHOWN = 5  # maximum number of topics named in such a log line
 _LEAVE_SECONDS = 10.0
-_WORKED_SECONDS = 5.0  # a link that was open for this long, or received a message, counts as working
+# a link counts as working once it has received a message or has been open for this many seconds
+_WORKED_SECONDS = 5.0
 
 Deliver = Callable[[Frame, Header], None]
-"""Called with each message's bytes and its publisher's connection header."""
+"""Called with each message's bytes, and the connection header of its publisher."""
 
 
 @dataclass(frozen=True)
 class InTurns:
-    """Options for a subscription that delivers messages of up to ``most`` bytes in steps on the loop, run by ``start``.
+    """Options for a subscription that delivers messages of up to ``most`` bytes in steps on the loop; ``start`` runs the steps.
 
-    When a longer message arrives, it is skipped and ``on_left_out`` is called with the publisher's connection header.
+    A longer message is skipped, and ``on_left_out`` is called with its publisher's connection header.
     """
 
     deliver: Callable[[Frame, Header], Steps[None]]
@@ -104,16 +108,17 @@ class Publication:
         self.headers = dict(headers or {})
         self.tcp_nodelay = tcp_nodelay
         self.links: tuple[OutLink, ...] = ()
-        # Bytes of messages with at least one subscriber, including the length prefix; each message counts once
+        # Total bytes of the messages that had a subscriber, including length prefixes; each message counts once
         self.sent_bytes = 0
-        self.expected = 0  # number of subscribers in the master when the publication was registered
+        # number of subscribers that the master listed when the publication was registered
+        self.expected = 0
         self._on_link = on_link
         self._latched: bytes | LargeFrame | None = None
         self._latch_lock = threading.Lock()
 
     @property
     def is_sending(self) -> bool:
-        """Return whether a thread is publishing, and so holds a lock."""
+        """Return whether a thread is publishing, and therefore holds a lock."""
         return self._latch_lock.locked() or any(link.is_sending for link in self.links)
 
     def publish(self, frame: bytes | LargeFrame) -> None:
@@ -157,8 +162,8 @@ class Publication:
 
         for other in self.links:
             if other.peer == link.peer and other.waiting:
-                # A node connects only once per topic, so it has lost the old link, and frames on that link would have
-                # no receiver.
+                # A node connects only once per topic, so it has lost the old link, and no longer receives frames on
+                # it.
                 other.close()
         # A subscriber that has received the header expects all messages published after that, so the link accepts
         # frames before the header is sent.
@@ -172,7 +177,7 @@ class Publication:
             if self._on_link:
                 self._on_link(link, True)
         except BaseException:
-            # The caller closes the socket: a link without a socket must not be counted or closed later.
+            # The caller closes the socket, and a link without a socket must not be counted or closed later.
             link.close()
             raise
         return None
@@ -206,7 +211,7 @@ class InLink:
     latched: Frame | None = None  # the last message from a latching publisher
     since: float = field(default_factory=time.monotonic)
     fault: Exception | None = None
-    # the publisher was removed from the master's list and added again while the link was open
+    # True if the publisher was removed from the master's list and added again while the link was open
     returned: bool = False
 
     @property
@@ -234,7 +239,7 @@ class InLink:
 
 
 class Unreachable:
-    """Logs unreachable publishers, in one line for all topics of a node, such as those of a killed bridge.
+    """Logs unreachable publishers. One line covers all topics of a node, such as those of a killed bridge.
 
     Use it on the loop only.
     """
@@ -243,17 +248,17 @@ class Unreachable:
         # A list may contain a thousand publishers that refuse: logging all of them would block the loop for 0.2 s.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._waiting: dict[str, tuple[list[str], Exception, str]] = {}
-        """Publisher's URI -> its topics, and the error and advice for the first topic."""
+        """Dict from a publisher's URI to its topics, and the error and advice for the first of them."""
         self._timer: asyncio.TimerHandle | None = None
 
     def add(self, uri: str, topic: str, error: Exception, advice: str) -> None:
-        """Log an unreachable publisher a moment later, in one line with its other topics."""
+        """Log an unreachable publisher a moment later, in one line with its other unreachable topics."""
         self._waiting.setdefault(uri, ([], error, advice))[0].append(topic)
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(TOGETHER_SECONDS, self._report)
 
     def close(self) -> None:
-        """Log the pending lines, and the number of omitted ones. Idempotent."""
+        """Log the pending lines and the number of omitted lines. Idempotent."""
         if self._timer:
             self._timer.cancel()
         self._report()
@@ -302,7 +307,7 @@ class Subscription:
     ) -> None:
         """Create the subscription; ``this_host`` is the value of :func:`local.this_host`, or "" to not use Unix sockets.
 
-        All subscriptions of the node share ``unreachable``, since several may lose the same publisher.
+        All subscriptions of the node share ``unreachable``, because several may lose the same publisher.
         """
         self.topic = topic
         self.type = type_
@@ -327,7 +332,7 @@ class Subscription:
         # Limit the rate, because /rosout has as many publishers as there are nodes.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._connecting: dict[str, asyncio.Task[None]] = {}
-        # Links to publishers that have left the master's list, with the timer that closes each link.
+        # Links to publishers that have left the master's list, each with the timer that closes it.
         self._leaving: dict[str, tuple[InLink, asyncio.TimerHandle]] = {}
         self.on_connected: list[Callable[[], object]] = []  # called on the loop when a publisher is connected
         self._closed = False
@@ -376,7 +381,10 @@ class Subscription:
         await asyncio.gather(*self._connecting.values(), return_exceptions=True)
 
     def _settle(self) -> None:
-        """Forget publishers that the master does not list, except those with an open link: rospy nodes never register again."""
+        """Forget publishers that the master does not list.
+
+        Keep those with an open link, because rospy nodes never register again.
+        """
         self._settling = None
         for action in self._plan.publishers_changed(self._named):
             if isinstance(action, Connect):
@@ -385,7 +393,7 @@ class Subscription:
                 self._disconnect(action.uri)
 
     def _leave(self, uri: str) -> None:
-        """Continue to read from a publisher that has unregistered: messages that it published before may still be in transit.
+        """Continue to read from a publisher that has unregistered: messages that it published earlier may still be in transit.
 
         The publisher closes the connection when everything is sent. If it does not, it is disconnected after a while.
         """
@@ -440,8 +448,8 @@ class Subscription:
             if self.lists == lists:
                 self._plan.refused(uri)
             else:
-                # A newer list arrived after this refusal, and perhaps no other list will follow: retry, because the
-                # publisher may accept by now.
+                # A newer list arrived after this refusal, and there may be no further list: retry, because the
+                # publisher may accept now.
                 self._retry(uri, error)
         except _NoPublisher as error:
             self._limited_log.warning("no connection for %s: %s", self.topic, error)
@@ -487,7 +495,7 @@ class Subscription:
     async def _open_link(self, uri: str) -> InLink:
         protocols: list[list[str]] = [["TCPROS"]]
         if self._this_host:
-            # Add this after TCPROS, since third-party nodes read the first protocol only.
+            # Add this after TCPROS, because third-party nodes read the first protocol only.
             protocols.append([local.PROTOCOL, self._this_host])
         answer = await self._rpc.call(uri, "requestTopic", self._caller_id, self.topic, protocols)
         sock, address = await self._reach(answer, uri)
@@ -549,7 +557,7 @@ class Subscription:
         except (OSError, WireError) as error:
             link.fault = error
         except MemoryError:
-            # There is no memory for the message, or none for a callback.
+            # There is not enough memory for the message, or for what a callback allocates.
             link.fault = WireError("no memory for a message")
         finally:
             with contextlib.suppress(RuntimeError):
@@ -564,7 +572,7 @@ class Subscription:
             return
         del self._links[link.uri]
         if link.returned:
-            # The closed connection belonged to the publisher's previous registration; connect to the current one
+            # The closed connection belonged to the publisher's previous registration; connect to its current one
             # immediately.
             self._start_connecting(Connect(link.uri))
             return
@@ -637,7 +645,10 @@ class _NoPublisher(WireError):
 
 
 def _tcpros_address(answer: object, uri: str, topic: str) -> tuple[str, int]:
-    """Return (host, port) from a publisher's response to requestTopic. Raise WireError if the response has neither."""
+    """Return (host, port) from a publisher's response to requestTopic.
+
+    Raise WireError if the response does not contain them.
+    """
     match answer:
         case [1, _, ["TCPROS", str(host), int(port), *_]]:
             return host, port

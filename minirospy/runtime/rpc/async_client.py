@@ -47,7 +47,10 @@ class AsyncRpcClient:
     """Calls methods on any server; a few connections to each server stay open for a while and are reused."""
 
     def __init__(self, *, same_host: bool = True, max_answer: int = MAX_BODY) -> None:
-        """Create the client; ``same_host``: try a Unix socket first; ``max_answer``: the maximum size of a response in bytes."""
+        """Create the client.
+
+        ``same_host``: try a Unix socket first; ``max_answer``: the maximum size of a response in bytes.
+        """
         self.same_host = same_host
         self.max_answer = max_answer
         # The idle connections to each server, least recently used first.
@@ -72,7 +75,7 @@ class AsyncRpcClient:
     def start(
         self, uri: str, body: bytes | list[bytes], timeout: float, done: Callable[[Body | RpcError], None]
     ) -> Call:
-        """Do the same as :meth:`call` with callbacks: on a busy master a coroutine would double the cost of a call.
+        """Make the same call as :meth:`call` does, with callbacks: on a busy master a coroutine would double the cost.
 
         ``body`` is the call as XML, possibly in pieces. ``done`` is called on the loop, possibly immediately, with the
         response as XML, or with the exception that :meth:`call` would raise.
@@ -106,7 +109,7 @@ class AsyncRpcClient:
         return connection
 
     def keep(self, connection: _Connection) -> None:
-        """Add a connection to the idle ones, for the next call."""
+        """Add a connection to the idle ones, so that the next call can use it."""
         if self.closed:
             connection.close()
             return
@@ -309,7 +312,7 @@ class Call:
         """Close this connection and try another one."""
         self._close()
         if self._is_kept and isinstance(error, ConnectionError | EOFError):
-            # The peer has closed an idle connection, so retry on a new one.
+            # The peer has closed this idle connection, so retry on a new one.
             self._is_kept = False
             self._connect()
         elif isinstance(error, ConnectionRefusedError) and _literal(self._address[0]) != self._address[0]:
@@ -382,7 +385,7 @@ class Call:
         self._next = 1
 
     def _send_early(self) -> None:
-        """Send now on a connection to this machine: it is already open, although the loop has not reported that yet."""
+        """Send now if the peer is on this machine, because the connection is then open before the loop reports that."""
         assert self._connection
         try:
             sent = self._connection.sock.send(self._left)

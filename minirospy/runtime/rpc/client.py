@@ -18,7 +18,7 @@ __all__ = ["RpcClient", "parse_http_uri"]
 
 _RECEIVE = 65536
 
-# The kernel accepts connections even for a busy program, so after this time the server counts as absent
+# Seconds; the kernel accepts connections even for a busy program, so after this time the server counts as absent
 _CONNECT_SECONDS = 5.0
 
 
@@ -30,7 +30,7 @@ class RpcClient:
     """
 
     def __init__(self, uri: str, timeout: float = 5.0, *, same_host: bool = True) -> None:
-        """Create the client for ``uri``; ``timeout`` limits each wait for bytes, and connecting (5 s at most), in seconds.
+        """Create the client for ``uri``. In seconds, ``timeout`` limits connecting (to 5 s at most) and each wait for data.
 
         ``same_host``: try a Unix socket first.
 
@@ -66,7 +66,7 @@ class RpcClient:
             sock = None
         try:
             if sock is not None:
-                # The peer may have closed an idle connection meanwhile: retry on a new one.
+                # The peer may have closed an idle connection in the meantime: retry on a new one.
                 with contextlib.suppress(ConnectionError, EOFError):
                     return self._ask(sock, request)
             return self._ask(self._connect(), request)

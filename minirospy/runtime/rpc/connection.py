@@ -1,4 +1,4 @@
-"""One client of the XML-RPC server: bytes in, requests out, and their answers in order.
+"""One client of the XML-RPC server: bytes in, requests out, and their responses in order.
 
 This module limits each client; the server (``runtime/rpc/server.py``) accepts clients and limits the memory of all
 clients together.
@@ -36,27 +36,28 @@ __all__ = ["Connection", "State"]
 
 _log = logging.getLogger(__name__)
 
-_REQUEST_SECONDS = 30.0  # time limit for receiving a started request, and for the client to read an answer
+_REQUEST_SECONDS = 30.0  # time limit for receiving a started request, and for the client to read a response
 
 _LINGER_SECONDS = 2.0
-"""Keep reading from a refused client for this many seconds; closing earlier resets the connection, and the answer is lost."""
+"""Keep reading from a refused client for this many seconds; closing earlier resets the connection, and the response is lost."""
 
 _SHORT_BODY = 4096  # bytes; a longer request is read in steps
 
-# Bytes; requests longer than this are read one at a time, since their values may take several times as much memory.
+# Bytes; requests longer than this are read one at a time, because their values may take several times as much memory.
 _ALONE_BODY = 1024 * 1024
 
-_PROGRESS = 65536  # transferred bytes that restart the time limit: slow radio needs long for a large value
+# transferred bytes that restart the time limit, because a slow radio link needs long for a large value
+_PROGRESS = 65536
 
 _RECEIVE = 4096
 _RECEIVE_MORE = 16384
-"""Bytes to receive at a time, of a new request and of the rest of a long one. They are small, since all pipelined
+"""Bytes per receive, for a new request and for the rest of a long one. The first number is small, because all pipelined
 requests in one receive are parsed before the next client is served.
 """
 
 _END_OF_HEAD = b"\r\n\r\n"
 
-# Requests answered immediately if several arrive together; the others are answered in steps
+# Number of requests processed immediately if several arrive together; the others are processed in steps
 _ANSWERS_AT_ONCE = 1
 
 
@@ -64,7 +65,7 @@ _OPEN, _REFUSED, _ENDED = State.OPEN, State.REFUSED, State.ENDED
 
 
 class Connection:
-    """One client: receives data, finds messages, and answers them in order."""
+    """One client: receives data, finds the requests in it, and responds to them in order."""
 
     __slots__ = (
         "_fd",
@@ -95,7 +96,7 @@ class Connection:
         self._state: State = _OPEN
 
         self._out = Outbox(sock)
-        # The next request to answer; further requests that arrived with it are still unparsed bytes.
+        # The next request to process; further requests that arrived with it are still unparsed bytes.
         self._message: HttpMessage | None = None
         self._has_deadline = False
         self._has_requested = False
@@ -103,10 +104,10 @@ class Connection:
         self._moved = 0
 
         self._task: asyncio.Task[None] | None = None
-        # The steps that answer a long request, and the bytes of its body.
+        # The steps that process a long request, and the bytes of its body.
         self._work: Steps[None] | None = None
         self._work_bytes = 0
-        # The work changes state, so it is finished whether or not the client waits for the answer.
+        # The work changes state, so it is finished even if the client no longer waits for the response.
         self._must_finish = False
         self._held = 0
         # Set while the socket is read in steps.
@@ -121,7 +122,7 @@ class Connection:
 
     @property
     def is_refused(self) -> bool:
-        """Return whether nothing more will be answered."""
+        """Return whether the connection will send no further responses."""
         return self._state is _REFUSED or self._state is _ENDED
 
     @property
@@ -133,7 +134,10 @@ class Connection:
         self._enter(Event.END)
 
     def _enter(self, event: Event) -> bool:
-        """Change the state if this event does so, and read as the new state requires; return whether it changed."""
+        """Move to the state that this event leads to, if any, and start or stop reading accordingly.
+
+        Return whether the state changed.
+        """
         state = TRANSITIONS[event].get(self._state)
         if state is None:
             return False
@@ -157,7 +161,7 @@ class Connection:
         self._server.deadlines.drop(self)
 
     def received(self, data: bytes) -> None:
-        """Accept bytes of requests."""
+        """Process received bytes of requests."""
         self._moved += len(data)
         self._find_message(data)
         self._answer_waiting()
@@ -166,7 +170,7 @@ class Connection:
     def _find_message(self, data: bytes = b"") -> bool:
         """Parse the next request from the received bytes and ``data``; return whether it is complete.
 
-        Only one, so that parsing a client's pipelined requests does not delay other clients.
+        Parses only one request, so that parsing a client's pipelined requests does not delay other clients.
         """
         try:
             message = self._reader.feed_one(data) if data else self._reader.next_message()
@@ -200,12 +204,12 @@ class Connection:
             return b""
 
     def readable(self) -> None:
-        """Read, unless other connections come first: then the loop calls this again in its next iteration."""
+        """Read, unless it is the turn of other connections; then the loop calls this again in its next iteration."""
         if self._server.admit(self, is_new=not self._has_requested):
             self.read()
 
     def read(self) -> None:
-        """Read available bytes; in steps for the rest of a long request or a client that was refused."""
+        """Read available bytes. The rest of a long request, or data from a refused client, is read in steps."""
         if not self._held and self._state is not _REFUSED:
             self._take(self._receive())
             return
@@ -234,12 +238,12 @@ class Connection:
         self._loop.add_reader(self._fd, self.readable)
 
     def _take(self, data: bytes | None) -> None:
-        """Process received bytes: b"" is end of file, None is nothing."""
+        """Process received data: b"" means end of file, None means that no data has arrived."""
         if data is None:
             return
 
         if self._state is _REFUSED:
-            # Ignore all further data.
+            # The client was refused, so ignore all further data.
             if not data:
                 self.end()
             return
@@ -267,19 +271,19 @@ class Connection:
             self._answer(message)
 
     def _answer_rest(self) -> Steps[None]:
-        """Answer the next of several requests that arrived together."""
+        """Process the next of several requests that arrived together."""
         yield None
         self._work = None
         self._go_on()
 
     def _go_on(self) -> None:
-        """Read and answer further requests if they waited for this answer."""
+        """Read and process further requests if they were waiting for this response."""
         if self._enter(Event.ANSWERED):
             self._answer_waiting()
             self._set_deadline()
 
     def _answer(self, message: HttpMessage) -> None:
-        """Answer immediately, or start a task or steps for longer work."""
+        """Respond to a request immediately, or start a task or steps if that takes longer."""
         if message.method != "POST":
             self.refuse(405, "this is an XML-RPC server: send POST")
             return
@@ -321,7 +325,7 @@ class Connection:
         self._server.turns.start(work)
 
     def _read_in_steps(self, body: bytes | bytearray, keep_alive: bool) -> Steps[None]:
-        """Parse a long request in steps, and answer it."""
+        """Parse a long request in steps, and respond to it."""
         if len(body) > _ALONE_BODY:
             yield ALONE
 
@@ -351,7 +355,7 @@ class Connection:
         yield from self._serialize_in_steps(method, value, keep_alive)
 
     def _serialize_in_steps(self, method: str, value: object, keep_alive: bool) -> Steps[None]:
-        """Answer with a value that may be long, or that is computed in steps."""
+        """Respond with a value that may be long, or that is computed in steps."""
         pieces: Sequence[bytes]
         try:
             if isinstance(value, Generator):
@@ -385,7 +389,7 @@ class Connection:
         self._finish(body, keep_alive)
 
     def _finish(self, body: bytes, keep_alive: bool) -> None:
-        """Send the answer of longer work, and continue with the next request."""
+        """Send the response to a long-running request, then continue with the next request."""
         self._work = None
         if not self.is_refused:
             self._send(body, keep_alive)
@@ -396,7 +400,7 @@ class Connection:
         self._sent(keep_alive)
 
     def _send_pieces(self, pieces: Sequence[bytes], keep_alive: bool) -> None:
-        """Send an answer in pieces; a long answer is not joined."""
+        """Send a response in pieces; the pieces of a long response are not joined."""
         if len(pieces) == 1:
             self._send(pieces[0], keep_alive)
             return
@@ -412,7 +416,7 @@ class Connection:
         self._server.log_refusal(self._sock, why)
 
     def _drop_request(self) -> None:
-        """Discard the present request."""
+        """Discard the current request."""
         self._message = None
         self._reader.close()
         self._work_bytes = 0
@@ -424,7 +428,7 @@ class Connection:
             self._task.cancel()
 
     def refuse(self, status: int, text: str) -> None:
-        """Answer with an error, and accept no more requests."""
+        """Respond with an error, and accept no more requests."""
         if self.is_refused:
             return
         self._drop_request()
@@ -461,12 +465,12 @@ class Connection:
         self._count_unread(kept)
         self._set_deadline()
         if self._out.size > MAX_UNREAD:
-            # Send no more answers, and stop reading requests.
+            # Send no more responses, and stop reading requests.
             self._enter(Event.UNREAD)
         self._server.limit_unread()
 
     def _count_unread(self, more: int) -> None:
-        """Count ``more`` bytes added to the unread answers, or removed from them if negative."""
+        """Add ``more``, which may be negative, to the number of bytes in responses that the client has not read."""
         self._server.unread += more
         if not self._out:
             self._server.slow.pop(self, None)
@@ -504,7 +508,7 @@ class Connection:
             self._sock.shutdown(socket.SHUT_WR)
 
     def _hold(self) -> None:
-        """Update the count of bytes buffered for the present request."""
+        """Update the count of bytes buffered for the current request."""
         count = self._reader.held + self._work_bytes
         if count == self._held:
             return
@@ -516,7 +520,7 @@ class Connection:
             self._server.holders.pop(self, None)
 
     def _set_deadline(self) -> None:
-        """Set the time limit of a started request or a pending answer; an idle connection has none."""
+        """Set the time limit for a started request or a pending response; an idle connection has none."""
         if self._out or not self._reader.is_idle:
             is_due = not self._has_deadline or self._moved > _PROGRESS
             if is_due and self._state is not _ENDED and self._state is not _REFUSED:
@@ -532,7 +536,7 @@ class Connection:
 
 
 def _fault(method: str, error: Exception) -> bytes:
-    """Return the answer to a call that failed."""
+    """Return the response to a call that failed."""
     match error:
         case RpcFault():
             return serialize_fault(error.code, error.text)

@@ -1,17 +1,17 @@
 """The states of a server's connection to one client, and a table of their transitions. Pure.
 
-How it works
-------------
-An event leads from a state to the next one; an event that a state does not have in the table changes nothing. The state decides
-whether requests are read, so the shell, :mod:`minirospy.runtime.rpc.connection`, starts and stops reading on a transition only.
-Everything else that a connection has is data of the present request or of the output, in any state:
+How it works ------------ An event leads from one state to the next; an event that the table does not contain for a
+state changes nothing. The state decides whether requests are read, so the shell,
+:mod:`minirospy.runtime.rpc.connection`, starts and stops reading on a transition only. All other data of a connection
+belongs to the current request or to the output, and may exist in any state:
 
-- the request: received bytes, the next message, the task or steps that answer it. A refusal and the end discard them.
-- the output: answers that the client has not read. LAST_ANSWER and END_OF_FILE are events only while there are some; without,
-  the connection ends immediately.
-- the time limit: of a started request or of unread output, and of the time that a refused client may keep sending.
+- the request: received bytes, the next message, the task or steps that process it. Refusing or closing discards them.
+- the output: responses that the client has not read. LAST_ANSWER and END_OF_FILE are events only while there are some;
+  otherwise the connection closes immediately.
+- the time limit for a started request, for unread output, or for a refused client that keeps sending.
 
-REFUSED reads, since closing the socket with unread bytes resets the connection, and the client would not get its answer.
+In the state REFUSED bytes are still read, because closing the socket with unread bytes would reset the connection, and the
+response would be lost.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class State(Enum):
     REFUSED = "received bytes are ignored, until the client closes the connection or the time is over"
     ENDED = "the socket is closed"
 
-    __hash__ = object.__hash__  # Enum's own is a function of Python, which takes longer than a transition
+    __hash__ = object.__hash__  # Enum defines a function in Python, which takes longer than a transition
 
 
 class Event(Enum):
@@ -47,7 +47,7 @@ class Event(Enum):
     REFUSE = "the client violated the protocol or a limit, and has been sent an error"
     END = "the connection is lost, its time is over, or the server closes"
 
-    __hash__ = object.__hash__  # as State
+    __hash__ = object.__hash__  # as in State
 
 
 _OPEN, _BUSY, _FULL, _CLOSING, _REFUSED, _ENDED = State

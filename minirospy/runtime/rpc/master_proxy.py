@@ -18,7 +18,7 @@ __all__ = ["BusConnection", "MasterProxy", "SlaveProxy", "SystemState", "master_
 
 
 class SystemState(NamedTuple):
-    """Publishers, subscribers and service providers: topic or service name -> node names."""
+    """Publishers, subscribers and service providers, each as a dict from topic or service name to node names."""
 
     publishers: dict[str, list[str]]
     subscribers: dict[str, list[str]]
@@ -185,7 +185,10 @@ class MasterProxy:
 
 
 class SlaveProxy:
-    """A proxy for the node at ``uri``. Each method raises RpcUnreachable if it does not respond, or another RpcError."""
+    """A proxy for the node at ``uri``.
+
+    Each method raises RpcUnreachable if the node does not respond, or another RpcError if the call fails.
+    """
 
     def __init__(self, uri: str, caller_id: str, timeout: float = 3.0, *, same_host: bool = True) -> None:
         self.uri = uri

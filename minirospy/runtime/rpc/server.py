@@ -1,7 +1,7 @@
 """An XML-RPC server on the event loop.
 
-Its connections are plain sockets that the loop watches: a master serves thousands of short connections, and an asyncio
-transport for each would cost more than all other work.
+Its connections are plain sockets that the loop watches, because a master serves thousands of short connections, and an
+asyncio transport for each would cost more than everything else together.
 
 No client delays the others: a short request is processed immediately. A long one (a large body, a large response, many
 calls in one) is processed in steps, for a few milliseconds in each loop iteration (``runtime/rpc/turns.py``). Memory
@@ -32,12 +32,12 @@ __all__ = ["Dispatch", "RpcServer", "is_address_in_use"]
 
 _log = logging.getLogger(__name__)
 
-# Maximum bytes of all clients' requests that are incomplete or being read; beyond that the largest are refused
+# Maximum total bytes of all clients' incomplete requests and those being read; beyond that the largest are refused
 _MAX_HELD = 72 * 1024 * 1024
-_LARGE = 32 * 1024  # bytes; requests up to this size are not refused because of that limit
+_LARGE = 32 * 1024  # bytes; requests up to this size are not refused when _MAX_HELD is exceeded
 
-# Maximum bytes of responses that all clients together have not read; beyond that, the client that has read nothing
-# for longest is disconnected
+# Maximum bytes of responses that all clients together have not read; beyond that, the client that has not read
+# anything for the longest time is disconnected
 _MAX_UNREAD_OF_ALL = 72 * 1024 * 1024
 
 _BACKLOG = 4096
@@ -47,24 +47,26 @@ the client resends them after growing delays: 1, 3, 7 s while connecting, up to 
 
 _ACCEPTS_AT_ONCE, _ACCEPT_SECONDS = 1024, 0.015
 _READ_SECONDS = 0.003
-"""Maximum connections to accept per loop iteration, the seconds this may take, and the seconds to read from them immediately.
+"""Seconds per loop iteration for reading from new connections immediately. The constants above limit how many connections are
+accepted per iteration, and the seconds that accepting may take.
 
 Thousands of clients may connect together; the server accepts all of them, 30 us each, before it serves a later one.
 """
 
 _ACCEPTS_BETWEEN = 64  # connections to accept before reading from others
 
-# Connections to read from, which takes some 1 ms, before accepting new ones: thousands may be readable together
+# Connections to read from before accepting new ones, which takes some 1 ms; thousands may be readable together
 _READS_AT_ONCE = 16
 
-# Maximum connections to read from per loop iteration, and the seconds this may take; the rest are read first in the
-# next iteration
+# Maximum number of connections to read from per loop iteration, and the maximum seconds for that; the rest are read
+# first in the next iteration
 _MAX_READS, _READS_SECONDS = 256, 0.01
 
 
 Dispatch = Callable[[str, list[object]], object]
-"""Called with a method name and arguments; returns the value, an awaitable of it, or steps that compute it, or raises
-RpcFault.
+"""Called with a method name and arguments.
+
+Returns the value, an awaitable of it, or steps that compute it; may raise RpcFault.
 """
 
 
@@ -84,7 +86,8 @@ class RpcServer:
     ) -> None:
         """Create a server on ``port``; port 0 means any free port, chosen from ``ports`` if given.
 
-        Processes on this machine that use one of the host names ``known_as`` for the server may connect through a Unix socket.
+        Processes on this machine that address the server by one of the host names ``known_as`` may connect through a Unix
+        socket.
 
         The ``most_idle`` most recently active clients stay connected (None: all). Clients that ``access`` does not allow are
         disconnected.
@@ -92,9 +95,9 @@ class RpcServer:
         self.dispatch = dispatch
         self.port = port
         self.refused = 0  # number of connections that were not allowed
-        self.held = 0  # bytes of requests that are incomplete or being read
-        self.holders: dict[Connection, int] = {}  # connection -> its share of ``held``, in bytes
-        self.unread = 0  # bytes of responses that clients have not read yet
+        self.held = 0  # total bytes of requests that are incomplete or being read
+        self.holders: dict[Connection, int] = {}  # dict from connection to its share of ``held``, in bytes
+        self.unread = 0  # total bytes of responses that clients have not read yet
         self.slow: OrderedDict[Connection, None] = OrderedDict()
         """The connections with unread responses, least recently read first."""
         self.turns = Turns()
@@ -104,16 +107,16 @@ class RpcServer:
         self._bind_host = bind_host
         self._ports = ports
         self._most = most_idle
-        # If few clients may stay connected, clients accepted together may displace each other, so read from each
-        # first.
+        # If only few clients may stay connected, clients that are accepted together may displace each other, so read
+        # from each first.
         self._reads_all = most_idle is not None and most_idle <= _ACCEPTS_AT_ONCE
         self._access = access
         self._known_as = dict.fromkeys(known_as)
         self._sock: socket.socket | None = None
         self._listening: list[socket.socket] = []
-        # Sockets on which accepting is paused for a moment.
+        # Sockets on which accepting is paused briefly.
         self._resting: set[socket.socket] = set()
-        # Connections read from in this loop iteration, the deadline for reading, and whether it has passed.
+        # Number of connections read from in this loop iteration, the deadline for reading, and whether it has passed.
         self._reads = 0
         self._reads_end = 0.0
         self._reads_over = False
@@ -198,7 +201,7 @@ class RpcServer:
         self._late.pop(connection, None)
 
     def _may_read(self) -> bool:
-        """Return whether one more connection may be read in this loop iteration; accept new connections in between."""
+        """Return whether one more connection may be read in this loop iteration; now and then, accept new connections first."""
         if self._reads_over:
             return False
         self._reads += 1
@@ -219,8 +222,8 @@ class RpcServer:
         self._reads, self._reads_over = 0, False
         number = 0
         while (self._late_new or self._late) and self._may_read():
-            # Alternate between new and other connections, so that many of one kind do not delay the other: new ones,
-            # idle ones that disconnect, and busy ones.
+            # Alternate between new and other connections, so that many of one kind do not delay the other kind. The
+            # kinds are new connections, idle ones that disconnect, and busy ones.
             if self._late_new and (number % 3 or not self._late):
                 connection, _ = self._late_new.popitem(last=number % 2 == 0)
             else:
@@ -245,8 +248,8 @@ class RpcServer:
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
                 return
             except OSError as error:
-                # There are no free file descriptors: close the connection that has been silent longest, and retry a
-                # moment later.
+                # There are no free file descriptors: close the connection that has been silent for the longest time,
+                # and retry a moment later.
                 self._unaccepted.error("a connection could not be accepted: %s", explain(error))
                 self._end_longest_silent()
                 loop.remove_reader(sock)

@@ -14,11 +14,12 @@ __all__ = ["Turns"]
 
 _log = logging.getLogger(__name__)
 
-_SECONDS = 0.003  # time limit per loop iteration for all work together
+_SECONDS = 0.003  # time limit in seconds per loop iteration for all work together
 
-_PAUSE = 0.005  # seconds to pause while all remaining work waits for something
+_PAUSE = 0.005  # seconds to pause while all remaining work is blocked
 
-_MAX_IN_PROGRESS = 16  # number of generators in progress; those not started yet take hardly any memory
+# maximum number of generators in progress; those not started yet take hardly any memory
+_MAX_IN_PROGRESS = 16
 
 
 class Turns:
@@ -29,7 +30,7 @@ class Turns:
         self._clock = clock
         self._queue: deque[Steps[None]] = deque()
         self._backlog: deque[Steps[None]] = deque()
-        # The generator that runs alone because it uses much memory, and those that are queued to run alone.
+        # The generator that runs alone because it uses much memory, and those queued to run alone later.
         self._alone: Steps[None] | None = None
         self._waiting: deque[Steps[None]] = deque()
         self._running: Steps[None] | None = None

@@ -20,7 +20,7 @@ class Access:
     def __init__(self, networks: Iterable[str] = ()) -> None:
         """Allow ``networks``, such as 192.168.65.0/24 or a single address. Raise UsageError if one is invalid."""
         self.networks = tuple(_network(text) for text in networks)
-        # A cache: a robot has few peers, and they connect often.
+        # A cache, because a robot has few peers, and they connect often.
         self._known: dict[str, bool] = {}
 
     @classmethod

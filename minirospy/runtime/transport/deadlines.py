@@ -21,7 +21,7 @@ class Deadlines(Generic[_T]):
         self._late = late
         self._ends: dict[_T, float] = {}
         self._timer: asyncio.TimerHandle | None = None
-        # When the timer fires, which is no later than the earliest limit.
+        # The time at which the timer fires, which is no later than the earliest limit.
         self._next = 0.0
 
     def __len__(self) -> int:
@@ -66,7 +66,7 @@ class Deadlines(Generic[_T]):
             (end, number, each) for number, (each, end) in enumerate(self._ends.items()) if end <= now
         )
         for end, _, each in late:
-            # The call for an earlier operation may have completed this one, or extended its limit.
+            # The call for an earlier operation may have completed this operation, or extended its limit.
             if self._ends.get(each) == end:
                 self.drop(each)
                 self._late(each)

@@ -18,7 +18,7 @@ _CGROUP = Path("/sys/fs/cgroup")
 
 @contextlib.contextmanager
 def naming_thread_limit() -> Iterator[None]:
-    """Start threads in the block. Raise ThreadLimitError, not RuntimeError, if the system allows no more threads."""
+    """Raise ThreadLimitError instead of RuntimeError if the system allows no more threads for those started in the block."""
     try:
         yield
     except RuntimeError as error:

@@ -20,8 +20,9 @@ from minirospy.runtime.transport.sockets import FAMILIES, is_writable
 __all__ = ["OutLink"]
 
 _GATHER = 64
-_PUSH_SECONDS = 0.005  # during which a publishing thread itself writes a large message to the socket
-_PUSH_WAIT_MS = 1  # for each wait during that time
+# seconds during which a publishing thread itself writes a large message to the socket
+_PUSH_SECONDS = 0.005
+_PUSH_WAIT_MS = 1  # milliseconds for each wait during that time
 
 # a frame in an outbox: the whole frame, or the buffers that are not sent yet
 _Waiting = bytes | list[bytes | memoryview]
@@ -99,7 +100,7 @@ class OutLink:
 
     @property
     def is_sending(self) -> bool:
-        """Return whether a thread is inside :meth:`send`, so that a signal handler that publishes could deadlock."""
+        """Return whether a thread is inside :meth:`send`. A signal handler that publishes could then deadlock."""
         return self._lock.locked()
 
     def open(self) -> None:
@@ -161,7 +162,7 @@ class OutLink:
         self._on_closed(self)
 
     def _has_to_wait(self, frame: _Waiting) -> bool:
-        """Append ``frame`` to the outbox and return True; return False if the outbox has become empty meanwhile."""
+        """Append ``frame`` to the outbox and return True; return False if the outbox has become empty in the meantime."""
         outbox = self._outbox
         if not self.sent % _GATHER or (self._is_reading and self._is_full()):
             # Send from here, because a thread that publishes without pause would not let the loop's thread send.
@@ -202,8 +203,8 @@ class OutLink:
         left = size
         end = time.monotonic() + _PUSH_SECONDS
         while True:
-            # A socket does not accept a large message in one call, and a peer that reads frees space in microseconds:
-            # passing each step to the loop would cost more than waiting here.
+            # A socket does not accept a large message in one call, but a peer that is reading frees space within
+            # microseconds. Handing each step to the loop would cost more than waiting here.
             try:
                 left -= self._gather(buffers)
             except (BlockingIOError, InterruptedError):
@@ -246,7 +247,7 @@ class OutLink:
 
     def _writable(self) -> None:
         if not self._drained.acquire(blocking=False):
-            # A publishing thread is already sending, so the loop continues with other work.
+            # A publishing thread is already sending, so the loop does other work.
             self._loop.remove_writer(self._sock)
             self._loop.call_later(_PUSH_SECONDS, self._start_writing)
             return
@@ -272,7 +273,7 @@ class OutLink:
         """Send part of the queue. Raise OSError if the connection has failed."""
         outbox = self._outbox
         if isinstance(outbox[0], list):
-            # A partly sent frame or a large one is sent separately, not together with small ones.
+            # A partly sent frame, or a large one, is sent separately, not together with small frames.
             self._gather(outbox[0])
             self._begun = self._is_reading = True
             if not outbox[0]:

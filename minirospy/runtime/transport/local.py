@@ -20,7 +20,7 @@ __all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answe
 PROTOCOL = "UNIXROS"
 _PREFIX = "minirospy-"  # the start of socket names
 
-_TRUSTED = frozenset({0})  # user ids that are trusted in addition to this process's own: root
+_TRUSTED = frozenset({0})  # trusted user ids in addition to this process's own: root
 
 
 class UnixAddress(NamedTuple):
@@ -32,7 +32,7 @@ class UnixAddress(NamedTuple):
 
 
 def this_host() -> str:
-    """Return a string that is equal in two processes if and only if abstract sockets connect them; "" if unsupported."""
+    """Return a string that is equal in two processes if and only if abstract sockets can connect them; "" if unsupported."""
     if sys.platform != "linux":
         return ""
     try:
@@ -96,7 +96,7 @@ def _open(name: str, use: Callable[[socket.socket, bytes], None]) -> socket.sock
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         sock.setblocking(False)
-        # A zero byte makes the socket abstract. Use UTF-8 in any locale, since the two processes may have different
+        # A zero byte makes the socket abstract. Use UTF-8 in any locale, because the two processes may have different
         # locales.
         use(sock, b"\0" + name.encode(errors="surrogatepass"))
     except BaseException:

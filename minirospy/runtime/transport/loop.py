@@ -1,4 +1,4 @@
-"""A connection between a program's threads and the process's single asyncio loop."""
+"""The connection between a program's threads and the process's single asyncio loop."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from minirospy.runtime.transport.limits import naming_thread_limit
 __all__ = ["LoopClosedError", "LoopThread", "new_event_loop"]
 
 _T = TypeVar("_T")
-_CLOSE_SECONDS = 2.0  # how long :meth:`LoopThread.close` waits for the loop's tasks to finish
+_CLOSE_SECONDS = 2.0  # seconds for which :meth:`LoopThread.close` waits for the loop's tasks to finish
 
 
 def new_event_loop() -> asyncio.AbstractEventLoop:
@@ -43,7 +43,7 @@ class LoopThread:
             self.loop.close()
             raise
         except BaseException:
-            # Ctrl-C arrived while the thread started; the thread closes the loop itself.
+            # Ctrl-C arrived while the thread was starting; the thread closes the loop itself.
             self.post(self._end.set)
             raise
 
@@ -106,7 +106,7 @@ class LoopThread:
         """Close the loop; tasks that are still running are cancelled."""
         if not self._thread.is_alive():
             return
-        # Do not call loop.stop(), because a second call would interrupt the thread's last steps.
+        # Do not call loop.stop(), because a second call would interrupt the thread during its last steps.
         self.post(self._end.set)
         if threading.current_thread() is not self._thread:
             self._thread.join(_CLOSE_SECONDS)

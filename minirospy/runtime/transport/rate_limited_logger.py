@@ -17,14 +17,14 @@ _SECONDS = 10.0
 
 
 class RateLimitedLogger:
-    """Logs ``lines`` lines every ten seconds, and counts the others."""
+    """Logs at most ``lines`` lines every ten seconds, and counts the rest."""
 
     def __init__(self, log: logging.Logger, lines: int = 1) -> None:
         self._log = log
         self._limit = lines
         self._logged = 0
         self._omitted = 0
-        self._end = 0.0  # when the current ten seconds are over
+        self._end = 0.0  # the time at which the current ten seconds end
 
     def close(self) -> None:
         """Log the number of lines omitted since the last report. Idempotent."""

@@ -33,7 +33,7 @@ from minirospy.runtime.transport.sockets import BUSY_POLL_SECONDS, busy_receive,
 
 __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frames_in_turns"]
 
-_TURN_CHUNK = 4096  # bytes per receive, and in each connection's buffer, for frames read in turns
+_TURN_CHUNK = 4096  # bytes per receive, and in each connection's buffer, if frames are read in turns
 
 _DRAIN_BYTES = 64 * 1024 * 1024
 # bytes per receive, so that a length prefix does not allocate more memory before the data arrives
@@ -91,7 +91,7 @@ def watch_frames(
     on_end: Callable[[], None],
     on_fault: Callable[[Exception], None],
 ) -> None:
-    """Read frames on the loop, for receivers so quick that a thread for each would cost more.
+    """Read frames on the loop, for receivers so quick that a separate thread for each would cost more.
 
     ``on_fault`` is called with the OSError or WireError that closed the connection, before ``on_end``.
     """
@@ -139,7 +139,7 @@ def watch_frames_in_turns(
 
     def read() -> Steps[None]:
         if sock.fileno() < 0:
-            # The socket was closed meanwhile.
+            # The socket was closed in the meantime.
             return
         skipped = reader.skipped
         try:
@@ -195,7 +195,7 @@ class _FrameSource:
         return self._small(count)
 
     def _receive(self, space: memoryview) -> int:
-        """Wait for bytes; busy-poll if the last ones arrived faster than a thread wakes up."""
+        """Wait for bytes; busy-poll if the previous ones arrived faster than a thread wakes up."""
         start = time.perf_counter()
         count = None
         if self._is_fast and self._readers.last is self:
@@ -203,7 +203,7 @@ class _FrameSource:
                 count = busy_receive(self.sock, space)
         if count is None:
             count = self.sock.recv_into(space)
-        # This is also false if bytes were ready but this thread waited for the GIL: then other threads in this
+        # This is also false if bytes were ready but this thread had to wait for the GIL: then other threads in this
         # process need it.
         self._is_fast = self._may_busy_poll and time.perf_counter() - start < BUSY_POLL_SECONDS
         self._readers.last = self

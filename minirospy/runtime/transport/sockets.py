@@ -31,10 +31,10 @@ FAMILIES = (socket.AF_INET, socket.AF_INET6)  # the address families of TCP sock
 
 HANDSHAKE_SECONDS = 10.0  # time limit for each handshake, because a peer may never respond
 
-BUSY_POLL_SECONDS = 0.0002  # most responses from a process on the same host arrive within this time
+BUSY_POLL_SECONDS = 0.0002  # seconds within which most responses from a process on the same host arrive
 
 _KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
-"""Seconds of silence, seconds between probes, number of probes. On macOS the first one is called TCP_KEEPALIVE."""
+"""Seconds of silence, seconds between probes, number of probes. On macOS the first option is called TCP_KEEPALIVE."""
 
 # Requested buffer size for a Unix socket in bytes, as much as TCP buffers; Linux limits it to net.core.wmem_max (208
 # kB by default)
@@ -54,7 +54,7 @@ class Peer(NamedTuple):
 def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
     """Set TCP_NODELAY as requested, and keepalive, so that a peer that lost power is detected within a minute.
 
-    Sockets of other kinds remain unchanged.
+    Has no effect on sockets that are not TCP sockets.
     """
     if sock.family not in FAMILIES:
         return
@@ -89,7 +89,7 @@ def resolvable(host: str) -> bytes:
 
 
 def peer(sock: socket.socket) -> Peer:
-    """Return the process at the other end of a Unix socket. Linux only."""
+    """Return the credentials of the process at the other end of a Unix socket. Linux only."""
     return Peer(*_PEER.unpack(sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size)))
 
 
@@ -100,7 +100,7 @@ def hang_up(sock: socket.socket) -> None:
 
 
 def is_readable(sock: socket.socket) -> bool:
-    """Return whether a read would not block. Uses poll, since select fails on descriptors above 1023."""
+    """Return whether a read would not block. Uses poll, because select fails on descriptors above 1023."""
     if hasattr(select, "poll"):
         return bool(_poll(sock, select.POLLIN).poll(0))
     return bool(select.select([sock], [], [], 0)[0])
@@ -118,8 +118,8 @@ def is_writable(sock: socket.socket, milliseconds: int) -> bool:
 def busy_poll(sock: socket.socket) -> None:
     """Busy-poll for another process's response, for up to a fifth of a millisecond.
 
-    Waking up takes as long as such a response. The processor is yielded to other processes meanwhile, since the peer may
-    need it. Has no effect on a socket that may not be busy-polled.
+    Waking up takes as long as such a response. While polling, this yields the processor to other processes, because the
+    peer may need it. Has no effect on a socket that may not be busy-polled.
     """
     if may_busy_poll(sock):
         _busy_poll(sock, select.POLLIN)

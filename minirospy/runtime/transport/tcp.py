@@ -31,12 +31,13 @@ __all__ = [
     "send_header",
 ]
 
-# Maximum handshakes in progress; another one closes the oldest, since a genuine one takes milliseconds
+# Maximum number of handshakes in progress. Another one closes the oldest, because a genuine one takes only
+# milliseconds
 MAX_HANDSHAKES = 200
 
 _AT_HAND = 8192
 _SHORT_HEADER = 64 * 1024
-# bytes in all incomplete headers above _SHORT_HEADER from a node's peers
+# total bytes of all incomplete headers above _SHORT_HEADER from a node's peers
 _MAX_LONG_HEADERS = 16 * 1024 * 1024
 
 _REFUSALS_LOGGED = 10
@@ -108,7 +109,7 @@ async def receive_header(
 ) -> Header:
     """Return the peer's connection header. Raise OSError if the connection fails, WireError if the header is invalid.
 
-    With ``memory``, a long header is refused if other headers use up the limit.
+    With ``memory``, a long header is refused if the headers of other peers use up the memory.
     """
     at_hand = _header_at_hand(sock)
     if at_hand is not None:
@@ -145,7 +146,7 @@ class Listener:
         self._accept = accept
         self._allows = allows
         self._sock: socket.socket | None = None
-        # Handshake task -> the peer's address, in the order in which the tasks started.
+        # Dict from handshake task to the peer's address, in the order in which the tasks started.
         self._handshakes: dict[asyncio.Task[None], str] = {}
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.port = 0
@@ -187,7 +188,7 @@ class Listener:
             asyncio.get_running_loop().add_reader(self._sock, self._take_one, self._sock)
 
     def _take_one(self, sock: socket.socket) -> None:
-        """Accept one connection; the loop calls this again for the next, so that accepted ones are served in between."""
+        """Accept one connection. The loop calls this again for the next one, so that the accepted one is served in between."""
         try:
             peer, address = sock.accept()
         except (BlockingIOError, InterruptedError):
@@ -228,7 +229,7 @@ class Listener:
         try:
             await self._accept(peer, address)
         except (_NothingSaidError, BrokenPipeError):
-            # The peer is a node that exited meanwhile, or a port scan.
+            # The peer is a node that has exited in the meantime, or a port scan.
             _log.debug("connection from %s: it disconnected before it was answered", address)
             peer.close()
         except (OSError, WireError) as error:
@@ -253,7 +254,7 @@ def _bind(host: str, port: int) -> socket.socket:
             # Do not set this on Windows, where it would let two servers share a port.
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if family == socket.AF_INET6:
-            # Accept IPv4 too, because peers without ROS_IPV6 use it.
+            # Accept IPv4 too, because peers without ROS_IPV6 use IPv4.
             sock.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
         sock.bind((host, port))
     except BaseException:
@@ -284,7 +285,7 @@ async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | in
 
 
 def _header_at_hand(sock: socket.socket) -> Header | None:
-    """Return a header that has already arrived completely, as most have; this saves a task and a timer."""
+    """Return a header that has already arrived completely, or None. Most have, which saves a task and a timer."""
     try:
         seen = sock.recv(_AT_HAND, socket.MSG_PEEK)
     except (BlockingIOError, InterruptedError):
@@ -328,7 +329,7 @@ async def _receive_exactly(
 
 @contextlib.contextmanager
 def _time_limit(doing: str) -> Iterator[None]:
-    """Convert asyncio's TimeoutError into the built-in one, with the name of the operation.
+    """Convert asyncio's TimeoutError into the built-in one, and name the operation in its message.
 
     Before Python 3.11 they are different classes.
     """

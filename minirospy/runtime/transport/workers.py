@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 
 
 class Workers:
-    """A pool of daemon threads that remain for a while after their work, because starting a thread is expensive.
+    """A pool of daemon threads that remain for a while after their function returns, because starting a thread is expensive.
 
     Their number is not limited: each connection that waits for bytes uses one, and the number of peers is limited when they
     are accepted.
@@ -35,8 +35,8 @@ class Workers:
         """Run ``function(*args)`` in a worker; log an uncaught exception. Raise ThreadLimitError if no thread can be started."""
         with self._lock:
             if self._idle:
-                # A claimed worker always takes an entry, because a worker that exits first removes itself from the
-                # idle ones.
+                # A claimed worker always takes an entry, because a worker that exits without one first removes itself
+                # from the idle workers.
                 self._idle -= 1
                 self._work.put((function, args))
                 return
@@ -61,7 +61,7 @@ class Workers:
                     if self._idle:
                         self._idle -= 1
                         return
-                # This worker was claimed just as it was about to exit: the entry will arrive immediately.
+                # This worker was claimed just as it was about to exit, so the entry will arrive immediately.
                 function, args = self._work.get()
 
 
@@ -75,7 +75,7 @@ class InOrder:
         self._is_running = False
 
     def start(self, function: Callable[..., object], *args: object) -> None:
-        """Run ``function(*args)`` after the functions that were started before; log an uncaught exception."""
+        """Run ``function(*args)`` after the functions that were passed earlier; log an uncaught exception."""
         with self._lock:
             self._waiting.append((function, args))
             if self._is_running:

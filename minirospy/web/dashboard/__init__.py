@@ -1,1 +1,1 @@
-"""The dashboard: one page for the graph and the board, served by the bridge. docs/dashboard.md describes its functions."""
+"""The dashboard, a web page for the graph and the board, served by the bridge. docs/dashboard.md describes its functions."""

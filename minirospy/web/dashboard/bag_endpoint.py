@@ -1,10 +1,10 @@
-"""Bags for the page: record topics, and open and play bags, with JSON over WebSocket.
+"""Bags for the page: record topics, open bags and play them, with JSON over WebSocket.
 
 A client sends ``{"op": NAME, ...}``: list; record {topics, name, suffix, compression}, stop; open {name}, close;
 play {paused, rate, seek, looping}, step, back; publish {topics, clock}; show {topics}; density {start, end, bins};
 thumbnails {topic, times}. The server sends ``{"writes"}``, ``{"files", "folder", "given"}``, ``{"recording"}``,
-``{"bag"}``, ``{"state"}``, ``{"density"}``, ``{"error"}``, and binary messages: a byte (1 the current message, 2 one for a
-thumbnail), the topic's number (u16), its time (f64), the serialized message.
+``{"bag"}``, ``{"state"}``, ``{"density"}``, ``{"error"}``, and binary messages: a byte (1: the current message, 2: a message
+for a thumbnail), the topic's number (u16), its time (f64), the serialized message.
 Times are seconds since the bag's start. All operations require the read-write token, because files are read and written as the
 dashboard's user.
 """
@@ -53,7 +53,7 @@ _SECOND = 10**9
 
 
 class BagEndpoint(JsonEndpoint["BagSession"]):
-    """Serves the bags of a folder; all clients share the same recording."""
+    """Serves the bags in a folder; all clients share the same recording."""
 
     def __init__(self, folder: BagFolder, master_uri: str, graph: Callable[[], SharedGraph]) -> None:
         super().__init__(SUBPROTOCOL, lambda client: BagSession(self, client))
@@ -68,7 +68,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
         is_starting = self._starting and not self._starting.done()
         if is_starting or (self.recording and not self.recording.state().is_ended):
             raise UsageError("there is a recording already: stop it first")
-        # The page may be closed during the start, and the child process must not be lost then.
+        # The page may be closed while the recording starts, and the child process must not be lost then.
         self._starting = self.spawn(self._start(name, suffix, topics, compression))
         await asyncio.shield(self._starting)
 
@@ -88,7 +88,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
             self.changed()
 
     async def close(self) -> None:
-        """End all sessions, whose connections have been closed, and complete the recording."""
+        """End all sessions, whose connections are already closed, and complete the recording."""
         await super().close()
         await self._close_recording()
 
@@ -108,7 +108,7 @@ class BagSession(JsonSession):
         self._endpoint = endpoint
         self._bag: OpenBag | None = None
         self._shown: dict[str, int] = {}
-        """Topics whose messages are sent, each with the time of the last message sent, or -1 if none was."""
+        """The topics whose messages are sent, each with the time of the last message sent, or -1 if none was."""
         self._thumbnails: deque[tuple[str, int]] = deque()
         self._sent: dict[str, str] = {}
         handlers: Mapping[str, Handler] = {
@@ -188,7 +188,7 @@ class BagSession(JsonSession):
         try:
             bag = self._bag = await asyncio.wrap_future(future)
         except asyncio.CancelledError:
-            # The page was closed during the opening: close the bag in that session's thread.
+            # The page was closed while the bag was being opened: close the bag in that session's thread.
             future.add_done_callback(_close_opened)
             raise
         start, end = bag.span
@@ -214,7 +214,7 @@ class BagSession(JsonSession):
         self._sent.pop("state", None)
         if bag:
             bag.output.close()
-            # If the client leaves now, only the waiting is cancelled, not the closing.
+            # If the client leaves now, only the waiting is cancelled, not the closing of the bag.
             await asyncio.shield(asyncio.wrap_future(self._thread.submit(bag.close)))
 
     async def _play(self, fields: Fields) -> None:
@@ -254,7 +254,7 @@ class BagSession(JsonSession):
         for line in bag.output.switch(bag.timeline, topics, clock=bool(fields.get("clock"))):
             self.send_error(line)
         bag.player.control(has_clock=bag.output.has_clock)
-        # Publish earlier latched messages, because new subscribers would not receive them otherwise.
+        # Publish earlier messages from latched topics, because new subscribers would not receive them otherwise.
         time = bag.state.time
         for topic, body in await self.in_thread(lambda: bag.latched_before(new, time)):
             bag.output.send(topic, body)
@@ -328,7 +328,7 @@ class BagSession(JsonSession):
 
     @staticmethod
     def _time(bag: OpenBag, seconds: object) -> int:
-        """Convert a client's seconds to the bag's time."""
+        """Convert a client's time in seconds to the bag's time."""
         start, end = bag.span
         return min(max(start + round(number(seconds) * _SECOND), start), end)
 

@@ -1,6 +1,6 @@
 """The bags that the page may open: those in or below one folder, and those on the command line.
 
-A name from the page is never used as a path: it is looked up among the bags that were found.
+A name from the page is never used as a path, but looked up among the bags that were found.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["BagFolder", "FoundBag"]
 _SUFFIXES = (".bag", ".mcap")
 _MAX_BAGS = 1000
 _MAX_ENTRIES = 50_000
-"""Limit for visited files and folders, because the working folder may be a home folder."""
+"""Maximum number of files and folders to visit, because the working folder may be a home folder."""
 
 _MAX_DEPTH = 8
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .+-]{0,99}")
@@ -68,7 +68,7 @@ class BagFolder:
         return sorted(found.values(), key=lambda bag: bag.modified, reverse=True)
 
     def path_of(self, name: str) -> Path:
-        """Return the file of an existing bag, given its name as in :meth:`bags`. Raise BagError if there is none."""
+        """Return the file of an existing bag, given its name as in :meth:`bags`. Raise BagError if it does not exist."""
         if name in self._given:
             return self._given[name]
         parts = name.split("/")

@@ -30,14 +30,14 @@ _log = logging.getLogger(__name__)
 
 _SECOND = 10**9
 _MAX_WAITING = 200
-"""Messages queued for the loop. If the queue is full, the player waits."""
+"""Maximum number of messages queued for the loop. If the queue is full, the player waits."""
 
 
 class GraphOutput:
     """Publishes a player's messages on the loop's graph: the messages on enabled topics, and the clock."""
 
     def __init__(self, graph: SharedGraph) -> None:
-        """Must be called on the loop."""
+        """Create the output. Must be called on the loop."""
         self._graph = graph
         self._loop = asyncio.get_running_loop()
         self._publications: dict[str, Publication] = {}
@@ -161,7 +161,7 @@ class GraphOutput:
 
 
 class OpenBag:
-    """An opened bag: a timeline, and a player that is paused at the start. Methods block: do not call them on the loop.
+    """An opened bag: a timeline, and a player that is paused at the start. Methods block, so do not call them on the loop.
 
     ``on_change`` is called in the player's thread when the player has moved or stopped. Raise BagError if the bag is
     invalid, OSError if it cannot be read.
@@ -199,7 +199,7 @@ class OpenBag:
         return found._replace(time=min(max(found.time, self.span[0]), self.span[1]))
 
     def latched_before(self, topics: Collection[str], time: int) -> list[tuple[str, bytes]]:
-        """Return the last message on each of these topics that is latched, for late subscribers."""
+        """For each latched topic among these, return its last message up to ``time``, for late subscribers."""
         return [
             (topic, message.body)
             for topic in topics

@@ -1,4 +1,4 @@
-"""The virtual board for the page: lights, buttons and simulated person, as JSON over WebSocket.
+"""The virtual board for the page: LEDs, buttons and simulated person, as JSON over WebSocket.
 
 The server sends ``{"name", "boards", "leds": [[pin, color, level]], "buttons": [[pin, level]], "pins": [[pin, function,
 level]], "person": [x, y] | null, "fields": [...], "writes"}`` after each change; a client sends ``{"press": pin}``,
@@ -66,7 +66,7 @@ class BoardSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: the board cannot be changed with it"
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """See :meth:`JsonSession.parse`. An operation's only field is named after the operation."""
+        """See :meth:`JsonSession.parse`. The name of an operation's only field is the operation's name."""
         (name,) = fields
         return name, fields
 
@@ -76,7 +76,7 @@ class BoardSession(JsonSession):
         try:
             directory = BoardDirectory.find(name)
             self._boards = await self.in_thread(directory.names)
-            # Opening a board that is not running starts a process.
+            # Only the owner may open a board that is not running, because this starts a process.
             if name and name not in self._boards and not self.client.is_owner:
                 raise BoardError(
                     f"there is no board [{directory.name}]: {self.client.why_not_owner('start boards')}"
@@ -155,7 +155,7 @@ def _pin(value: object) -> int:
 
 
 def _leave(opening: Future[Board], pressed: set[int]) -> None:
-    """Release the buttons and disconnect from the board, if it was opened. Runs in the session's thread."""
+    """Release the buttons, and disconnect from the board if it was opened. Runs in the session's thread."""
     if opening.cancelled() or opening.exception():
         return
     board = opening.result()

@@ -1,8 +1,8 @@
 """Open a link in the local user's browser, if there is one.
 
-The link contains a secret, and every user of the machine can list command lines. Therefore the browser is started with a
-file that only this user can read: a page that redirects to the link. Browsers send neither Referer nor Origin for a page
-opened from a file.
+The link contains a secret, and every user of the machine can list command lines. Therefore the browser is started with
+a file that only this user can read: a page that redirects to the link. Browsers send neither Referer nor Origin for a
+page opened from a file.
 """
 
 from __future__ import annotations
@@ -80,13 +80,13 @@ def open_link(link: str) -> Callable[[], object] | None:
 
 
 def _open(address: str, remove: Callable[[], object]) -> Callable[[], object]:
-    # Starting a browser may block for seconds; a daemon thread does not keep this process alive.
+    # Starting a browser may block for seconds. A daemon thread does not keep this process alive.
     threading.Thread(target=webbrowser.open, args=(address,), name="browser", daemon=True).start()
     return remove
 
 
 def _parent() -> Path | None:
-    """Return the folder in which to create the file's folder, or None for the system's temporary folder."""
+    """Return the folder in which to create the file's own folder, or None for the system's temporary folder."""
     home = Path.home()
     if any(each.exists() for each in _SNAPS) and os.access(home, os.W_OK):
         return home

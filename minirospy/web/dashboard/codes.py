@@ -1,8 +1,8 @@
 """One-time codes that the local browser exchanges for the token, so that the token is never in a file or a command line.
 
 A code is valid once, for a minute, and is stored in a file that only this user can read (browser.py). On Linux the
-connection that sends it must also belong to this user or to root; a connection whose owner is unknown is refused. Other
-systems have no table of connections that an unprivileged program can read: on those systems the code alone is sufficient.
+connection that sends it must also belong to this user or to root; a connection whose owner is unknown is refused. On
+other systems the code alone is sufficient, because an unprivileged program cannot read a table of connections there.
 """
 
 from __future__ import annotations
@@ -58,13 +58,13 @@ class Codes:
             action()
 
     def token_of(self, code: str) -> str:
-        """Return a code's token, without using up the code; "" if the code is not valid."""
+        """Return the token for a code, without using up the code, or "" if the code is not valid."""
         self.forget_expired()
         found = self._waiting.get(code)
         return found.token if found else ""
 
     def redeem(self, code: str) -> str:
-        """Return a code's token and invalidate the code; "" if the code is not valid."""
+        """Return the token for a code and invalidate the code, or return "" if the code is not valid."""
         token = self.token_of(code)
         self._forget(code)
         return token

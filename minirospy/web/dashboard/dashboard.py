@@ -35,10 +35,11 @@ class Dashboard:
         *,
         publishes_joints: bool = False,
     ) -> None:
-        """``options.foxglove_port`` is the port of the page and its data; the 3D view opens ``rviz_file``.
+        """Create the dashboard.
 
-        ``bags``: the bags that may be opened, by default all bags in the working folder. ``publishes_joints``: publish
-        joints as joint_state_publisher_gui does, even if no page is open.
+        ``options.foxglove_port`` is the port of the page and its data; the 3D view opens ``rviz_file``. ``bags``: the
+        bags that may be opened, by default all bags in the working folder. ``publishes_joints``: publish joints as
+        joint_state_publisher_gui does, even if no page is open.
         """
         master_uri = node.master_uri
         self.codes = Codes()
@@ -69,8 +70,8 @@ class Dashboard:
         """Disconnect all clients. Idempotent."""
         self.codes.close()
         async with AsyncExitStack() as closing:
-            # Close in reverse order, and close all parts even if one fails. Players use the bridge's graph until
-            # their sessions end.
+            # Close the parts in reverse order, and all of them even if one fails. Players use the bridge's graph
+            # until their sessions end.
             for part in (
                 self._tools,
                 self._board,

@@ -1,10 +1,10 @@
 """Driving from the page: publish velocities while the user holds a control, and a zero velocity afterwards.
 
-A client of the sub-protocol sends ``{"topic", "twist": [x, y, z, roll, pitch, yaw]}`` (m/s, rad/s) or ``{"topic", "axes":
-[...], "buttons": [...]}`` repeatedly while a control is held, and ``{"leave": topic}`` when it no longer drives a topic.
-The server sends ``{"writes": bool}`` first, ``{"stopped": topic}`` after it has stopped a topic without commands, and
-``{"error": text, "topic"}``. The last message on each topic is a zero velocity, whether the control is released or the
-connection is lost. This process publishes it; if a client stops sending, a separate thread does
+A client of the sub-protocol sends ``{"topic", "twist": [x, y, z, roll, pitch, yaw]}`` (m/s, rad/s) or ``{"topic",
+"axes": [...], "buttons": [...]}`` repeatedly while a control is held, and ``{"leave": topic}`` when it no longer drives
+a topic. The server sends ``{"writes": bool}`` first, ``{"stopped": topic}`` after it has stopped a topic because
+commands stopped arriving, and ``{"error": text, "topic"}``. The last message on each topic is a zero velocity, whether
+the control is released or the connection is lost. If a client stops sending, a separate thread publishes it
 (:mod:`minirospy.runtime.stop_guard`), even if the event loop is blocked.
 """
 
@@ -45,13 +45,13 @@ __all__ = [
 SUBPROTOCOL = "minirospy.drive.v1"
 
 SILENT_SECONDS = 0.5
-"""A client that holds a control and sends nothing for this long is considered lost, and its topics are stopped."""
+"""A client that holds a control and sends nothing for this many seconds is considered lost, and its topics are stopped."""
 
 _log = logging.getLogger(__name__)
 
 _MAX_TOPICS = 20
 _MAX_VALUES = 100
-_MAX_COMMAND_LENGTH = 20_000  # characters
+_MAX_COMMAND_LENGTH = 20_000  # maximum number of characters in a command
 
 _MAX_AXIS = 3.4028234663852886e38  # largest float32
 
@@ -149,7 +149,7 @@ def _numbers(values: object) -> tuple[float, ...]:
 
 
 class DriveEndpoint:
-    """Opens a session for each client; ``graph()`` returns the graph on which they publish."""
+    """Opens a session for each client; ``graph()`` returns the graph on which clients publish."""
 
     def __init__(self, graph: Callable[[], SharedGraph]) -> None:
         self._graph = graph
@@ -192,7 +192,7 @@ class DriveSession:
             self._send(error=str(error), topic=command.topic)
 
     def received_binary(self, data: bytes) -> None:
-        """Report an error: clients send no binary messages."""
+        """Report an error, because clients send no binary messages."""
         self._send(error="binary messages have no meaning here")
 
     def ended(self) -> None:
@@ -240,7 +240,7 @@ class _Driven:
         held: Velocity | Joystick,
         stopped: Callable[[str], None],
     ) -> None:
-        """Raise BridgeError if clients may not publish the topic, or the topic has another type."""
+        """Advertise the topic. Raise BridgeError if clients may not publish it, or if it has another type."""
         self.kind = type(held)
         self._graph = graph
         self._guard = guard
@@ -258,7 +258,7 @@ class _Driven:
     def hold(self, held: Velocity | Joystick) -> None:
         """Publish a command, and a zero velocity if no further command arrives in time.
 
-        Raise BridgeError if the command could not be stopped.
+        Raise BridgeError, and publish nothing, if a later stop cannot be guaranteed.
         """
         deadline = math.inf if held.is_zero else time.monotonic() + SILENT_SECONDS
         if held.is_zero:
@@ -280,7 +280,7 @@ class _Driven:
             if not self._last.is_zero:
                 self._publish(self._last.zero())
         if self._joining and not self._joining.done():
-            # That task publishes the zero velocity; keep the topic open until then.
+            # The task that waits for subscribers publishes the zero velocity; keep the topic open until then.
             self._joining.add_done_callback(lambda _: self._publication.close())
         else:
             self._publication.close()
@@ -291,14 +291,14 @@ class _Driven:
             if self._deadline > time.monotonic():
                 return  # a command has just arrived, or the topic was released
             self._deadline = math.inf
-            # If the node is shut down, the topic is closed, and no message can be published on it any more.
+            # If the node has been shut down, the topic is closed, and no message can be published on it any more.
             with contextlib.suppress(ROSException):
                 self._publish(self._last.zero())
         with contextlib.suppress(RuntimeError):  # the loop has been closed
             self._loop.call_soon_threadsafe(self._stopped, self._topic)
 
     def _publish(self, held: Velocity | Joystick) -> None:
-        """Publish now or, if subscribers are still connecting, publish the newest command once they are connected.
+        """Publish a command now or, if subscribers are still connecting, publish the newest command once they are connected.
 
         The caller must hold the lock.
         """

@@ -1,6 +1,6 @@
 """The page's files and their HTTP headers. Pure except for reading the folder once.
 
-Paths are served from a table of the folder's files, so that a request cannot name any other file. The page contains no
+Requests are served from a table of the folder's files, so that a request cannot name any other file. The page contains no
 secrets, so it needs no token, but its WebSocket does. Source: CSP level 3 (w3.org/TR/CSP3).
 """
 
@@ -28,7 +28,7 @@ _TYPES = {
     ".svg": "image/svg+xml",
     ".txt": "text/plain; charset=utf-8",
 }
-"""Served file types. Other files in the folder are not served."""
+"""The file types that are served; other files in the folder are not."""
 
 SECURITY = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; worker-src 'self'; connect-src 'self'; "

@@ -67,7 +67,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.always_publishes = always_publishes
         self.joints: JointStates | None = None
         self.parameters: JointParameters | None = None
-        self.why = ""  # the reason why there are no joints
+        self.why = ""  # the reason why there are no joints, or ""
         self.warnings: list[str] = []
         self.kinds: dict[str, str] = {}
         self.robot = ""
@@ -123,7 +123,10 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
     # --- the joints
 
     def start_work(self) -> None:
-        """Start the task that follows the parameters and publishes, while there are clients or ``always_publishes``."""
+        """Start the task that follows the parameters and publishes.
+
+        It runs while there are clients or ``always_publishes``.
+        """
         if self._working is None or self._working.done():
             self.is_publishing = self.is_publishing or self.always_publishes
             self._working = asyncio.ensure_future(keep_running(self._work, self._reporter))
@@ -193,7 +196,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             if (why := why_illegal(topic))
         ]
 
-        # Clients receive each generation once, so complete its data before incrementing the counter.
+        # Clients receive each generation only once, so complete its data before incrementing the counter.
         self._values, self.parameters, self.joints = values, parameters, joints
         self.robot, self.kinds, self.warnings, self.why = robot, kinds, warnings, missing_because
         self.generation += 1
@@ -291,7 +294,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return {"joints": found, "why": ""}
 
     def state(self) -> dict[str, object]:
-        """Return the positions of all joints, including mimic joints, and the topic's other publishers."""
+        """Return the positions of all joints, including mimic joints, and the other nodes that publish the topic."""
         values = self.joints.values() if self.joints else None
         # A source may publish infinity or NaN, which JSON cannot represent.
         pairs = zip(values.name, values.position, strict=False) if values else ()
@@ -324,7 +327,7 @@ class JointSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: it sets no joints"
 
     async def follow(self) -> None:
-        """Send the joints, if they were read again, and the joints' positions."""
+        """Send the joints if they have been read again, and the joints' positions."""
         if self._generation != self._endpoint.generation:
             self._generation = self._endpoint.generation
             self.send(self._endpoint.description())
@@ -350,7 +353,7 @@ class JointSession(JsonSession):
 
 
 def _finite(value: float) -> float:
-    """Return a number that JSON can represent, because limits may be infinite."""
+    """Replace an infinite limit with a finite number, because JSON cannot represent infinity."""
     return min(max(value, -_FARTHEST), _FARTHEST) if not math.isnan(value) else 0.0
 
 

@@ -1,8 +1,8 @@
 """Sessions of the page's endpoints: clients send operations and receive responses as JSON.
 
-An operation is an object with its name, ``{"op": NAME, ...}``. If the client lacks the permission, the string is too long
-or not an operation, or the operation fails, the response is ``{"error": text}`` with one line of text. Operations run one
-after another in a task of the session. The state that is sent to a client is read after changes, not at regular
+An operation is an object with its name, ``{"op": NAME, ...}``. If the client may not do this, if the string is too long
+or not an operation, or if the operation fails, the response is ``{"error": text}`` with one line of text. Operations
+run one after another in a task of the session. The state that is sent to a client is read after changes, not at regular
 intervals.
 """
 
@@ -32,12 +32,12 @@ _log = logging.getLogger(__name__)
 
 _MAX_ERROR_LENGTH = 1000
 _VALUE_FACTOR = 4
-"""Memory that a parsed operation takes per byte of its string, as for objects and lists of numbers."""
+"""Memory that a parsed operation takes, in bytes per byte of its string, for objects and lists of numbers."""
 
-_INTERNAL_ERROR = 1011  # WebSocket close code, RFC 6455, section 7.4.1
+_INTERNAL_ERROR = 1011  # WebSocket close code for an internal error, RFC 6455, section 7.4.1
 
 _CLOCK_SECONDS = time.get_clock_info("monotonic").resolution
-"""Resolution of the loop's clock: 16 ms on Windows before Python 3.13."""
+"""Resolution of the loop's clock in seconds, 16 ms on Windows before Python 3.13."""
 
 _T = TypeVar("_T")
 Fields = Mapping[str, object]
@@ -52,16 +52,16 @@ class JsonSession:
     """The subject of the operations, for error messages."""
 
     owners_only: ClassVar[str] = ""
-    """The operations that require the token, for error messages; empty if other clients may use some of them."""
+    """A description of the operations that require the token, for error messages; "" if other clients may use some of them."""
 
     longest: ClassVar[int] = 256_000
-    """Maximum characters in an operation, because parsing it delays all clients."""
+    """Maximum number of characters in an operation, because parsing it delays all clients."""
 
     most_waiting: ClassVar[int] = 100
     pace: ClassVar[float] = 0.05  # minimum seconds between calls of :meth:`follow`
 
     def __init__(self, client: WebClient, handlers: Mapping[str, Handler]) -> None:
-        """``handlers``: the functions that execute the operations, by name."""
+        """Create the session. ``handlers``: the functions that execute the operations, by name."""
         self.client = client
         self.is_ended = False
         self._handlers = handlers
@@ -157,11 +157,11 @@ class JsonSession:
             self.dispatch(name, fields)
 
     def received_binary(self, data: bytes) -> None:
-        """Report an error: clients send no binary messages."""
+        """Report an error, because clients send no binary messages."""
         self.send_error("binary messages have no meaning here")
 
     def ended(self) -> None:
-        """End the session. Idempotent: resources are released only once, without interruption."""
+        """End the session. Idempotent: resources are released only once, and the release is not interrupted."""
         if not self.is_ended:
             self.is_ended = True
             self._task.cancel()
@@ -321,10 +321,10 @@ class JsonEndpoint(Generic[_S]):
 
 
 async def wait_until(event: asyncio.Event, end: float) -> None:
-    """Wait for an event, at most until ``end`` on the loop's clock; after the timeout, the clock is past ``end``."""
-    # Do not use asyncio.wait_for: before Python 3.12 it may lose a cancellation that coincides with the event. Add
-    # the clock's resolution, because a loop runs timers early by that much, and callers that compare times would spin
-    # until the clock advances.
+    """Wait for an event until the loop's clock reaches ``end``. After a timeout, the clock is certain to be past ``end``."""
+    # Do not use asyncio.wait_for, because before Python 3.12 it may lose a cancellation that coincides with the
+    # event. Add the clock's resolution, because a loop runs timers early by that much, and callers that compare times
+    # would spin until the clock advances.
     loop = asyncio.get_running_loop()
     timer = loop.call_at(end + _CLOCK_SECONDS, event.set) if end < math.inf else None
     try:
@@ -354,7 +354,7 @@ def texts_of(fields: Fields, name: str) -> list[str]:
 
 
 def number(value: object) -> float:
-    """Return an operation's field as a finite number. Raise TypeError or OverflowError if it is not one."""
+    """Return an operation's field as a finite number. Raise TypeError or OverflowError if it is not a finite number."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise TypeError(f"{value!r:.40} is not a number")
     return float(value)

@@ -36,7 +36,7 @@ _LOG_SECONDS = 0.2
 _STOPPING_SECONDS = 0.2
 _MAX_RUNS = 50
 _MAX_ENDED = 20
-"""Ended launches that are stored with their last lines."""
+"""Maximum number of ended launches that are stored with their last lines."""
 
 _TAIL_BYTES = 64 * 1024
 
@@ -50,7 +50,7 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         self.packages = Packages(self.environment)
         self.files = LaunchFiles(self.packages)
         self.runs: dict[int, LaunchRun] = {}
-        """The launches by id, in order; changed only on the loop."""
+        """The launches by id, in order. Changed only on the loop."""
         self._restarting: set[int] = set()
 
     def start(self, file: LaunchFile, path: Path, args: Mapping[str, str]) -> None:
@@ -81,7 +81,7 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
             self._restarting.discard(run.id)
 
     def changed(self) -> None:
-        """See :meth:`JsonEndpoint.changed`. Also discards all but the newest ended launches."""
+        """See :meth:`JsonEndpoint.changed`. Also discards old launches: of those that have ended, only the newest are kept."""
         ended = [run.id for run in self.runs.values() if run.is_ended and run.id not in self._restarting]
         for number in ended[:-_MAX_ENDED]:
             del self.runs[number]
@@ -128,7 +128,7 @@ class _Tail:
                 data = file.read(_TAIL_BYTES)
         except OSError:
             return ""
-        # Return whole lines, because the end may be in the middle of a character. Exceptions: a very long line, and
+        # Return whole lines, because the data may end in the middle of a character. Exceptions: a very long line, and
         # the last line after the exit.
         end = data.rfind(b"\n") + 1
         is_whole = not end if len(data) == _TAIL_BYTES else has_exited
@@ -162,7 +162,7 @@ class LaunchSession(JsonSession):
 
     async def follow(self) -> float | None:
         """Send the launches, if one has changed, and new lines of the log."""
-        # Check this before sending, because a change after the check triggers another call.
+        # Check this before sending, so that a change after the check triggers another call.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()
         is_growing = await self._send_log()
@@ -232,7 +232,7 @@ class LaunchSession(JsonSession):
             self.client.send_text_message("launches", text.encode(), newest_only=True)
 
     async def _send_log(self) -> bool:
-        """Send new lines; return whether more lines may arrive without a change in the launch."""
+        """Send new log lines; return whether to check again even if the launch's state does not change."""
         tail = self._tail
         if tail is None:
             return False

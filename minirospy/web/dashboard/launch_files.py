@@ -1,4 +1,4 @@
-"""The launch files in packages; a page identifies one by its package and its path in the package."""
+"""The launch files in packages. A page identifies a file by its package and its path in the package."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class LaunchFiles:
     def path_of(self, file: LaunchFile) -> Path:
         """Return the path of a launch file that was found.
 
-        Raise NotFoundError if it was not found: such files are not started.
+        Raise NotFoundError if it was not found, because such files must not be started.
         """
         if not self._found:
             self.scan()

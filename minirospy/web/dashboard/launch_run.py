@@ -28,7 +28,7 @@ _MAX_LINES = 2000
 
 
 class NodeState(NamedTuple):
-    """A node of a launch: starting, running, ending, exited (``status``), failed (it could not be started), stopped.
+    """A node in a launch: starting, running, ending, exited (with ``status``), failed (it could not be started) or stopped.
 
     ``starts``: the number of starts; ``respawns``: whether it is restarted when it exits.
     """
@@ -43,7 +43,7 @@ class NodeState(NamedTuple):
 
 
 class RunState(NamedTuple):
-    """A launch: starting, running, stopping or ended; ``error``: the error that ended the launch, "" if there was none."""
+    """A launch, which is starting, running, stopping or ended; ``error``: the error that ended the launch, or ""."""
 
     id: int
     package: str
@@ -132,8 +132,8 @@ class LaunchRun:
         self._exited: dict[str, Process] = {}
         self._known: dict[str, Process] = {}
         self._lock = threading.Lock()
-        # A daemon thread, because if this process exits without stopping the launch, the launcher's guardian process
-        # ends the nodes.
+        # Use a daemon thread, because if this process exits without stopping the launch, the launcher's guardian
+        # process ends the nodes.
         self._thread = threading.Thread(target=self._run, name=f"launch-{self.id}", daemon=True)
         self._thread.start()
 
@@ -166,7 +166,7 @@ class LaunchRun:
         return RunState(self.id, self.package, self.file, self.args, self._state, self._error, nodes)
 
     def log_file(self, node: str) -> Path | None:
-        """Return the file with a node's output; or None if it does not exist yet."""
+        """Return the file with a node's output, or None if it does not exist yet."""
         process = self._known.get(node)
         return process.stdout_file if process else None
 

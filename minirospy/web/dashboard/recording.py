@@ -21,7 +21,7 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""Timeouts for stopping; long, because after SIGINT the file is completed, possibly on a slow disk."""
+"""Timeouts for stopping. They are long, because after SIGINT the file is completed, possibly on a slow disk."""
 
 _TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
 """Short timeouts while no file is open: a starting interpreter may lose a SIGINT that arrives in a callback of importlib."""
@@ -33,9 +33,9 @@ COMPRESSIONS = {".bag": {"none": [], "lz4": ["--lz4"], "bz2": ["--bz2"]},
 
 
 class RecordingState(NamedTuple):
-    """A recording: its file's name, topics, seconds, bytes.
+    """A recording: its file's name, topics, seconds, and size in bytes.
 
-    ``is_ended``, and the error of an ended recording, "" if there is none.
+    ``error`` describes why an ended recording failed; it is "" if it did not fail.
     """
 
     name: str
@@ -47,7 +47,7 @@ class RecordingState(NamedTuple):
 
 
 class Recording:
-    """One run of `rosbag record` into ``path``, whose suffix is .bag or .mcap.
+    """A process that runs `rosbag record` into ``path``, whose suffix is .bag or .mcap.
 
     Raise MinirospyError if it cannot be started.
     """
@@ -102,7 +102,8 @@ class Recording:
             "rosbag record",
             command,
             environ={**os.environ, "PYTHONUNBUFFERED": "1", "ROS_MASTER_URI": self._master_uri},
-            # -m imports from the working folder first, so avoid a folder that contains the user's own modules.
+            # `python -m` imports from the working folder first, so avoid a folder that contains the user's own
+            # modules.
             folder=Path(minirospy.__file__).parents[2],
             stdout=subprocess.PIPE,
             log_errors=True,
@@ -120,7 +121,7 @@ class Recording:
 
     def state(self) -> RecordingState:
         """Return the current state."""
-        # Query this first, because the sizes are final only after the exit.
+        # Query this first, because the size is final only after the exit.
         status = self._process.exit_code
         size = 0
         for path in self._paths:

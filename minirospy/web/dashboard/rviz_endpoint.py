@@ -1,7 +1,7 @@
 """Read and save .rviz files for the 3D view, with JSON over WebSocket: one response per operation.
 
-``{"read": true}`` -> ``{"config": {...} | null, "name", "writes"}``: the command's file, null if it does not exist yet;
-``{"save": config}`` -> ``{"name"}``: saved there, for clients with the read-write token; ``{"parse": text}`` ->
+``{"read": true}`` -> ``{"config": {...} | null, "name", "writes"}`` reads the command's file (null: it does not exist
+yet); ``{"save": config}`` -> ``{"name"}`` saves it, for clients with the read-write token; ``{"parse": text}`` ->
 ``{"config"}`` and ``{"format": config}`` -> ``{"text"}`` for files that the browser opens or saves. A failure is
 ``{"error": text}``. Operations cannot name a file.
 """
@@ -74,7 +74,7 @@ class RvizEndpoint(JsonEndpoint["RvizSession"]):
         """One thread for all sessions, because parsing in parallel would delay the loop longer, and saves could conflict."""
 
     async def close(self) -> None:
-        """End all sessions after completing running saves."""
+        """End all sessions after completing the saves in progress."""
         await super().close()
         self.thread.shutdown(wait=False)
 
@@ -97,7 +97,7 @@ class RvizSession(JsonSession):
         super().__init__(client, handlers)
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """See :meth:`JsonSession.parse`. An operation's only field is named after the operation."""
+        """See :meth:`JsonSession.parse`. The name of an operation's only field is the operation's name."""
         (name,) = fields
         return name, fields
 

@@ -1,4 +1,4 @@
-"""Parse and format the YAML of .rviz files: text -> plain values -> text that RViz reads. Pure.
+"""Parse the YAML of .rviz files to plain values, and format such values as YAML that RViz reads. Pure.
 
 Parsing and formatting are implemented here in one pass, because PyYAML's loader and dumper take seconds for a 200 kB file
 or, in their compiled form, hold the GIL for that time.
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_CHARACTERS", "format_rviz", "parse_rviz"]
 
-MAX_CHARACTERS = 200_000  # RViz's own files have some 10,000 characters
+MAX_CHARACTERS = 200_000  # maximum number of characters; RViz's own files have some 10,000
 
 _MANAGER = "Visualization Manager"
 _MAX_DEPTH = 50
@@ -33,7 +33,7 @@ _SCALARS: tuple[tuple[re.Pattern[str], Callable[[str], object]], ...] = (
     (re.compile(r"-?(?:0|[1-9][0-9]{0,14})"), int),
     (re.compile(r"-?(?:[0-9]+\.[0-9]*(?:[eE][-+]?[0-9]{1,3})?|[0-9]+[eE][-+][0-9]{1,3})"), float),
 )
-"""Values that are not strings; other YAML 1.1 types (dates, octal numbers) stay strings, as in RViz."""
+"""Patterns and parsers for values that are not strings. Other YAML 1.1 types (dates, octal numbers) stay strings, as in RViz."""
 
 _PLAIN = re.compile(r"[A-Za-z0-9_/(](?:[A-Za-z0-9_/.;,()+=-]| (?=[^ #])|:(?=[^ ]))*")
 """Strings that need no quotes, unless another parser could read them as numbers."""
@@ -46,7 +46,7 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
     try:
         value = _built(yaml.parse(text, Loader=_LOADER), name)
     except yaml.MarkedYAMLError as error:
-        # If something is missing at the end, the compiled parser reports the line after the last one.
+        # If something is missing at the end of the file, the compiled parser reports the line after the last one.
         line = min(error.problem_mark.line, text.count("\n")) + 1 if error.problem_mark else 1
         raise RvizFileError(name, line, f"not YAML: {error.problem}") from None
     except (yaml.YAMLError, ValueError) as error:
@@ -117,7 +117,7 @@ def format_rviz(config: Mapping[str, object]) -> str:
 
 
 def _lines(value: Mapping[str, object] | list[object], depth: int) -> Iterator[str]:
-    """Yield the lines of a nonempty map or list, nested in ``depth - 1`` others."""
+    """Yield the lines for a nonempty map or list at a nesting depth of ``depth``."""
     # Limit the depth, because each line passes through one generator per level and is indented once per level.
     if depth >= _MAX_DEPTH:
         raise RvizFileError("the file", 0, "nested too deeply")

@@ -1,4 +1,4 @@
-"""Requests from the views about nodes, types and files, which the Foxglove protocol lacks, as JSON over WebSocket.
+"""The views' requests about nodes, types and files, which the Foxglove protocol lacks, as JSON over WebSocket.
 
 A client sends ``{"id": 1, "do": NAME, ...}``; the server responds with ``{"id": 1, "result": ...}`` or ``{"id": 1,
 "error": "..."}``. The requests are in ``ToolsSession.handlers``. After ``watch``, the server sends ``{"report": ...}``
@@ -45,11 +45,11 @@ _TYPE_NAMES: Mapping[type, str] = {
     bool: "bool", int: "int", float: "double", str: "string", bytes: "binary", list: "list", tuple: "list", dict: "dictionary",
 }  # fmt: skip
 _MAX_PREVIEW = 200
-"""Maximum characters of a value shown while the user types it."""
+"""Maximum characters shown of a value that the user is typing."""
 
 _REPORT_SECONDS = 2.0
 _MAX_CONCURRENT = 4
-"""Concurrent requests from one client, because nodes that do not respond take seconds."""
+"""Maximum concurrent requests from one client. Nodes that do not respond take seconds."""
 
 
 class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
@@ -102,7 +102,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         while True:
             started = time.monotonic()
             try:
-                # Use one thread, so that if a survey is cancelled, the next survey waits until it has ended.
+                # Use one thread, so that if a survey is cancelled, the next one waits until it has ended.
                 now = await asyncio.get_running_loop().run_in_executor(self._surveyor, self._survey)
             except (MinirospyError, OSError) as error:
                 fields: Mapping[str, object] = {"trouble": str(error)}
@@ -116,7 +116,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             await asyncio.sleep(max(_REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
     def topic_types(self) -> Mapping[str, str]:
-        """Return the topic types that the master knows; ``*`` if there are only subscribers to any type."""
+        """Return the topic types that the master knows; ``*`` if a topic has only subscribers to any type."""
         with self.graph() as graph:
             return graph.master.get_topic_types()
 
@@ -126,7 +126,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
 
 
 class ToolsSession(JsonSession):
-    """One client's session. A response with the request's ``id`` is sent when each request is done."""
+    """A client's session. When a request is done, a response with the request's ``id`` is sent."""
 
     subject: ClassVar[str] = "the graph"
     longest: ClassVar[int] = 100_000
@@ -271,18 +271,18 @@ class ToolsSession(JsonSession):
             raise UsageError(f"this token is read-only: it {what}")
 
     async def _yaml(self, fields: Fields) -> Fields:
-        """Return the values in a file of rqt_reconfigure or dynparam, by name."""
+        """Return the values, by name, in a file from rqt_reconfigure or dynparam."""
         text = text_of(fields, "text")
         loop = asyncio.get_running_loop()
         values = await loop.run_in_executor(self._endpoint.parser, parameter_values, text)
-        # JSON cannot represent infinity.
+        # JSON cannot represent infinity, so represent it as a string.
         return {
             name: value if not isinstance(value, float) or math.isfinite(value) else str(value)
             for name, value in values.items()
         }
 
     async def _value(self, fields: Fields) -> Fields:
-        """Return the type and text of the value that `rosparam set` would store for ``text``."""
+        """Return the type and YAML text of the value that `rosparam set` would store for ``text``."""
         value = await self._parsed(fields)
         return {"type": _type_name(value), "text": format_value(value)[:_MAX_PREVIEW]}
 

@@ -63,7 +63,7 @@ def link(
 
 
 def plotted_fields(words: Iterable[str]) -> list[str]:
-    """Return the paths for rqt_plot's arguments: ``/a/x,/b/y`` are two, ``/pose/x:y`` is /pose/x and /pose/y.
+    """Return the paths in rqt_plot's arguments: ``/a/x,/b/y`` has two, and ``/pose/x:y`` means /pose/x and /pose/y.
 
     Raise UsageError if an argument is not a path.
     """

@@ -1,4 +1,4 @@
-"""Files for clients: meshes and images that a robot description refers to, read only from known packages."""
+"""Files for clients: meshes and images that a robot description refers to. They are read only from known packages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["ALLOWED", "MAX_BYTES", "Assets"]
 ALLOWED = r"^package://(?:[-\w%]+/)*[-\w%.]+\.(?:dae|fbx|glb|gltf|jpeg|jpg|mtl|obj|png|stl|tif|tiff|urdf|webp|xacro)$"
 """The URIs that foxglove_bridge allows; the whole URI must match, ignoring case."""
 
-MAX_BYTES = 100_000_000  # size limit for a file
+MAX_BYTES = 100_000_000  # maximum size of a file
 
 
 class Assets:
@@ -28,7 +28,7 @@ class Assets:
     def __init__(
         self, packages: Packages, allowed: Sequence[str] = (ALLOWED,), most_bytes: int = MAX_BYTES
     ) -> None:
-        """Read files in ``packages`` whose URI matches a regular expression in ``allowed``.
+        """Create a reader for files in ``packages`` whose URI matches a regular expression in ``allowed``.
 
         Raise BridgeError if an expression is invalid.
         """

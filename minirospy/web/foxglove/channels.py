@@ -14,7 +14,7 @@ from minirospy.web.graph import SharedGraph
 __all__ = ["Channels", "Services"]
 
 _SECONDS = 3.0
-"""Timeout for querying topic types that are not installed. It is short because all clients wait for the list of channels."""
+"""Timeout in seconds for querying topic types that are not installed. It is short because all clients wait for the channels."""
 
 
 class Channels:
@@ -75,8 +75,8 @@ class Channels:
     def redefine(self, channel: Channel, header: Header) -> Channel | None:
         """Return a replacement for a channel whose publisher sends messages with another definition.
 
-        Return None if the channel has been removed, or was replaced before, because then its publishers contradict each
-        other.
+        Return None if the channel has been removed. Also return None if it was replaced before, because that means that
+        its publishers contradict each other.
         """
         md5sum = header.get("md5sum", ANY)
         if self.by_id.get(channel.id) is not channel or md5sum in self._definitions[channel.topic]:

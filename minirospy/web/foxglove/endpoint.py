@@ -1,4 +1,4 @@
-"""The server for the Foxglove protocol: the offers to all clients, and their changes."""
+"""The server for the Foxglove protocol: advertises channels and services to all clients, and updates them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = ["CAPABILITIES", "FoxgloveEndpoint", "FoxgloveOptions", "Playback"]
 _log = logging.getLogger(__name__)
 
 CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "services", "connectionGraph", "assets")
-"""The capabilities that clients have by default."""
+"""The default capabilities of clients."""
 
 _FOR_WRITERS = {"clientPublish", "services", "playbackControl"}
 _DROP_REPORT_SECONDS = 2.0
@@ -42,7 +42,7 @@ class Playback(Protocol):
         """Return the start and end of the recording, in nanoseconds."""
 
     def now(self) -> int:
-        """Return the current time in the recording, which stamps messages."""
+        """Return the current playback time, used as messages' timestamp."""
 
     def state(self) -> PlaybackState: ...
 
@@ -51,7 +51,7 @@ class Playback(Protocol):
 
 @dataclass(frozen=True)
 class FoxgloveOptions:
-    """``name`` is the server name that clients see; ``session_id`` differs for each start of the bridge."""
+    """``name`` is the server's name that clients show; ``session_id`` is different for each start of the bridge."""
 
     name: str = "minirospy bridge"
     capabilities: Sequence[str] = CAPABILITIES
@@ -78,7 +78,7 @@ class FoxgloveEndpoint:
 
         self.sessions: set[FoxgloveSession] = set()
         self._options = options or FoxgloveOptions()
-        self._waiting: set[FoxgloveSession] = set()  # clients to which the channels have not been sent yet
+        self._waiting: set[FoxgloveSession] = set()  # clients that have not been sent the channels yet
         self._is_known = False
         self._updating: asyncio.Task[None] | None = None
         self._is_outdated = False
@@ -193,7 +193,7 @@ class FoxgloveEndpoint:
             self._updating = self.graph.spawn(self._update())
 
     async def _update(self) -> None:
-        """Advertise new channels and services and remove old ones; repeat if the graph has changed meanwhile."""
+        """Advertise new channels and services and remove old ones; repeat this if the graph has changed in the meantime."""
         while self._is_outdated:
             self._is_outdated = False
             new_services, removed_services = self.services.update(self.graph)

@@ -1,4 +1,4 @@
-"""`rosrun foxglove_bridge foxglove_bridge`: the bridge as a node for launch files, with the real bridge's parameters.
+"""`rosrun foxglove_bridge foxglove_bridge`: the bridge as a node for launch files, with the parameters of the real bridge.
 
 Tokens come from the environment (MINIROSPY_BRIDGE_TOKEN, MINIROSPY_BRIDGE_READ_TOKEN), never from parameters, which every
 node can read. Source: https://github.com/foxglove/ros-foxglove-bridge (README).

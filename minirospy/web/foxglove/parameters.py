@@ -27,7 +27,7 @@ class Parameters:
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
         self._wanted: dict[ParameterListener, set[str] | None] = {}
-        """The names to which each client subscribes; None: all."""
+        """The names that each client subscribes to; None means all."""
         self._is_watching = False
         self._at_master = asyncio.Lock()
 
@@ -81,7 +81,7 @@ class Parameters:
             self._graph.spawn(self._in_order(self._graph.node.parameters.add))
 
     def count(self, listener: ParameterListener) -> int:
-        """Return the number of names that a client subscribes to."""
+        """Return the number of parameter names that a client subscribes to."""
         return len(self._wanted.get(listener) or ())
 
     def unsubscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
@@ -126,7 +126,7 @@ class Parameters:
             self._graph.spawn(self._report(tuple(again), emptied))
 
     async def _report(self, names: tuple[str, ...], emptied: str) -> None:
-        """Report current values to subscribers; report ``emptied`` also to clients that subscribe to all."""
+        """Report current values to subscribers; also report ``emptied`` to clients that subscribe to all parameters."""
         found = await self.read(names)
         for listener, wanted in list(self._wanted.items()):
             mine = [each for each in found if each.name in (wanted or (emptied,))]
@@ -135,7 +135,7 @@ class Parameters:
 
 
 def _is_affected(wanted: str, name: str, value: object) -> bool:
-    """Return whether a change of ``name`` may change ``wanted`` in a way that ``value`` does not show."""
+    """Return whether a change of ``name`` may change the parameter ``wanted`` in a way that ``value`` does not show."""
     if name.startswith(wanted.rstrip("/") + "/"):
         return True
     if not isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""The Foxglove WebSocket protocol, version 1: a client's events, and a server's records.
+"""The Foxglove WebSocket protocol, version 1: events from clients, and records sent by the server.
 
 ``parsing.py`` parses messages into events, ``serializing.py`` serializes records. Pure.
 Source: https://github.com/foxglove/ws-protocol (docs/spec.md), and for playback https://github.com/foxglove/foxglove-sdk.
@@ -43,7 +43,7 @@ __all__ = [
 ]
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
-"""Two names of the same protocol; the newer one is preferred if a client offers both."""
+"""Two names for the same protocol; the newer one is preferred if a client offers both."""
 
 MESSAGE_ENCODING = "ros1"
 SCHEMA_ENCODING = "ros1msg"
@@ -107,7 +107,7 @@ class Parameter(NamedTuple):
 
 
 class GraphTables(NamedTuple):
-    """Names of topics or services -> the nodes that use them."""
+    """Dicts from the names of topics or services to the nodes that use them."""
 
     published: Mapping[str, Sequence[str]]
     subscribed: Mapping[str, Sequence[str]]
@@ -229,7 +229,7 @@ class ServiceRequest:
 
 @dataclass(frozen=True)
 class PlaybackControl:
-    """Control a player; ``seek``: the new position (nanoseconds), None for the current one."""
+    """Control a player; ``seek``: the new position in nanoseconds, or None to keep the current one."""
 
     command: PlaybackCommand
     speed: float

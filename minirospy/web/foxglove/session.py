@@ -31,19 +31,20 @@ __all__ = ["FoxgloveSession"]
 _log = logging.getLogger(__name__)
 
 _MAX_CALLS = 200
-"""Limit for one client's concurrent calls and requests."""
+"""Maximum number of concurrent calls and requests from one client."""
 
 _MAX_CHANNELS = 1000
-"""Limit for the topics that one client may publish, and for its subscriptions, each of which receives every message."""
+"""Maximum number of topics that one client may publish, and of its subscriptions, each of which receives every message."""
 
 _MAX_PARAMETERS = 10_000
-"""Parameter names to whose changes one client may subscribe."""
+"""Maximum number of parameter names to which one client may subscribe."""
 
-_MAX_STATUSES = 100  # per client message, which may name thousands of nonexistent channels
+# maximum per client message, because a message may name thousands of nonexistent channels
+_MAX_STATUSES = 100
 _VALUE_FACTOR = 4
-"""Memory of a parsed operation per byte of its string, as for objects and lists of numbers."""
+"""Memory that a parsed operation takes, in bytes per byte of its string, for objects and lists of numbers."""
 
-_TIME = "time"  # key for the time in a slow client's queue, which keeps only the newest message per key
+_TIME = "time"  # key of time messages in a client's queue, so that only the newest one is kept
 
 
 class FoxgloveSession:
@@ -125,7 +126,7 @@ class FoxgloveSession:
         self.send(serializing.unadvertise(ids))
 
     def report_drops(self) -> None:
-        """Notify the client that messages are being dropped, or no longer are. Called at regular intervals."""
+        """Notify the client when messages start or stop being dropped. Called at regular intervals."""
         dropped = self.client.queue.dropped
         if dropped > self._dropped:
             counts = self.client.queue.dropped_of.most_common(3)
@@ -174,7 +175,7 @@ class FoxgloveSession:
             raise BridgeError(f"{doing} is not allowed: {why}")
 
     def _spawn(self, work: Coroutine[object, object, object]) -> None:
-        """Start a task for the received request, which keeps the request's memory."""
+        """Start a task for the received request; the request's memory counts until the task ends."""
         if len(self._calls) >= _MAX_CALLS:
             work.close()
             raise BridgeError(f"{_MAX_CALLS} requests are under way: wait for an answer")

@@ -1,1 +1,1 @@
-"""rosapi: questions about the graph as services, for clients of rosbridge, which have no master to query."""
+"""rosapi: services that report about the graph, for rosbridge clients, which cannot query the master."""

@@ -1,4 +1,4 @@
-"""`rosrun rosapi rosapi_node`: the services of rosapi as a node. Source: http://wiki.ros.org/rosapi."""
+"""`rosrun rosapi rosapi_node`: rosapi's services as a node. Source: http://wiki.ros.org/rosapi."""
 
 from __future__ import annotations
 

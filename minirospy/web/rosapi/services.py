@@ -1,4 +1,4 @@
-"""The services of rosapi, on a node. Source: http://wiki.ros.org/rosapi."""
+"""rosapi's services, provided by a node. Source: http://wiki.ros.org/rosapi."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ _ACTION_TOPICS = ("cancel", "feedback", "goal", "result", "status")
 
 
 class Rosapi:
-    """Offers the services ``/rosapi/...`` on a node, of names that the filters allow."""
+    """Provides the ``/rosapi/...`` services on a node. They report only names that the filters allow."""
 
     def __init__(self, node: Node, filters: Filters | None = None) -> None:
         self.node = node
@@ -124,7 +124,7 @@ class Rosapi:
             await service
 
     async def close(self) -> None:
-        """Withdraw them. Idempotent."""
+        """Stop offering the services. Idempotent."""
         served, self._served = self._served, []
         for service in served:
             await service.close()
@@ -138,7 +138,7 @@ class Rosapi:
     async def _typed_topics(self) -> tuple[list[str], list[str]]:
         graph = await self._graph()
         types = {topic: _known(graph.types.get(topic)) for topic in graph.topics}
-        # Those of unknown type are last.
+        # Put topics of unknown type last.
         topics = sorted(types, key=lambda topic: (not types[topic], topic))
         return topics, [types[topic] for topic in topics]
 
@@ -173,7 +173,7 @@ class Rosapi:
     # --- services
 
     async def _type_of(self, service: str) -> str:
-        """Return a service's type; nothing if it does not answer."""
+        """Return a service's type, or "" if the service does not respond."""
         if not self._filters.services(service):
             return ""
         async with self._probing:
@@ -197,7 +197,7 @@ class Rosapi:
         return {"type": await self._type_of(self.node.resolve(request.service))}
 
     async def _service_providers(self, request: ServiceProvidersRequest) -> object:
-        """``service`` is a type, in spite of its name."""
+        """Return the nodes that provide services of a type; ``service`` is the type, despite its name."""
         found = await self._services_of(request.service)
         return {"providers": [node for _, nodes in found for node in nodes]}
 
@@ -283,7 +283,7 @@ class Rosapi:
 
 
 def _guarded(handler: _Handler) -> _Handler:
-    """Return a handler whose refusals reach the client as a line, not as a traceback in the log."""
+    """Return a handler that reports a BridgeError to the client in one line, without a traceback in the log."""
 
     async def handle(request: object) -> object:
         try:
@@ -299,7 +299,7 @@ def _known(type_: str | None) -> str:
 
 
 def _text_of(type_: str) -> str:
-    """Return the full text of a type; nothing if it is not installed."""
+    """Return the full text of a type, or "" if the type is not installed."""
     try:
         text: str = message_class(type_)._full_text
     except BridgeError:

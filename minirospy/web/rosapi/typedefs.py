@@ -1,4 +1,4 @@
-"""The fields of message types as rosapi's TypeDef describes them. Pure.
+"""The fields of message types, as rosapi's TypeDef describes them. Pure.
 
 Source: http://wiki.ros.org/rosapi (message_details, service_request_details, service_response_details).
 """
@@ -25,7 +25,7 @@ _NOT_AN_ARRAY = -1
 
 @dataclass
 class TypeDefinition:
-    """A type's fields and constants; ``lengths``: -1 where a field is not an array, 0 if its length varies."""
+    """A type's fields and constants. ``lengths`` has -1 for a field that is not an array, 0 for an array of any length."""
 
     type: str
     names: list[str] = field(default_factory=list)
@@ -36,7 +36,7 @@ class TypeDefinition:
 
 
 def describe(class_: type[Message], find: Callable[[str], type[Message]]) -> list[TypeDefinition]:
-    """Return the definitions of a type and of all types in it, each once; ``find`` returns the class of a name."""
+    """Return the definitions of a type and of all types that it uses, each once; ``find`` returns the class for a name."""
     return list(_walk(_described(class_), find, {_name_of(class_)}))
 
 

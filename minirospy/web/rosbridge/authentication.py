@@ -1,4 +1,4 @@
-"""Clients that prove who they are by a MAC, which the node of rosauth checks. Source: http://wiki.ros.org/rosauth."""
+"""Client authentication by a MAC, which rosauth's node checks. Source: http://wiki.ros.org/rosauth."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 __all__ = ["SERVICE", "authenticate"]
 
 SERVICE = "authenticate"
-"""The service of the node `rosrun rosauth ros_mac_authentication`, in the namespace of the server."""
+"""The service of the node `rosrun rosauth ros_mac_authentication`, in the server's namespace."""
 
 
 async def authenticate(node: Node, event: Auth) -> bool:
-    """Return whether rosauth's node accepts a client. Raise ServiceException if it cannot be called."""
+    """Return whether rosauth's node accepts a client. Raise ServiceException if the node cannot be called."""
     class_: Any = service_class("rosauth/Authentication")
     response = await node.call(
         SERVICE,

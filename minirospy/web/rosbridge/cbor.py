@@ -1,6 +1,6 @@
-"""CBOR: what a client sends, and messages with typed arrays by tag. Pure; needs the library cbor2.
+"""Encode and decode CBOR, with typed arrays marked by tags. Pure; needs the library cbor2.
 
-Source: RFC 8949, RFC 8746 (typed arrays), and rosbridge's choice of tags: little-endian ones.
+Source: RFC 8949, RFC 8746 (typed arrays); like rosbridge, this uses the little-endian tags.
 """
 
 from __future__ import annotations
@@ -27,22 +27,25 @@ TYPED_ARRAYS = {
     "float32": (85, "f"),
     "float64": (86, "d"),
 }
-"""Tag and format character of an array of each type."""
+"""Dict from element type to the tag and format character of its arrays."""
 
 _MAX_VALUES = 1_000_000
-"""Of a client's message; an array with a tag is one."""
+"""Maximum number of values in a client's message; a tagged array counts as one."""
 
 _FORMATS = {64: "B", 68: "B", **dict(TYPED_ARRAYS.values())}
 
 
 def encode_cbor(value: object) -> bytes:
-    """Return a value as CBOR. Raise BridgeProtocolError without cbor2."""
+    """Return a value as CBOR. Raise BridgeProtocolError if cbor2 is not installed."""
     data: bytes = _library().dumps(value)
     return data
 
 
 def decode_cbor(data: bytes) -> object:
-    """Return the value of CBOR; typed arrays become lists. Raise ValueError, BridgeProtocolError without cbor2."""
+    """Return the value in CBOR data; typed arrays become lists.
+
+    Raise ValueError if the data is invalid, BridgeProtocolError if cbor2 is not installed.
+    """
     library = _library()
     _check_heads(data)
     stream = BytesIO(data)
@@ -58,7 +61,10 @@ def decode_cbor(data: bytes) -> object:
 
 
 def _check_heads(data: bytes) -> None:
-    """Raise ValueError for too many values, and for tags that no message has: cbor2 would compile regular expressions."""
+    """Raise ValueError if there are too many values, or tags that messages do not use.
+
+    For other tags, cbor2 would for example compile regular expressions.
+    """
     at = count = 0
     while at < len(data):
         major, argument = data[at] >> 5, data[at] & 31
@@ -68,7 +74,7 @@ def _check_heads(data: bytes) -> None:
             argument = int.from_bytes(data[at : at + size], "big")
             at += size
         elif argument == 31:
-            argument = 0  # of indefinite length: its parts follow
+            argument = 0  # the length is indefinite: the parts follow
         if major in (2, 3):
             at += argument
         elif major == 6 and argument not in _FORMATS:
@@ -79,7 +85,7 @@ def _check_heads(data: bytes) -> None:
 
 
 def typed_array(type_: str, values: Sequence[float]) -> object:
-    """Return the tagged bytes of an array of numbers."""
+    """Return an array of numbers as tagged bytes."""
     tag, format_ = TYPED_ARRAYS[type_]
     packed = array(format_, values)
     if sys.byteorder == "big":
@@ -88,7 +94,7 @@ def typed_array(type_: str, values: Sequence[float]) -> object:
 
 
 def _from_tag(first: Any, second: Any = None, *_: object) -> object:
-    """Return the list of a typed array. cbor2 passes its decoder first in older releases."""
+    """Return the list for a typed array. Older versions of cbor2 pass their decoder as first argument."""
     tag = first if hasattr(first, "tag") else second
     format_ = _FORMATS.get(tag.tag)
     if format_ is None or not isinstance(tag.value, bytes):
@@ -106,7 +112,7 @@ def _library() -> Any:
     try:
         import cbor2
     except ImportError as error:
-        # No command: it names the server's interpreter, and this goes to clients.
+        # Do not include the install command, which contains the server's interpreter path: clients receive this text.
         raise BridgeProtocolError(
             "compression cbor needs the library cbor2: install minirospy[web] on the server"
         ) from error

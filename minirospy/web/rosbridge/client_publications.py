@@ -1,4 +1,4 @@
-"""The topics that a client of rosbridge publishes."""
+"""The topics that a rosbridge client publishes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ClientPublications"]
 
-_LARGE_LATCHED = 100_000  # bytes of a latched message that is not kept when its publisher has left
+_LARGE_LATCHED = 100_000  # bytes; a larger latched message is not kept after its publisher has left
 
 
 @dataclass
@@ -31,22 +31,23 @@ class _Published:
     publication: Publication
     message_class: type[Message]
     latch: bool = False
-    latched: int = 0  # bytes of the last message, if it is kept for later subscribers
-    ids: set[object] = field(default_factory=set)  # of the advertisements
-    numbers: itertools.count[int] = field(default_factory=lambda: itertools.count(1))  # for headers
+    latched: int = 0  # bytes of the last message, if it is stored for later subscribers
+    ids: set[object] = field(default_factory=set)  # ids of the advertisements
+    # sequence numbers for headers
+    numbers: itertools.count[int] = field(default_factory=lambda: itertools.count(1))
 
 
 class ClientPublications:
-    """The topics that one client publishes; called with its operations, in their order."""
+    """The topics that one client publishes. Called with the client's operations in order."""
 
     def __init__(self, session: RosbridgeSession) -> None:
         self.latched_size = 0
-        """Bytes of the last messages of latched topics."""
+        """Total bytes of the stored messages of latched topics."""
         self._session = session
         self._published: dict[str, _Published] = {}
 
     def close(self) -> None:
-        """End all of them."""
+        """Stop publishing all topics."""
         for published in self._published.values():
             self._release(published)
         self._published.clear()
@@ -75,7 +76,10 @@ class ClientPublications:
             self._session.count()
 
     def _release(self, published: _Published) -> None:
-        """End a publication: after a while, in which it may be advertised again, but at once if it keeps a large message."""
+        """Release a publication after a delay, within which it may be advertised again.
+
+        Release it immediately if it stores a large message.
+        """
         if published.latched > _LARGE_LATCHED:
             published.publication.close()
         else:
@@ -90,7 +94,7 @@ class ClientPublications:
         return self._publish_to(published, event)
 
     async def _publish_established(self, event: protocol.Publish) -> None:
-        """Publish on a topic that the client has not advertised: its type is that of the graph."""
+        """Publish on a topic that the client has not advertised, with the type that the topic has in the graph."""
         type_ = await self._session.type_of(event.topic)
         published = self._open(event.topic, type_, event.latch)
         published.ids.add(None)
@@ -114,7 +118,10 @@ class ClientPublications:
         await self._publish_when_joined(published.publication, body)
 
     def _count_latched(self, published: _Published, body: bytes) -> None:
-        """Count a message that stays as the latched one. Raise BridgeError if the client has too many bytes of them."""
+        """Count a message that is stored as the latched one.
+
+        Raise BridgeError if the client's latched messages exceed the limit.
+        """
         if not published.latch:
             return
         grown = len(body) - published.latched

@@ -1,4 +1,4 @@
-"""The services of a client of rosbridge: its calls that are under way, and the services that it offers."""
+"""A rosbridge client's service calls in progress, and the services that it offers."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ __all__ = ["ClientServices"]
 
 _log = logging.getLogger(__name__)
 
-_MAX_CALLS = 200  # under way, of one client
-_MAX_SERVICES = 200  # that one client offers
+_MAX_CALLS = 200  # maximum calls in progress from one client
+_MAX_SERVICES = 200  # maximum services that one client offers
 
 
 class ClientServices:
-    """The calls and services of one client; called with its operations, in their order."""
+    """The calls and services of one client. Called with the client's operations in order."""
 
     def __init__(self, session: RosbridgeSession) -> None:
         self.calls_size = 0
-        """Bytes of memory of the calls under way."""
+        """Bytes of memory used by the calls in progress."""
         self._session = session
-        self._calls = 0  # under way
+        self._calls = 0  # number of calls in progress
         self._reporter = ErrorReporter(_log, "a client's call of a service")
 
     def close(self) -> None:
-        """End the services that the client offers; its calls are tasks of the session."""
+        """Stop offering the client's services. Its calls are tasks of the session, which cancels them."""
         endpoint = self._session.endpoint
         for name, service in list(endpoint.services.items()):
             if service.session is self._session:
@@ -58,7 +58,7 @@ class ClientServices:
             self._session.count()
 
         self._session.spawn(self._call(event, is_large=self._session.is_large)).add_done_callback(ended)
-        # Last: if this is too much, it ends the client, and with it the call.
+        # Do this last, because it closes the client, and cancels the call, if the limit is exceeded.
         self._session.count()
 
     async def _call(self, event: protocol.CallService, *, is_large: bool) -> None:
@@ -79,7 +79,7 @@ class ClientServices:
         self._session.send_encoded(messages)
 
     async def _encoded(self, event: protocol.CallService, response: Response) -> list[str | bytes]:
-        """Return the messages that carry a response; a large one is encoded in a thread."""
+        """Return the messages that contain a response; a large response is encoded in a thread."""
         endpoint = self._session.endpoint
         size = event.fragment_size or endpoint.options.fragment_size
 

@@ -1,4 +1,4 @@
-"""The topics that a client of rosbridge subscribes to."""
+"""The topics that a rosbridge client subscribes to."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ __all__ = ["ClientSubscriptions"]
 
 
 class ClientSubscriptions:
-    """The subscriptions of one client by topic; called with its operations, in their order."""
+    """One client's subscriptions, by topic. Called with the client's operations in order."""
 
     def __init__(self, session: RosbridgeSession) -> None:
         self._session = session
         self._subscribed: dict[str, ClientTopic] = {}
 
     def close(self) -> None:
-        """End all of them."""
+        """Cancel all subscriptions."""
         for topic in self._subscribed.values():
             topic.close()
         self._subscribed.clear()
@@ -57,7 +57,7 @@ class ClientSubscriptions:
         self._add(event)
 
     async def _subscribe_unknown(self, event: protocol.Subscribe, error: BridgeError) -> None:
-        """Subscribe by a type that is not installed here, where the topic has it: its publishers know the definition."""
+        """Subscribe with a type that is not installed here, if the topic has that type, whose definition the publishers send."""
         with contextlib.suppress(BridgeError):
             if await self._session.type_of(event.topic) == event.type:
                 self._add(event)

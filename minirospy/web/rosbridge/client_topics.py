@@ -1,6 +1,6 @@
-"""The topics in which rosbridge_server publishes its clients: /client_count and /connected_clients, latched.
+"""The topics on which rosbridge_server publishes its clients: /client_count and /connected_clients, both latched.
 
-Source: http://wiki.ros.org/rosbridge_server, and what the real rosbridge_websocket of branch ros1 publishes.
+Source: http://wiki.ros.org/rosbridge_server, and the output of the real rosbridge_websocket in branch ros1.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ __all__ = ["ClientTopics"]
 
 
 class ClientTopics:
-    """Publishes the number of clients, their addresses and since when they are connected, at each change."""
+    """Publishes the number of clients, their addresses and the times when they connected, after each change."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -29,7 +29,10 @@ class ClientTopics:
         self._clients: Publisher[Message] | None = None
 
     async def start(self) -> None:
-        """Publish what is connected now. Raise MasterUnreachableError, RpcError."""
+        """Publish the connected clients.
+
+        Raise MasterUnreachableError if the master does not respond, RpcError if the call fails.
+        """
         from rosbridge_msgs.msg import ConnectedClients
         from std_msgs.msg import Int32
 
@@ -40,7 +43,7 @@ class ClientTopics:
         self._publish()
 
     async def close(self) -> None:
-        """Publish no more. Idempotent."""
+        """Stop publishing. Idempotent."""
         publishers = self._count, self._clients
         self._count = self._clients = None
         for publisher in publishers:
@@ -48,7 +51,7 @@ class ClientTopics:
                 await publisher.close()
 
     def changed(self, sessions: Sequence[RosbridgeSession]) -> None:
-        """Publish the clients that are connected."""
+        """Publish the connected clients."""
         self._sessions = sessions
         self._publish()
 

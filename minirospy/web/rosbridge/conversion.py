@@ -1,7 +1,7 @@
-"""Messages as dictionaries, for JSON and CBOR, and back, by the rules and with the texts of rosbridge. Pure.
+"""Convert messages to dictionaries, for JSON and CBOR, and back, with rosbridge's rules and error messages. Pure.
 
-uint8[] and char[] are base64 (bytes in CBOR), NaN and infinities null (in JSON), times {secs, nsecs}. Source:
-ROSBRIDGE_PROTOCOL.md, and what rosbridge_library answers.
+uint8[] and char[] become base64 (bytes in CBOR), NaN and infinities null (in JSON), times {secs, nsecs}. Source:
+ROSBRIDGE_PROTOCOL.md, and the responses of rosbridge_library.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ _Convert = Callable[[Any], object]
 
 
 class ConversionError(BridgeProtocolError):
-    """A value that does not fit a message's field."""
+    """A value does not match a message's field."""
 
 
 # --- messages -> dictionaries
 
 
 def values(message: Message) -> dict[str, object]:
-    """Return a message's fields as JSON has them."""
+    """Return a message's fields as values for JSON."""
     return {name: convert(getattr(message, name)) for name, convert in _json_fields(type(message))}
 
 
 def cbor_values(message: Message) -> dict[str, object]:
-    """Return a message's fields as CBOR has them."""
+    """Return a message's fields as values for CBOR."""
     return {name: convert(getattr(message, name)) for name, convert in _cbor_fields(type(message))}
 
 
@@ -117,7 +117,8 @@ def _float(found: float) -> float | None:
 
 
 def _floats(found: Sequence[float]) -> list[float | None]:
-    # The sum of finite numbers is finite, but for one that overflows: the most arrays need no look at each number.
+    # The sum of finite numbers is finite, unless it overflows, so most arrays can be accepted without checking each
+    # number.
     if math.isfinite(sum(found)):
         return list(found)
     return [each if math.isfinite(each) else None for each in found]
@@ -131,15 +132,15 @@ def _time(found: Time | Duration) -> dict[str, int]:
 
 
 def fill(message: Message, found: object, now: Callable[[], Time]) -> None:
-    """Set a message's fields to the values of a dictionary; a header in it without ``stamp`` gets the present time.
+    """Set a message's fields to the values in a dictionary; a header without ``stamp`` gets the current time.
 
-    Raise ConversionError with rosbridge's text: an unknown field, a value of another type.
+    Raise ConversionError, with rosbridge's message, if a field is unknown or a value has the wrong type.
     """
     _fill(message, found, message._type, message._type, (), now)
 
 
 def request_values(message: Message, arguments: object) -> Mapping[str, object]:
-    """Return the fields that the arguments of a call mean: a dictionary, a list in order, else none."""
+    """Return the request's fields from the arguments of a call: a dictionary, or a list in order; otherwise no fields."""
     if isinstance(arguments, dict):
         return arguments
     if isinstance(arguments, list):
@@ -213,7 +214,7 @@ def _from_time(
         return now()
     if not isinstance(value, dict):
         raise _mismatch(root, path, type_, value)
-    # roslib.js of ROS 2 has other names.
+    # Also accept the names in ROS 2, which roslib.js may send.
     for name, other in (("secs", "sec"), ("nsecs", "nanosec")):
         part = value.get(name, value.get(other, getattr(present, name)))
         if type(part) is not int:

@@ -1,4 +1,4 @@
-"""The rosbridge protocol's server side: what all of its clients share."""
+"""The server for the rosbridge protocol: the state that all of its clients share."""
 
 from __future__ import annotations
 
@@ -29,19 +29,24 @@ __all__ = ["RosbridgeEndpoint", "RosbridgeOptions"]
 _SUBPROTOCOL = "rosbridge_v2"
 _LOG_LINES = 20
 
-_MAX_QUICK_BODY = 64 * 1024  # bytes of a message that is encoded immediately: 8,000 numbers take 8 ms
-_MAX_QUICK_IMAGE = 1024 * 1024  # bytes of an image that is encoded immediately: in base64 it takes 3 ms
+# maximum bytes of a message that is encoded immediately; 8,000 numbers take 8 ms
+_MAX_QUICK_BODY = 64 * 1024
+# maximum bytes of an image that is encoded immediately; in base64 it takes 3 ms
+_MAX_QUICK_IMAGE = 1024 * 1024
 _IMAGES = {
     "sensor_msgs/Image",
     "sensor_msgs/CompressedImage",
-}  # their only array is the data, in base64 or typed
+}  # types whose only array is the data, in base64 or typed
 
 _T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
 class RosbridgeOptions:
-    """``fragment_timeout`` and ``unregister_timeout`` in seconds; ``fragment_size``: of messages to clients, None: whole."""
+    """``fragment_timeout`` and ``unregister_timeout`` are in seconds.
+
+    ``fragment_size`` is the maximum number of characters in a message to clients; None disables fragments.
+    """
 
     fragment_timeout: float = 600.0
     unregister_timeout: float = 10.0
@@ -50,30 +55,31 @@ class RosbridgeOptions:
 
 
 class _LargeWork:
-    """Runs work on large messages in one thread, one after another."""
+    """Runs work on large messages in one thread, one piece of work at a time."""
 
     def __init__(self, name: str) -> None:
-        self._name = name  # of the thread
-        self._thread: ThreadPoolExecutor | None = None  # from the first work on
+        self._name = name  # name of the thread
+        self._thread: ThreadPoolExecutor | None = None  # created for the first work
         self._is_busy = asyncio.Lock()
 
     async def __call__(self, work: Callable[[], _T]) -> _T:
-        """Return what some work returns."""
-        # Work that waits is not with the thread: the message of a client that leaves is freed immediately.
+        """Run ``work`` in the thread, and return its result."""
+        # Do not queue work in the executor: if a client leaves while its work waits here, the message is freed
+        # immediately.
         async with self._is_busy:
             if self._thread is None:
                 self._thread = ThreadPoolExecutor(1, self._name)
             return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def close(self) -> None:
-        """End the thread, after the work that it does. Idempotent."""
+        """Stop the thread after the work in progress. Idempotent."""
         if self._thread:
             self._thread.shutdown(wait=False, cancel_futures=True)
             self._thread = None
 
 
 class RosbridgeEndpoint:
-    """Serves the rosbridge protocol. On the loop."""
+    """Serves the rosbridge protocol. Runs on the loop."""
 
     def __init__(
         self,
@@ -81,19 +87,19 @@ class RosbridgeEndpoint:
         options: RosbridgeOptions | None = None,
         on_clients: Callable[[Sequence[RosbridgeSession]], object] = lambda _: None,
     ) -> None:
-        """``on_clients`` is called with the sessions when one comes or leaves."""
+        """Create the endpoint. ``on_clients`` is called with the open sessions whenever a client connects or disconnects."""
         self.graph = graph
         self.options = options or RosbridgeOptions()
         self.sessions: list[RosbridgeSession] = []
         self.services: dict[str, ClientService] = {}
-        """Services that clients offer, by name."""
+        """The services that clients offer, by name."""
         self._closing: dict[str, asyncio.Task[None]] = {}
         self.log = RateLimitedLogger(logging.getLogger(graph.node.log.name), _LOG_LINES)
 
         self.in_thread = _LargeWork("rosbridge-large")
-        """Returns what some work on a large message from a client returns; clients wait for each other."""
+        """Runs work on large messages from clients, which wait for each other."""
         self.encode = _LargeWork("rosbridge-encode")
-        """The same for large messages to clients."""
+        """Runs work on large messages to clients."""
         self._types = ArrivingTypes()
         self._encoded: dict[str, tuple[Arrival, dict[str, bytes]]] = {}
         self._on_clients = on_clients
@@ -101,7 +107,7 @@ class RosbridgeEndpoint:
     # --- Endpoint
 
     def select(self, offered: Sequence[str]) -> str | None:
-        """Return the sub-protocol to use."""
+        """Return the sub-protocol to use, or None."""
         return _SUBPROTOCOL if _SUBPROTOCOL in offered else None
 
     def open(self, client: WebClient) -> RosbridgeSession:
@@ -114,14 +120,14 @@ class RosbridgeEndpoint:
         return session
 
     def close(self) -> None:
-        """End the threads, after the message that each works on. Idempotent."""
+        """Stop the threads after the work in progress. Idempotent."""
         self.in_thread.close()
         self.encode.close()
 
     # --- for sessions
 
     def left(self, session: RosbridgeSession) -> None:
-        """Forget a client."""
+        """Remove a client that has disconnected."""
         self.sessions.remove(session)
         if not self.sessions:
             self.graph.unwatch(_ignore)
@@ -129,11 +135,11 @@ class RosbridgeEndpoint:
         self._on_clients(self.sessions)
 
     def release(self, publication: Publication) -> None:
-        """End a publication after the time that a client may need to advertise it again."""
+        """Release a publication after a delay, within which clients may advertise it again."""
         asyncio.get_running_loop().call_later(self.options.unregister_timeout, publication.close)
 
     def close_service(self, service: ClientService, why: str) -> asyncio.Task[None]:
-        """Start to end a service of a client; return the task."""
+        """Start to close a client's service; return the task."""
         name = service.name
         del self.services[name]
         task = self._closing[name] = self.graph.spawn(service.close(why))
@@ -141,29 +147,29 @@ class RosbridgeEndpoint:
         return task
 
     async def free_service(self, name: str, why: str) -> None:
-        """End the service that a client offers by this name, and wait until the name is free."""
+        """Close the service that a client offers with this name, and wait until the name is free."""
         while name in self.services or name in self._closing:
             if name in self.services:
                 self.close_service(self.services[name], why)
             await asyncio.wait([self._closing[name]])
 
     def forget_topic(self, topic: str) -> None:
-        """Forget the last message of a topic."""
+        """Discard the encodings of a topic's last message."""
         self._encoded.pop(topic, None)
 
     def class_of(self, arrival: Arrival) -> type[Message] | None:
-        """Return the class of a message that came, None if nobody knows it."""
+        """Return the class for a received message, or None if its definition is unknown."""
         return self._types.of(arrival.header)
 
     @staticmethod
     def is_quick(body: bytes | memoryview, compression: str = "none", type_: str = "") -> bool:
-        """Return whether a message is encoded in a few milliseconds."""
+        """Return whether a message can be encoded in a few milliseconds."""
         if type_ in _IMAGES and compression != "png":
             return len(body) <= _MAX_QUICK_IMAGE
         return len(body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
 
     def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
-        """Return a message as clients get it, encoded once for all of them. Raise BridgeError if it cannot be."""
+        """Return a message as clients receive it, encoded once for all of them. Raise BridgeError if that is not possible."""
         found = self._encodings(topic, arrival)
         made = found.get(compression)
         if made is None:
@@ -173,11 +179,11 @@ class RosbridgeEndpoint:
     async def encoded_large(
         self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str
     ) -> bytes:
-        """Do the same in a thread, so that other clients do not wait; those that want this message wait for it."""
+        """Return the same as :meth:`encoded`, but encode in a thread, so that only clients of this message wait."""
         found = self._encodings(topic, arrival)
 
         def encode() -> bytes:
-            # Another client may have waited for the same.
+            # The encoding may have been created for another client in the meantime.
             return found.get(compression) or _encoded(
                 topic, class_, arrival, compression, dump_json_in_pieces
             )
@@ -187,7 +193,7 @@ class RosbridgeEndpoint:
         return found[compression]
 
     def _encodings(self, topic: str, arrival: Arrival) -> dict[str, bytes]:
-        """Return what is known of a message by its compression."""
+        """Return the existing encodings of a message, by compression."""
         known = self._encoded.get(topic)
         if known is None or known[0] is not arrival:
             known = self._encoded[topic] = arrival, {}
@@ -195,7 +201,7 @@ class RosbridgeEndpoint:
 
 
 def _ignore(_: Changes) -> None:
-    """Sessions look at the graph when they need it."""
+    """Do nothing, because sessions look at the graph when they need it."""
 
 
 def _encoded(
@@ -228,6 +234,6 @@ def _message(topic: str, class_: type[Message] | None, arrival: Arrival) -> Mess
     message = class_()
     try:
         message.deserialize(bytes(arrival.body))
-    except Exception as error:  # whatever a class of another generator raises on bad bytes
+    except Exception as error:  # any exception that a third-party message class raises on invalid bytes
         raise BridgeError(f"a message of [{topic}] does not fit [{message._type}]: {error}") from error
     return message

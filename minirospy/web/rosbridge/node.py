@@ -1,4 +1,4 @@
-"""`rosrun rosbridge_server rosbridge_websocket`: rosbridge as a node of launch files, with the parameters of the real one.
+"""`rosrun rosbridge_server rosbridge_websocket`: rosbridge as a node for launch files, with the real node's parameters.
 
 Tokens come from the environment, as those of foxglove_bridge. Source: http://wiki.ros.org/rosbridge_suite.
 """
@@ -27,7 +27,7 @@ _ARGUMENTS = (
     *("delay_between_messages", "max_message_size", "unregister_timeout", "topics_glob", "services_glob"),
     *("params_glob", "websocket_ping_interval", "websocket_ping_timeout"),
 )
-"""Parameters that may be given as `--port 9090`, too."""
+"""Parameters that may also be passed as options, such as `--port 9090`."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def refuse(program: str) -> int:
-    """Print that a server of rosbridge_suite is not offered; return the exit status."""
+    """Print that minirospy does not include a server of rosbridge_suite; return the exit status."""
     print(
         f"{program}: ERROR: minirospy serves rosbridge over WebSocket only: start rosbridge_websocket "
         "(rosrun rosbridge_server rosbridge_websocket)",
@@ -56,7 +56,7 @@ def refuse(program: str) -> int:
 
 
 def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
-    """Return the options that a node's private parameters mean. Raise BridgeError."""
+    """Return the options for a node's private parameters. Raise BridgeError if a parameter is invalid."""
     if private.get("bson_only_mode") or private.get("binary_encoder") == "bson":
         raise BridgeError("BSON is not offered: subscribe with compression cbor, which is as small")
     services = globs(private, "services_glob")
@@ -78,7 +78,7 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
         filters=Filters(
             topics=topics,
             publishable=topics,
-            # Programs find topics and services by those of rosapi.
+            # Programs find topics and services by calling rosapi's services.
             services=NameFilter.of([*services, "/rosapi/*"] if services else ()),
             parameters=NameFilter.of(globs(private, "params_glob")),
         ),
@@ -95,7 +95,7 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
 
 
 def _size(private: Mapping[str, object]) -> int | None:
-    """Return from which size messages to clients are sent in fragments, which is what rosbridge's parameter limits."""
+    """Return the size above which messages to clients are sent in fragments; rosbridge's parameter limits only those."""
     if private.get("max_message_size") in (None, "None", ""):
         return None
     most = value(private, "max_message_size", int, 0)
@@ -105,7 +105,7 @@ def _size(private: Mapping[str, object]) -> int | None:
 
 
 def _arguments(argv: Sequence[str]) -> tuple[dict[str, object], list[str]]:
-    """Return the parameters given as `--name value`, and the rest: remappings."""
+    """Return the parameters passed as `--name value`, and the remaining arguments, which are remappings."""
     from minirospy.introspect.values import parse_value
 
     given: dict[str, object] = {}

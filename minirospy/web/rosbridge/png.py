@@ -1,4 +1,4 @@
-"""PNG as a compression of texts: the UTF-8 bytes are the pixels of an RGB image. Pure; needs Pillow.
+"""PNG as a compression of text: the UTF-8 bytes are the pixels of an RGB image. Pure; needs Pillow.
 
 Source: ROSBRIDGE_PROTOCOL.md, section 3.1.2.
 """
@@ -16,11 +16,14 @@ from minirospy.base.errors import BridgeProtocolError
 __all__ = ["decode", "encode"]
 
 _MAX_PIXELS = 5_600_000
-"""Of a client's image: 17 MB of text, with wide characters four times as much memory."""
+"""Maximum pixels in a client's image: 17 MB of text, which takes four times the memory if it contains wide characters."""
 
 
 def encode(text: str) -> str:
-    """Return a text as PNG in base64: about as wide as high, newlines at its end. Raise BridgeProtocolError without Pillow."""
+    """Return a text as a base64-encoded PNG, about as wide as high, padded with newlines.
+
+    Raise BridgeProtocolError if Pillow is not installed.
+    """
     data = text.encode()
     width = max(1, math.isqrt(len(data) // 3))
     height = max(1, -(-len(data) // (3 * width)))
@@ -31,7 +34,10 @@ def encode(text: str) -> str:
 
 
 def decode(data: str) -> str:
-    """Return the text of a PNG in base64. Raise BridgeProtocolError."""
+    """Return the text in a base64-encoded PNG.
+
+    Raise BridgeProtocolError if the data is invalid, the image is too large, or Pillow is not installed.
+    """
     pillow = _pillow()
     try:
         picture = pillow.open(BytesIO(base64.b64decode(data, validate=True)), formats=("PNG",))
@@ -49,7 +55,7 @@ def _pillow() -> Any:
     try:
         from PIL import Image
     except ImportError as error:
-        # No command: it names the server's interpreter, and this goes to clients.
+        # Do not include the install command, which contains the server's interpreter path: clients receive this text.
         raise BridgeProtocolError(
             "compression png needs Pillow: install minirospy[images] on the server"
         ) from error

@@ -1,6 +1,6 @@
-"""The rosbridge protocol, version 2: a client's operations in, events out; the fields of messages out, frames out.
+"""The rosbridge protocol, version 2: parse clients' operations into events, and encode fields as messages.
 
-Pure. Texts of errors are those of rosbridge_library. Source: ROSBRIDGE_PROTOCOL.md of
+Pure. Error messages are those of rosbridge_library. Source: ROSBRIDGE_PROTOCOL.md in
 https://github.com/RobotWebTools/rosbridge_suite, branch ros1.
 """
 
@@ -59,15 +59,15 @@ Compression = str
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
 _MAX_FRAGMENTS = 2_000
-"""Of a message to a client: it may want fragments of one character, each of which is a message."""
+"""Maximum fragments of a message to a client, which may request fragments of one character, each in its own message."""
 
 _LONGEST_ID = 1000
 _SHOWN = 200
-"""Characters of a client's message that an error repeats."""
+"""Maximum characters of a client's message that an error repeats."""
 
 
 class StatusLevel(IntEnum):
-    """The severity of a status message; a client gets those up to its level."""
+    """The severity of a status message; a client receives those up to the level that it has set."""
 
     NONE = 0
     ERROR = 1
@@ -76,7 +76,7 @@ class StatusLevel(IntEnum):
 
 
 class OperationError(BridgeProtocolError):
-    """An operation that is refused; ``id`` is that of the client's message."""
+    """An operation was refused; ``id`` is the id in the client's message."""
 
     def __init__(self, text: str, id_: Id = None) -> None:
         super().__init__(text)
@@ -85,7 +85,7 @@ class OperationError(BridgeProtocolError):
 
 @dataclass(frozen=True)
 class Event:
-    """An operation of a client."""
+    """An operation from a client."""
 
     id: Id
 
@@ -106,7 +106,7 @@ class ServiceEvent(Event):
 
 @dataclass(frozen=True)
 class Advertise(TopicEvent):
-    """Publish a topic."""
+    """Advertise a topic."""
 
     type: str
     latch: bool
@@ -114,12 +114,12 @@ class Advertise(TopicEvent):
 
 
 class Unadvertise(TopicEvent):
-    """Publish it no more."""
+    """Unadvertise a topic."""
 
 
 @dataclass(frozen=True)
 class Publish(TopicEvent):
-    """Send a message."""
+    """Publish a message."""
 
     message: object
     latch: bool
@@ -127,7 +127,7 @@ class Publish(TopicEvent):
 
 @dataclass(frozen=True)
 class Subscribe(TopicEvent):
-    """Receive a topic's messages; ``throttle_rate`` in milliseconds."""
+    """Subscribe to a topic; ``throttle_rate`` is in milliseconds."""
 
     type: str | None
     throttle_rate: int
@@ -137,12 +137,12 @@ class Subscribe(TopicEvent):
 
 
 class Unsubscribe(TopicEvent):
-    """Receive them no more."""
+    """Unsubscribe from a topic."""
 
 
 @dataclass(frozen=True)
 class CallService(ServiceEvent):
-    """``arguments``: the fields of the request, a list of their values, or anything else for none."""
+    """Call a service. ``arguments``: the request's fields, or a list of their values; anything else means none."""
 
     arguments: object
     fragment_size: int | None
@@ -151,7 +151,7 @@ class CallService(ServiceEvent):
 
 @dataclass(frozen=True)
 class ServiceResponse(ServiceEvent):
-    """Answer a call; ``values`` is a text where ``result`` is false."""
+    """Respond to a call; if ``result`` is false, ``values`` is an error message."""
 
     values: object
     result: bool
@@ -165,7 +165,7 @@ class AdvertiseService(ServiceEvent):
 
 
 class UnadvertiseService(ServiceEvent):
-    """Offer it no more."""
+    """Stop offering a service."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ class SetLevel(Event):
 
 @dataclass(frozen=True)
 class Auth(Event):
-    """A request of http://wiki.ros.org/rosauth; times in seconds."""
+    """An authentication request, as in http://wiki.ros.org/rosauth; times are in seconds."""
 
     mac: str
     client: str
@@ -200,17 +200,17 @@ Fields = Mapping[str, Any]
 
 
 def is_quick(data: str | bytes) -> bool:
-    """Return whether a message is decoded in a few milliseconds."""
+    """Return whether a message can be decoded in a few milliseconds."""
     return is_quick_text(data) if isinstance(data, str) else len(data) <= MAX_QUICK_CHARACTERS
 
 
 def decode(data: str | bytes) -> Fields:
-    """Return the object that a message is: JSON as text, CBOR as bytes. Raise OperationError."""
+    """Return the object in a message: JSON as a string, or CBOR as bytes. Raise OperationError if the data is invalid."""
     return _decode(data, load_json)
 
 
 def decode_in_pieces(data: str | bytes) -> Fields:
-    """Do the same for a thread beside the event loop, without keeping the GIL for long."""
+    """Return the same as :func:`decode`, without holding the GIL for long, for a thread alongside the event loop."""
     return _decode(data, load_json_in_pieces)
 
 
@@ -227,7 +227,10 @@ def _decode(data: str | bytes, load: Callable[[str], object]) -> Fields:
 
 
 def parse(fields: Fields) -> Event:
-    """Return the event of an operation; a PNG's content is that of the operation in it. Raise OperationError."""
+    """Return the event for an operation; for a PNG, the event for the operation in it.
+
+    Raise OperationError if it is invalid.
+    """
     id_ = _id(fields)
     op = fields.get("op")
     if op is None:
@@ -260,19 +263,19 @@ def _without_op(fields: Fields, id_: Id) -> OperationError:
 
 
 def _shown(value: object) -> str:
-    """Return the start of ``str(value)``, without making the text of all that is in it."""
+    """Return the start of ``str(value)``, without formatting the whole value."""
     return _text_of(value, _SHOWN)[:_SHOWN]
 
 
 def _text_of(value: object, most: int) -> str:
-    """Return ``str(value)``, or a text that has the same first ``most`` characters, and more."""
+    """Return ``str(value)``, or a longer string with the same first ``most`` characters."""
     return value if isinstance(value, str) else str(_cut(value, most, itertools.count()))
 
 
 def _cut(value: object, most: int, numbers: Iterator[int]) -> object:
-    """Return the first values in a value from JSON or CBOR: each has a character at least in the text."""
+    """Return only the first values in a value from JSON or CBOR, because each one takes at least one character."""
     if isinstance(value, str) and len(value) > most:
-        # The quotes around a text depend on those in it, also behind the cut.
+        # The quotes around a string depend on the quotes in it, including those in the part cut off.
         return value[: most + 1] + "".join(quote for quote in "'\"" if quote in value)
     if isinstance(value, bytes):
         return value[: most + 1]
@@ -296,7 +299,10 @@ def _id(fields: Fields) -> Id:
 
 
 def _value(fields: Fields, name: str, types: tuple[type, ...], default: Any = ...) -> Any:
-    """Return a field, ``default`` where it is absent. Raise BridgeProtocolError, with rosbridge's texts."""
+    """Return a field, or ``default`` if it is missing.
+
+    Raise BridgeProtocolError, with rosbridge's message, if it is invalid.
+    """
     found = fields.get(name)
     if found is None:
         if default is ...:
@@ -396,12 +402,12 @@ _FIELDS: Mapping[str, tuple[Callable[..., Event], tuple[_Read, ...]]] = {
         ),
     ),
 }
-"""The operations whose record has a field for each of these, in its order."""
+"""Dict from operation to its event class and the functions that read the event's fields, in order."""
 
 
 def _call_service(fields: Fields, id_: Id) -> Event:
     service: str = _text(fields, "service")
-    name, _, old_id = service.partition("#")  # an id of old clients: /rosapi/topics#33
+    name, _, old_id = service.partition("#")  # old clients append an id: /rosapi/topics#33
     return CallService(
         id_ if id_ is not None or not old_id else old_id,
         name,
@@ -460,7 +466,7 @@ OPERATIONS = (
 def encode(
     fields: Fields, compression: Compression = "none", dump: Callable[[object], str] = dump_json
 ) -> str | bytes:
-    """Return a message as text, with CBOR as bytes; ``dump`` makes JSON of it."""
+    """Return a message as a string, or as bytes for CBOR; ``dump`` converts a value to JSON."""
     if compression in ("cbor", "cbor-raw"):
         return encode_cbor(fields)
     text = dump(fields)
@@ -475,7 +481,7 @@ def encode_messages(
     fragment_size: int | None,
     dump: Callable[[object], str] = dump_json,
 ) -> list[str | bytes]:
-    """Return the messages that carry one: itself, or its fragments if it is a text and a size is given."""
+    """Return the messages to send: the message itself, or its fragments if it is a string and a size is given."""
     data = encode(fields, compression, dump)
     if isinstance(data, bytes) or not fragment_size:
         return [data]
@@ -483,9 +489,9 @@ def encode_messages(
 
 
 def fragments(text: str, size: int, id_: Id) -> list[str]:
-    """Return the messages that carry a text in pieces of ``size`` characters; the text itself where it is not longer.
+    """Return a text as fragments of ``size`` characters, or the text itself if it is not longer than that.
 
-    They are longer where there would be too many.
+    The fragments are longer if there would be too many.
     """
     size = max(size, -(-len(text) // _MAX_FRAGMENTS))
     if len(text) <= size:
@@ -513,7 +519,7 @@ def status(level: StatusLevel, text: str, id_: Id = None) -> dict[str, object]:
 
 
 def service_response(service: str, values: object, id_: Id, *, result: bool) -> dict[str, object]:
-    """Return the answer to a call; ``values`` is a text where ``result`` is false."""
+    """Return the response to a call; if ``result`` is false, ``values`` is an error message."""
     fields: dict[str, object] = {
         "op": "service_response",
         "service": service,
@@ -524,5 +530,5 @@ def service_response(service: str, values: object, id_: Id, *, result: bool) -> 
 
 
 def service_call(service: str, arguments: object, id_: str) -> dict[str, object]:
-    """Return the call of a service that the client offers."""
+    """Return the message that calls a service that the client offers."""
     return {"op": "call_service", "id": id_, "service": service, "args": arguments}

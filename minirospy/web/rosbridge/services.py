@@ -1,4 +1,4 @@
-"""Services for clients of rosbridge: calls that they make, and services that they offer."""
+"""Services for rosbridge clients: calls from clients, and services that clients offer."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ class InThread(Protocol):
 
 
 class Response(NamedTuple):
-    """A service's response as it came, and its class."""
+    """A service's serialized response, and its class."""
 
     message_class: type[Message]
     data: bytes
 
     def message(self) -> Message:
-        """Return it as a message. Raise what the class raises for bytes that do not fit."""
+        """Deserialize the response. Invalid bytes raise the exceptions of the message class."""
         message = self.message_class()
         message.deserialize(self.data)
         return message
@@ -46,9 +46,10 @@ class Response(NamedTuple):
 async def call(
     graph: SharedGraph, name: str, arguments: object, in_thread: InThread | None = None
 ) -> Response:
-    """Return a service's response. Raise BridgeError, ServiceException, ROSSerializationException.
+    """Call a service and return its response.
 
-    ``in_thread`` runs the conversion of arguments that are large.
+    Raise BridgeError, ServiceException or ROSSerializationException if the call fails. With ``in_thread`` the arguments
+    are converted in a thread, because they are large.
     """
     service = graph.node.resolve(name)
     info = graph.service_info(service)
@@ -73,10 +74,13 @@ async def call(
 
 
 class ClientService:
-    """A service that a client offers: calls of the graph go to it, and its answers back."""
+    """A service that a client offers: forwards calls from the graph to the client, and its responses back."""
 
     def __init__(self, session: RosbridgeSession, graph: SharedGraph, name: str, type_: str) -> None:
-        """Raise BridgeError if the type is unknown, ServiceException where this node offers the service itself."""
+        """Offer the service.
+
+        Raise BridgeError if the type is unknown, ServiceException if this node already offers the service.
+        """
         self.session = session
         self.name = name
         self._graph = graph
@@ -87,7 +91,7 @@ class ClientService:
         graph.refresh_soon()
 
     async def close(self, why: str) -> None:
-        """End it; calls under way fail with ``why``."""
+        """Stop offering the service; calls in progress fail with ``why``."""
         for future in self._waiting.values():
             if not future.done():
                 future.set_exception(ServiceException(why))
@@ -96,7 +100,7 @@ class ClientService:
         self._graph.refresh_soon()
 
     def answered(self, event: protocol.ServiceResponse) -> None:
-        """Take over a client's answer. Raise BridgeError: values that do not fit, or no call waits for it."""
+        """Process a client's response. Raise BridgeError if its values do not match, or no call is waiting for it."""
         future = self._taken(event)
         if not event.result:
             future.set_exception(ServiceException(str(event.values)))
@@ -109,7 +113,7 @@ class ClientService:
         future.set_result(response)
 
     async def answered_large(self, event: protocol.ServiceResponse, in_thread: InThread) -> None:
-        """Do the same with a large answer, which is converted in a thread."""
+        """Do the same as :meth:`answered` for a large response, which is converted in a thread."""
         future = self._taken(event)
         try:
             response = await in_thread(lambda: self._response(event)) if event.result else None
@@ -118,7 +122,7 @@ class ClientService:
                 future.set_exception(ServiceException(str(error)))
             raise
         if future.done():
-            return  # the call was given up meanwhile
+            return  # the call was cancelled in the meantime
         if response is None:
             future.set_exception(ServiceException(str(event.values)))
         else:

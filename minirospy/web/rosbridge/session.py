@@ -1,6 +1,6 @@
-"""One client of the rosbridge protocol: its operations are carried out one after another.
+"""One client of the rosbridge protocol, whose operations are executed in order.
 
-What its operations do is in client_publications.py, client_subscriptions.py and client_services.py.
+The operations are in client_publications.py, client_subscriptions.py and client_services.py.
 """
 
 from __future__ import annotations
@@ -31,46 +31,51 @@ __all__ = ["RosbridgeSession"]
 
 _log = logging.getLogger(__name__)
 
-_VALUE_FACTOR = 4  # memory of a parsed operation, relative to that of its text: objects, lists of numbers
+# memory of a parsed operation relative to that of its text, for objects and lists of numbers
+_VALUE_FACTOR = 4
 
-_MAX_READ_ONLY_CBOR = 8 * 1024  # bytes: a client that subscribes needs less, and each may be a value
+# maximum bytes: a read-only client only subscribes, which needs less; each byte may be a value
+_MAX_READ_ONLY_CBOR = 8 * 1024
 
-_POLICY = 1008  # codes of RFC 6455, 7.4
+_POLICY = 1008  # WebSocket close codes, RFC 6455, section 7.4
 _FAILED = 1011
 
 
 class _Pending(NamedTuple):
-    """The rest of an operation, which has to wait for something; the event is None if it reports its faults itself."""
+    """The rest of an operation that must wait for something. ``event`` is None if the work reports its errors itself."""
 
     event: Event | None
     work: Work
 
 
 class RosbridgeSession:
-    """The state of one client; called by its connection, on the loop.
+    """The session of one client; its connection calls it on the loop.
 
-    Operations are carried out in the order in which they came: where one has to wait (for the graph, for the subscribers of a
-    new topic), those behind it wait, except for calls of services.
+    Operations are executed in the order of arrival: if one has to wait (for the graph, or for the subscribers of a new topic),
+    later operations wait too, except for service calls.
     """
 
     def __init__(self, endpoint: RosbridgeEndpoint, client: WebClient) -> None:
         self.client = client
         self.endpoint = endpoint
         self.graph = endpoint.graph
-        self.connected = endpoint.graph.node.now()  # when the client connected, for /connected_clients
-        self.budget = Budget()  # for messages of topics whose rate the client limits
-        self.operation_size = 0  # bytes of memory of the operation that is carried out
-        self.is_large = False  # while that came in a large message: a thread makes the ROS message of it, too
-        self._level = StatusLevel.ERROR  # of the status messages that the client wants
+        self.connected = endpoint.graph.node.now()  # time when the client connected, for /connected_clients
+        self.budget = Budget()  # for messages on topics whose rate the client limits
+        self.operation_size = 0  # bytes of memory of the current operation
+        # True if the current operation's message is large: a thread then creates the ROS message, too
+        self.is_large = False
+        self._level = StatusLevel.ERROR  # maximum level of the status messages that the client receives
         self._is_authenticated = not endpoint.options.authenticate
-        self._fragments = Fragments(endpoint.options.fragment_timeout)  # of incomplete messages
+        # received fragments of incomplete messages
+        self._fragments = Fragments(endpoint.options.fragment_timeout)
         self._publications = ClientPublications(self)
         self._subscriptions = ClientSubscriptions(self)
         self._services = ClientServices(self)
-        self._tasks: set[asyncio.Task[None]] = set()  # operations that wait, and calls; cancelled at the end
-        self._inbox: deque[str | bytes] = deque()  # messages behind an operation that waits
-        self._inbox_size = 0  # bytes of memory of the inbox, and of the message whose operation waits
-        self._is_working = False  # while an operation waits
+        # waiting operations, and calls; cancelled when the session ends
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._inbox: deque[str | bytes] = deque()  # messages queued behind a waiting operation
+        self._inbox_size = 0  # bytes of memory of the inbox, and of the message whose operation is waiting
+        self._is_working = False  # True while an operation is waiting
         self._handlers: Mapping[type[Event], Callable[[Any], Work | _Pending | None]] = {
             protocol.Advertise: self._publications.advertise,
             protocol.Unadvertise: self._publications.unadvertise,
@@ -89,22 +94,22 @@ class RosbridgeSession:
     # --- from the connection
 
     def received_text(self, text: str) -> None:
-        """Take over a JSON message."""
+        """Process a JSON message."""
         self._received(text)
 
     def received_binary(self, data: bytes) -> None:
-        """Take over a CBOR message."""
+        """Process a CBOR message."""
         if len(data) > _MAX_READ_ONLY_CBOR and not self.client.may_write:
             self._refuse_large(data)
             return
         self._received(data)
 
     def ended(self) -> None:
-        """End everything that the client has."""
+        """Release everything that belongs to the client."""
         self._subscriptions.close()
         self._publications.close()
         self._services.close()
-        # The session is part of reference cycles: what it keeps is freed now, not when they are collected.
+        # The session is part of reference cycles: release its memory now, not when they are collected.
         self._inbox.clear()
         self._fragments.clear()
         for task in list(self._tasks):
@@ -114,11 +119,11 @@ class RosbridgeSession:
     # --- for services and topics
 
     def send(self, fields: Mapping[str, object]) -> None:
-        """Send a message that is not one of a topic."""
+        """Send a message that does not belong to a topic's stream."""
         self.send_encoded(protocol.encode_messages(fields, "none", self.endpoint.options.fragment_size))
 
     def send_encoded(self, messages: Sequence[str | bytes]) -> None:
-        """Send messages that are JSON as text, or CBOR."""
+        """Send messages: strings as JSON, bytes as CBOR."""
         for message in messages:
             if isinstance(message, bytes):
                 self.client.send_binary(message)
@@ -126,7 +131,7 @@ class RosbridgeSession:
                 self.client.send_text(message)
 
     def status(self, level: StatusLevel, text: str, id_: object = None) -> None:
-        """Send a status, where the client has asked for this level."""
+        """Send a status message, if the client has requested this level; log it unless it is only information."""
         if level <= self._level:
             self.client.send_text(str(protocol.encode(protocol.status(level, text, id_))))  # type: ignore[arg-type]
         if level is not StatusLevel.INFO:
@@ -136,7 +141,7 @@ class RosbridgeSession:
     # --- one operation after the other
 
     def count(self) -> None:
-        """Count what is kept of the client in the account of the server."""
+        """Report the memory used for the client to the server's account."""
         self.client.holds(
             self._inbox_size
             + self._fragments.size
@@ -159,12 +164,12 @@ class RosbridgeSession:
         if first is not None:
             self._is_working = True
             self._inbox_size += size
-            # A task that is cancelled before its first step does not start the work.
+            # A task that is cancelled before its first step does not start the work, so close it.
             self.spawn(self._work(first, size)).add_done_callback(lambda _: first.work.close())
             self.count()
 
     async def _work(self, first: _Pending, size: int) -> None:
-        """Finish an operation, whose message has this size, then those that have come meanwhile."""
+        """Finish an operation, whose message has ``size`` bytes, then execute those that have arrived in the meantime."""
         try:
             await self._finish(first)
             self._inbox_size -= size
@@ -183,7 +188,7 @@ class RosbridgeSession:
         self._is_working = False
 
     def _begin(self, data: str | bytes) -> _Pending | None:
-        """Carry out an operation; return what is left to be waited for."""
+        """Execute an operation; return the part that has to wait, if any."""
         self.operation_size = _VALUE_FACTOR * sys.getsizeof(data)
         if not protocol.is_quick(data):
             return self._begin_large(data)
@@ -195,9 +200,9 @@ class RosbridgeSession:
         return self._carry_out(event)
 
     def _begin_large(self, data: str | bytes) -> _Pending | None:
-        """Parse a large message in a thread, so that no other client waits for it; nothing more is read meanwhile."""
+        """Parse a large message in a thread, so that no other client has to wait; pause reading from the client until then."""
         if not self.client.may_write:
-            # What joined fragments or a PNG make: a message of this size is refused by the connection.
+            # The message comes from joined fragments or a PNG: the connection itself refuses messages of this size.
             self._refuse_large(data)
             return None
         self.client.pause()
@@ -237,7 +242,7 @@ class RosbridgeSession:
         except REFUSALS as error:
             self._failed(event, error)
             return None
-        # What a fragment completes is a separate operation.
+        # An operation that a fragment completes is separate, and has its own event.
         return pending if pending is None or isinstance(pending, _Pending) else _Pending(event, pending)
 
     async def _finish(self, pending: _Pending) -> None:
@@ -248,7 +253,7 @@ class RosbridgeSession:
             self._failed(pending.event, error)
 
     def _failed(self, event: Event, error: Exception) -> None:
-        # rosbridge names the operation where it did not report the fault itself.
+        # rosbridge prefixes the operation's name unless it reported the error itself.
         front = "" if isinstance(error, OperationError) else f"{_OPERATIONS[type(event)]}: "
         self.status(StatusLevel.ERROR, f"{front}{error}", event.id)
 
@@ -282,7 +287,7 @@ class RosbridgeSession:
     # --- for handlers of operations
 
     async def type_of(self, topic: str) -> str:
-        """Return the type that a topic has in the graph. Raise BridgeError if it has none."""
+        """Return a topic's type in the graph. Raise BridgeError if it has none."""
         resolved = self.graph.node.resolve(topic)
         if self.graph.snapshot.types.get(resolved, ANY) == ANY:
             await self.graph.look()
@@ -292,7 +297,7 @@ class RosbridgeSession:
         return found
 
     def is_allowed(self, kind: str, name: str, what: str) -> bool:
-        """Return whether a name passes the globs; else warn, with rosbridge's text."""
+        """Return whether a name matches the globs; if not, send a warning with rosbridge's message."""
         filters = self.graph.filters
         if (filters.topics if kind == "topics" else filters.services)(self.graph.node.resolve(name)):
             return True

@@ -1,4 +1,4 @@
-"""A client's subscriptions to one topic as one, and when its messages are sent; fragments that come in. Pure."""
+"""A client's subscriptions to one topic, merged into one; the rate at which messages are sent; received fragments. Pure."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _T = TypeVar("_T")
 _STRENGTH = ("none", "png", "cbor", "cbor-raw")
 
 MAX_FRAGMENT_BYTES = 64_000_000
-"""Memory of the incomplete messages of one client, and of what keeps them: a wide character takes two or four bytes."""
+"""Maximum memory for one client's incomplete messages, including overhead: a wide character takes two or four bytes."""
 _MAX_FRAGMENTS = 100_000
 _FRAGMENT_BYTES = 200
 _MESSAGE_BYTES = 1000
-"""Memory that a fragment takes besides its text, and an incomplete message besides its fragments."""
+"""Memory that a fragment takes in addition to its text, and an incomplete message in addition to its fragments."""
 
 
 @dataclass(frozen=True)
 class Merged:
-    """How the messages of a topic are sent; ``throttle`` in seconds."""
+    """The parameters for sending a topic's messages; ``throttle`` is in seconds."""
 
     throttle: float
     queue_length: int
@@ -36,7 +36,7 @@ class Merged:
 
 
 def merge(subscriptions: Iterable[Subscribe]) -> Merged:
-    """Return what satisfies all subscriptions: the shortest interval, queue and fragments, the strongest compression."""
+    """Return parameters for all subscriptions: the shortest interval, queue and fragments, and the strongest compression."""
     each = tuple(subscriptions)
     sizes = [one.fragment_size for one in each if one.fragment_size is not None]
     return Merged(
@@ -49,17 +49,20 @@ def merge(subscriptions: Iterable[Subscribe]) -> Merged:
 
 @dataclass
 class Budget:
-    """The bytes of messages that wait for their time, of all topics of a client, and how many may."""
+    """The bytes of messages that a client's topics hold back, and their maximum."""
 
     most: int = DEFAULT_LIMIT
     taken: int = 0
 
 
 class Pacer(Generic[_T]):
-    """The messages of a topic in time: one in ``throttle`` seconds; the newest ``queue_length`` wait, others are dropped."""
+    """Limits a topic's rate to one message per ``throttle`` seconds.
+
+    The newest ``queue_length`` messages are queued, others are dropped.
+    """
 
     def __init__(self, budget: Budget, size_of: Callable[[_T], int]) -> None:
-        """``budget`` may be that of other topics, too; ``size_of`` returns the bytes of a message."""
+        """Create the limit. ``budget`` may be shared with other topics; ``size_of`` returns a message's size in bytes."""
         self.throttle = 0.0
         self._budget = budget
         self._size_of = size_of
@@ -69,12 +72,12 @@ class Pacer(Generic[_T]):
         self._waiting: deque[_T] = deque()
 
     def set(self, throttle: float, queue_length: int) -> None:
-        """Change the interval and the length of the queue; the newest stay."""
+        """Change the interval and the length of the queue; the newest messages are kept."""
         self.throttle, self._length = throttle, queue_length
         self._trim()
 
     def arrived(self, message: _T, now: float) -> bool:
-        """Return whether a message is to be sent now; else it waits, or is dropped."""
+        """Return whether to send a message now; otherwise it is queued or dropped."""
         if not self._waiting and now >= self._last + self.throttle:
             self._last = now
             return True
@@ -88,18 +91,18 @@ class Pacer(Generic[_T]):
 
     @property
     def due(self) -> float | None:
-        """Return when the next message that waits is to be sent."""
+        """Return the time when to send the next queued message, or None if there is none."""
         return self._last + self.throttle if self._waiting else None
 
     def next(self, now: float) -> _T | None:
-        """Return a message that is due."""
+        """Remove and return a message that is due, or return None."""
         if not self._waiting or now < self._last + self.throttle:
             return None
         self._last = now
         return self._popped()
 
     def clear(self) -> None:
-        """Drop what waits."""
+        """Drop the queued messages."""
         while self._waiting:
             self._popped()
 
@@ -127,18 +130,21 @@ class _Parts(NamedTuple):
 
 
 class Fragments:
-    """The fragments of one client that wait for others of their message."""
+    """One client's fragments whose messages are incomplete."""
 
     def __init__(self, timeout: float = 600.0) -> None:
-        """``timeout``: seconds after which an incomplete message is forgotten."""
+        """Create the collection. ``timeout``: seconds after which an incomplete message is discarded."""
         self._timeout = timeout
-        # The one that got a fragment longest ago is first.
+        # The message whose last fragment is oldest comes first.
         self._messages: OrderedDict[Hashable, _Parts] = OrderedDict()
         self.size = 0
-        """Bytes of memory that all of them take."""
+        """Total bytes of memory of the fragments."""
 
     def add(self, fragment: Fragment, now: float) -> str | None:
-        """Return the message that a fragment completes. Raise OperationError."""
+        """Return the message that a fragment completes, or None.
+
+        Raise OperationError if the fragment is invalid or too large.
+        """
         self._forget_old(now)
         known = self._messages.get(fragment.id)
         if known is None:
@@ -161,7 +167,7 @@ class Fragments:
         if len(known.parts) < known.total:
             return None
         self._forget(fragment.id)
-        # One wide character makes all of the message wide.
+        # One wide character makes every character in the message wide.
         width = max(map(width_of, known.parts.values()))
         if width * sum(map(len, known.parts.values())) > MAX_FRAGMENT_BYTES:
             raise OperationError(
@@ -172,7 +178,7 @@ class Fragments:
         return "".join(known.parts[number] for number in range(known.total))
 
     def clear(self) -> None:
-        """Forget all incomplete messages."""
+        """Discard all incomplete messages."""
         self._messages.clear()
         self.size = 0
 

@@ -1,4 +1,4 @@
-"""A topic that a client of rosbridge subscribes to: its subscriptions merged, its messages in time."""
+"""A topic that a rosbridge client subscribes to: merges the subscriptions, and sends messages at the requested rate."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 __all__ = ["MAX_IDS", "ClientTopic"]
 
 MAX_IDS = 100
-"""Subscriptions of one client to one topic, and its advertisements of one."""
+"""Maximum subscriptions of one client to one topic, and maximum advertisements of one topic by one client."""
 
 
 class ClientTopic:
-    """One subscription to the graph, for all of a client to one topic."""
+    """The single subscription to the graph for all of a client's subscriptions to one topic."""
 
     def __init__(self, session: RosbridgeSession, endpoint: RosbridgeEndpoint, name: str) -> None:
         self.name = name
@@ -39,11 +39,11 @@ class ClientTopic:
 
     @property
     def is_wanted(self) -> bool:
-        """Return whether any subscription is left."""
+        """Return whether any subscriptions remain."""
         return bool(self._subscriptions)
 
     def add(self, event: protocol.Subscribe) -> None:
-        """Add a subscription; one with an id that is known is replaced."""
+        """Add a subscription, or replace the one with the same id."""
         is_first = not self._subscriptions
         if event.id not in self._subscriptions and len(self._subscriptions) >= MAX_IDS:
             raise BridgeError(f"a client may subscribe to a topic {MAX_IDS} times")
@@ -51,11 +51,11 @@ class ClientTopic:
         self._update()
         self._endpoint.graph.subscribe(self._topic, self._arrived)
         if not is_first:
-            # It was subscribed to once more for the sake of latched messages, which each subscription gets.
+            # This was a second subscription, made only because each subscription receives the latched messages.
             self._endpoint.graph.unsubscribe(self._topic, self._arrived)
 
     def remove(self, id_: object) -> None:
-        """Remove a subscription, without an id all."""
+        """Remove a subscription, or all subscriptions if ``id_`` is None."""
         if id_ is None:
             self._subscriptions.clear()
         else:
@@ -99,7 +99,7 @@ class ClientTopic:
         self._wait()
 
     def _send(self, arrival: Arrival) -> None:
-        # Encoding a large message, and cutting it into fragments, takes milliseconds for each client.
+        # Encoding a large message, and splitting it into fragments, takes milliseconds per client.
         self._session.client.in_turn(lambda: self._send_now(arrival), arrival.body)
 
     def _send_now(self, arrival: Arrival) -> None:
@@ -121,7 +121,7 @@ class ClientTopic:
         self._queue(data, self._fragments(data, size, arrival) if size else None, self._merged)
 
     async def _send_large(self, arrival: Arrival, class_: type[Message] | None, merged: Merged) -> None:
-        """Send a message that takes long to encode, while the session's other messages wait behind it."""
+        """Send a message that takes long to encode; the session's other messages wait until it is sent."""
         try:
             data = await self._endpoint.encoded_large(self.name, class_, arrival, merged.compression)
             size = self._fragment_size(merged, data)
@@ -136,7 +136,7 @@ class ClientTopic:
             self._session.client.hold_work(is_held=False)
 
     def _fragment_size(self, merged: Merged, data: bytes) -> int | None:
-        """Return the characters of the fragments into which a message is cut; None if it is sent whole."""
+        """Return the size in characters of a message's fragments, or None if it is sent as a whole."""
         size = merged.fragment_size or self._endpoint.options.fragment_size
         is_cut = size and len(data) > size and not merged.compression.startswith("cbor")
         return size if is_cut else None

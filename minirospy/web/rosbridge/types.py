@@ -1,4 +1,4 @@
-"""Classes of messages and services by the names that clients give, with rosbridge's texts, and of what publishers send."""
+"""Find message and service classes by the names that clients send, with rosbridge's errors, or for publishers' messages."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ _Class = TypeVar("_Class")
 
 
 class UnknownTypeError(BridgeError):
-    """A type that is not installed."""
+    """A type is not installed."""
 
 
 def message_class(name: str) -> type[Message]:
-    """Return a message's class. Raise UnknownTypeError."""
+    """Return a message's class. Raise UnknownTypeError if the type is not installed."""
     return _installed(get_message_class, name, "msg")
 
 
 def service_class(name: str) -> ServiceClass:
-    """Return a service's class. Raise UnknownTypeError."""
+    """Return a service's class. Raise UnknownTypeError if the type is not installed."""
     return _installed(get_service_class, name, "srv")
 
 
@@ -34,7 +34,8 @@ def _installed(get: Callable[[str], _Class | None], name: str, kind: str) -> _Cl
     try:
         found = get(name)
     except Exception as error:
-        # Of a module of messages, which may be anybody's: whatever it raises is why the type is not known.
+        # Importing a third-party message module may raise anything; report that error as the reason why the type is
+        # unknown.
         raise _unknown(
             name, kind, f"{type(error).__name__}: {error}" if _is_foreign(error) else str(error)
         ) from error
@@ -64,18 +65,18 @@ def _is_installed(package: str) -> bool:
     try:
         return package.isidentifier() and importlib.util.find_spec(package) is not None
     except (ImportError, ValueError):
-        # ValueError: a module without a spec, such as __main__.
+        # ValueError means that the module has no spec, such as __main__.
         return False
 
 
 class ArrivingTypes:
-    """The classes of what publishers send: the installed one where it has their definition, else one of their text."""
+    """Classes for publishers' messages: the installed class if its md5sum matches, else one generated from the definition."""
 
     def __init__(self) -> None:
         self._classes: dict[tuple[str, str], type[Message] | None] = {}
 
     def of(self, header: Header) -> type[Message] | None:
-        """Return the class of a publisher's messages, None if nobody knows it."""
+        """Return the class for a publisher's messages, or None if the definition is unknown."""
         key = header.get("type", ""), header.get("md5sum", "")
         if key not in self._classes:
             if len(self._classes) > 1000:

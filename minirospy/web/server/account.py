@@ -1,10 +1,11 @@
-"""The account of a server's memory: what it holds for its clients, with a share for each. Pure.
+"""Accounting of the memory that a server uses for its clients, with a share for each client. Pure.
 
-Unfinished messages, fragments, operations that wait, and queued output count, for all clients of all listeners together. Beyond
-the limit the client that holds the most, at the address that holds the most, has to give up what it holds: first messages that
-may be dropped, then its connection. Clients of the owner come last. So no client can take the memory, nor another client's place.
+Unfinished messages, fragments, queued operations and queued output count, for all clients of all listeners together. If
+the limit is exceeded, the client that uses the most memory, at the address that uses the most, has to release memory:
+first messages that may be dropped, then its connection. The owner's clients are chosen last. Therefore no client can
+use up the memory, or cause another client to be disconnected.
 
-Pieces that are large may wait for many clients at the same time, as the images of a camera do: they count once.
+The same large piece, such as a camera image, may be queued for many clients; it counts only once.
 """
 
 from __future__ import annotations
@@ -15,36 +16,39 @@ from collections.abc import Callable, Sequence
 __all__ = ["LARGE_PIECE", "MAX_BYTES", "Account", "Share"]
 
 MAX_BYTES = 160_000_000
-"""Bytes that a server holds for all clients: the process stays under 400 MB, with copies while a message is handled."""
+"""Maximum bytes that a server holds for all clients:
+
+the process stays below 400 MB, including copies while it handles a message.
+"""
 
 LARGE_PIECE = 32_768
-"""Bytes from which a piece is counted once, however many clients it waits for."""
+"""Minimum bytes of a piece that is counted only once, even if it is queued for many clients."""
 
 Piece = bytes | memoryview | bytearray
 
 
 class Share:
-    """What one client holds."""
+    """The memory that one client uses."""
 
     def __init__(self, account: Account, address: str, shed: Callable[[], object]) -> None:
         self.address = address
         self.is_owner = False
-        """Set once the client has proved to be the owner: its share is the last to be shed."""
+        """True once the client has proved to be the owner: its share is then the last to be reduced."""
         self.size = 0
-        """Bytes that the client holds alone."""
+        """Bytes that only this client uses."""
         self.large = 0
-        """Bytes of the large pieces that wait for it, which may wait for others, too."""
+        """Bytes of the large pieces queued for this client, which may be queued for other clients too."""
         self.shed = shed
-        """Gives up some of what the client holds, or all."""
+        """Releases some or all of the client's memory."""
         self._account = account
 
     @property
     def weight(self) -> int:
-        """Return all bytes that the client holds, alone or with others."""
+        """Return all bytes that the client uses, including those shared with other clients."""
         return self.size + self.large
 
     def set(self, size: int) -> None:
-        """Set the bytes that the client holds alone, and let clients give up memory if there is too much."""
+        """Set the number of bytes that only this client uses. If the limit is exceeded, make clients release memory."""
         grown = size - self.size
         if grown:
             self.size = size
@@ -53,42 +57,42 @@ class Share:
                 self._account.enforce()
 
     def hold(self, pieces: Sequence[Piece]) -> None:
-        """Count the large ones of these pieces."""
+        """Count those of the pieces that are large."""
         self.large += self._account.hold(pieces)
 
     def release(self, pieces: Sequence[Piece]) -> None:
-        """Count them no more; they are the same objects that were held."""
+        """Stop counting pieces, which must be the objects that were passed to :meth:`hold`."""
         self.large -= self._account.release(pieces)
 
 
 class Account:
-    """The memory of all clients of a server. On the loop."""
+    """The memory that all clients of a server use. Runs on the loop."""
 
     def __init__(self, limit: int = MAX_BYTES) -> None:
         self.limit = limit
         self.total = 0
-        """Bytes that are held now."""
+        """Total bytes in use."""
         self.shed = 0
-        """How often a client had to give up memory."""
+        """Number of times that a client had to release memory."""
         self._shares: set[Share] = set()
         self._holders: Counter[int] = Counter()
-        """How often a large piece waits, by the id of the object, which exists as long as it waits."""
+        """Number of times that a large piece is queued, by the id of the object, which exists while it is queued."""
         self._is_enforcing = False
 
     def open(self, address: str, shed: Callable[[], object]) -> Share:
-        """Return the share of a new client; ``shed`` is called when it has to give up what it holds."""
+        """Return the share of a new client; ``shed`` is called when the client has to release memory."""
         share = Share(self, address, shed)
         self._shares.add(share)
         return share
 
     def close(self, share: Share) -> None:
-        """Forget a client, whose pieces have been released. Idempotent."""
+        """Remove a client's share, whose pieces must have been released. Idempotent."""
         self._shares.discard(share)
         self.total -= share.size
         share.size = 0
 
     def hold(self, pieces: Sequence[Piece]) -> int:
-        """Count the large ones of these pieces; return their bytes."""
+        """Count those of the pieces that are large; return their total bytes."""
         found = 0
         for piece in pieces:
             size = len(piece)
@@ -100,7 +104,7 @@ class Account:
         return found
 
     def release(self, pieces: Sequence[Piece]) -> int:
-        """Count pieces that were held once less; return the bytes of the large ones."""
+        """Decrement the count of pieces that were held; return the total bytes of the large ones."""
         found = 0
         for piece in pieces:
             size = len(piece)
@@ -113,9 +117,9 @@ class Account:
         return found
 
     def enforce(self) -> None:
-        """Have clients give up memory until the limit is kept."""
+        """Make clients release memory until the total is within the limit."""
         if self._is_enforcing:
-            return  # what is shed calls this again
+            return  # releasing memory calls this method again
         self._is_enforcing = True
         try:
             while self.total > self.limit:
@@ -126,13 +130,13 @@ class Account:
                 self.shed += 1
                 share.shed()
                 if share.weight >= before:
-                    # It holds on to what it has: it must not be chosen for ever.
+                    # The client has released nothing: remove it, so that it is not chosen forever.
                     self.close(share)
         finally:
             self._is_enforcing = False
 
     def heaviest(self) -> Share | None:
-        """Return the client that has to give up memory; None if no client holds any."""
+        """Return the share of the client that has to release memory next, or None if no client uses any."""
         holding = [share for share in self._shares if share.weight]
         holding = [share for share in holding if not share.is_owner] or holding
         if not holding:

@@ -1,14 +1,14 @@
-"""Which connection gives way to a new one where there is room for no more. Pure.
+"""Select the connection to close for a new one if the maximum number of connections is reached. Pure.
 
-An attacker holds connections: it opens them and sends nothing, or is served and does nothing, or a little now and then. It has
-few addresses and no token. So, in this order:
+An attacker occupies connections: it opens them and sends no request, or is served and then sends nothing, or only occasionally
+a little. It has few addresses and no token. Therefore connections are closed in this order:
 
-1. a connection without a request that is older than some seconds, or of which its address has too many;
-2. a client that has sent and received nothing for some time: of the address with the most connections, the longest idle;
-3. any client of an address that has more than half of all connections, for an address that has few;
-4. for the owner any client of another one.
+1. a connection without a request that is older than some seconds, or whose address has too many of these;
+2. a client that has sent and received nothing for some time: the longest idle one at the address with the most connections;
+3. for an address with few connections, a client of an address that has more than half of all connections;
+4. for the owner, any client of another user.
 
-A client gives way only to one with at least its rights.
+A client is closed only for a connection whose rights are at least equal.
 """
 
 from __future__ import annotations
@@ -22,48 +22,50 @@ from minirospy.web.access import Grant
 
 __all__ = ["Occupant", "Rank", "displaced", "rank_of"]
 
-SILENT_SECONDS = 5.0  # a client sends its request with its connection; a browser opens some in advance
-MAX_SILENT = 16  # connections of an address without a request that may be younger; a browser opens six
-IDLE_SECONDS = 30.0  # pages have something to send or to show more often
-FEW = 8  # an address has few connections if it has less than an eighth of all
+# a client sends its request right after connecting, but a browser opens some connections in advance
+SILENT_SECONDS = 5.0
+# maximum connections per address without a request that are younger than this; a browser opens six
+MAX_SILENT = 16
+IDLE_SECONDS = 30.0  # pages send or receive something more often than this
+FEW = 8  # an address has few connections if it has less than an eighth of all connections
 
 
 class Rank(IntEnum):
-    """The rights of a connection, as far as they are known."""
+    """A connection's rights, as far as they are known."""
 
     SILENT = 0
-    """It has sent no request."""
+    """The client has sent no request yet."""
     READ = 1
     WRITE = 2
     OWN = 3
-    """It has the read-write token, or belongs to the user of the server."""
+    """The client has the token for owners, or belongs to the server's user."""
 
 
 def rank_of(grant: Grant) -> Rank:
-    """Return the rank of a client by its rights."""
+    """Return the rank that corresponds to a client's rights."""
     return {Grant.READ: Rank.READ, Grant.WRITE: Rank.WRITE, Grant.OWN: Rank.OWN}[grant]
 
 
 class Occupant(Protocol):
-    """A connection that has a place."""
+    """An admitted connection."""
 
     @property
     def peer(self) -> str:
-        """The address of the other end."""
+        """The peer's address."""
 
     @property
     def rank(self) -> Rank: ...
 
     @property
     def active(self) -> float:
-        """When it was opened, or sent a message, or took one: by the same clock as ``now``."""
+        """The time when the connection was opened, or last sent or received a message, by the same clock as ``now``."""
 
 
 _O = TypeVar("_O", bound=Occupant)
 
 
 def displaced(peer: str, rank: Rank, occupants: Iterable[_O], now: float) -> _O | None:
-    """Return the connection that gives way to one from ``peer``; None if there is none."""
+    """Return the connection to close for a new one from ``peer``, or None if there is none."""
     found = list(occupants)
     silent = [each for each in found if each.rank is Rank.SILENT]
     old = [each for each in silent if now - each.active >= SILENT_SECONDS]
@@ -91,7 +93,7 @@ def displaced(peer: str, rank: Rank, occupants: Iterable[_O], now: float) -> _O 
 
 
 def _of_heaviest(occupants: list[_O]) -> list[_O]:
-    """Return those of the address that has the most of them."""
+    """Return the connections of the address that has the most of them."""
     counts = Counter(each.peer for each in occupants)
     heaviest = max(counts, key=counts.__getitem__)
     return [each for each in occupants if each.peer == heaviest]

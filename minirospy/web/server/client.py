@@ -1,4 +1,4 @@
-"""The peers that sessions of a protocol and handlers of pages send to: one WebSocket client, one HTTP request."""
+"""The peers to which a protocol's sessions and pages' handlers send: a WebSocket client, and an HTTP request."""
 
 from __future__ import annotations
 
@@ -43,39 +43,42 @@ PLAIN_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
 }
-"""The headers of every answer: what is served changes by the moment, and its path may carry a token."""
+"""The headers of every response.
+
+They prevent caching, because the contents change constantly, and the path may contain a token.
+"""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of one client: bytes of a message, frames a second, bytes that wait, seconds without progress.
+    """The limits for one client: bytes per message, frames per second, queued bytes, seconds without progress.
 
-    ``connections`` is the number of all clients together; an address may open ``connections_a_second``, and at first
+    ``connections`` is the maximum number of all clients together; an address may open ``connections_a_second``, and initially
     ``connection_burst``.
     """
 
     message: int = 64_000_000
     read_only_message: int = 64 * 1024
-    """Bytes of a message of a client that may not write: it subscribes, and sends nothing large."""
+    """Maximum bytes in a message from a read-only client, which subscribes but sends nothing large."""
     memory: int = MAX_BYTES
-    """Bytes that are held for all clients together: see account.py."""
+    """Maximum bytes held for all clients together: see account.py."""
     messages_a_second: int = 20_000
-    """Frames of any kind: empty ones, pings and parts of a message are counted too."""
+    """Maximum number of frames of any kind, including empty frames, pings and fragments of a message."""
     queue: int = DEFAULT_LIMIT
     connections: int = 256
     connections_a_second: float = 50.0
     connection_burst: int = 500
     reserve: int = 32
-    """Connections beyond that number which may be open until their request is known."""
+    """Number of connections in excess of ``connections`` that may be open until their request is known."""
     handshake_seconds: float = 30.0
-    """A browser opens connections in advance, and uses them for ten seconds: those must not end here first."""
+    """A browser opens connections in advance and uses them within ten seconds, so this time must be longer."""
     ping_seconds: float = 20.0
     silent_seconds: float = 60.0
-    """A client that answers no ping, or takes no byte, for this long is disconnected."""
+    """A client that responds to no ping, or reads nothing, for this many seconds is disconnected."""
 
 
 class HttpRequest(NamedTuple):
-    """A request; names of headers are in lower case."""
+    """An HTTP request; header names are in lower case."""
 
     path: str
     query: Mapping[str, str]
@@ -84,11 +87,13 @@ class HttpRequest(NamedTuple):
     peer_port: int = 0
     address: str = ""
     port: int = 0
-    """The client's port, and the server's address and port, of this connection; see Endpoints in pipe.py."""
+    """The port of the client (``peer_port``), and the address and port of the server, for this connection; see Endpoints in
+    pipe.py.
+    """
 
 
 class Session(Protocol):
-    """A client of a protocol. Called on the loop; what it raises ends the connection."""
+    """The session of one client of a protocol. Called on the loop; an exception closes the connection."""
 
     def received_text(self, text: str) -> None: ...
 
@@ -101,13 +106,13 @@ class Endpoint(Protocol):
     """A protocol over WebSocket."""
 
     def select(self, offered: Sequence[str]) -> str | None:
-        """Return the sub-protocol to use, None for none. Raise LookupError with the reason for a refusal."""
+        """Return the sub-protocol to use, or None to use none. Raise LookupError, with the reason, to refuse the client."""
 
     def open(self, client: WebClient) -> Session: ...
 
 
 HttpHandler = Callable[["Exchange"], None]
-"""Answers a request now, or later, by the methods of the exchange."""
+"""Responds to a request immediately or later, with the methods of the exchange."""
 
 
 class Site(Protocol):
@@ -135,7 +140,7 @@ class Site(Protocol):
 
 
 class WebClient:
-    """One WebSocket client, for the session of its protocol."""
+    """One WebSocket client, as the session of its protocol sees it."""
 
     def __init__(
         self, connection: Connection, request: HttpRequest, grant: Grant, subprotocol: str | None
@@ -147,7 +152,7 @@ class WebClient:
 
     @property
     def name(self) -> str:
-        """Return the client's address, for people."""
+        """Return the client's address for display."""
         return self.request.peer
 
     @property
@@ -157,50 +162,53 @@ class WebClient:
 
     @property
     def is_owner(self) -> bool:
-        """Return whether the client may start programs and open files, as the user who runs the server."""
+        """Return whether the client may start programs and open files as the user who runs the server."""
         return self.grant is Grant.OWN
 
     def why_not_owner(self, what: str) -> str:
-        """Return the line for a client that is no owner and so may not ``what``."""
+        """Return the error message for a client that may not do ``what``, because it is not the owner."""
         if self.may_write:
             return f"only a client that has the token may {what}: open the link that the command printed"
         return f"this token is read-only: it does not let you {what}"
 
     @property
     def queue(self) -> SendQueue:
-        """Return the frames that wait for the client, and the counts."""
+        """Return the queue of frames for the client, with its counters."""
         return self._connection.queue
 
     def send_text(self, text: str) -> None:
-        """Send an answer as text; it is never dropped."""
+        """Send a response as a text message; it is never dropped."""
         data = text.encode()
         self._connection.answer((frame_head(_TEXT, len(data)), data))
 
     def send_binary(self, *pieces: Piece) -> None:
-        """Send an answer as one binary message; it is never dropped."""
+        """Send a response as one binary message; it is never dropped."""
         self._connection.answer((frame_head(_BINARY, sum(map(len, pieces))), *pieces))
 
     def send_file(self, answer: FileAnswer) -> None:
-        """Send a file as one binary message, read in pieces when its turn comes; ``answer`` is without frames."""
+        """Send a file as one binary message, read in pieces when it reaches the front of the queue.
+
+        The parts of ``answer`` do not include WebSocket frame headers.
+        """
         self._connection.answer_file(
             FileAnswer(answer.open, partial(_file_head, answer), partial(_file_failure, answer))
         )
 
     def holds(self, count: int) -> None:
-        """Count the bytes that the session keeps of the client: of messages that wait for others, or are handled."""
+        """Count the bytes that the session uses for the client: those of messages that are queued or being handled."""
         self._connection.session_holds(count)
 
     def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:
-        """Send a message of a stream as one binary message; older ones of ``key`` give way where the client is slow."""
+        """Send a stream's message as one binary message; if the client is slow, older messages with ``key`` are dropped."""
         front = frame_head(_BINARY, len(head) + len(payload)) + head
         self._connection.stream(key, (front, payload), newest_only=newest_only)
 
     def send_text_message(self, key: Hashable, text: bytes, *, newest_only: bool = False) -> None:
-        """Do the same as a text message; ``text`` is UTF-8."""
+        """Send a stream's message as a text message, as :meth:`send_message` does; ``text`` is UTF-8."""
         self._connection.stream(key, (frame_head(_TEXT, len(text)), text), newest_only=newest_only)
 
     def send_texts(self, key: Hashable, texts: Sequence[str], *, newest_only: bool = False) -> None:
-        """Send one message of a stream as several text messages, of which all wait or none."""
+        """Send one message of a stream as several text messages, which are queued or dropped together."""
         pieces: list[Piece] = []
         for text in texts:
             data = text.encode()
@@ -208,32 +216,35 @@ class WebClient:
         self._connection.stream(key, tuple(pieces), newest_only=newest_only)
 
     def discard(self, key: Hashable) -> None:
-        """Drop what waits under a key."""
+        """Remove the messages queued under a key."""
         self._connection.queue.discard(key)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
-        """Do work that takes long for the client in its turn; it keeps ``message`` until then."""
+        """Run ``work``, which takes long, in the client's turn. It uses ``message``, whose bytes are counted until then."""
         self._connection.in_turn(work, message)
 
     def hold_work(self, *, is_held: bool) -> None:
-        """Stop or continue what :meth:`in_turn` was given, while the last work goes on in a thread: its order is kept."""
+        """Stop or continue running the functions passed to :meth:`in_turn`.
+
+        Used while the last one continues in a thread, so that the order is preserved.
+        """
         self._connection.hold_jobs(are_held=is_held)
 
     def pause(self) -> None:
-        """Handle no more of what the client sends, until :meth:`resume`."""
+        """Stop handling messages from the client, until :meth:`resume` is called."""
         self._connection.hold(is_held=True)
 
     def resume(self) -> None:
-        """Go on with what the client sends."""
+        """Continue handling messages from the client."""
         self._connection.hold(is_held=False)
 
     def close(self, code: int = 1000, reason: str = "") -> None:
-        """End the connection after what waits; ``reason`` is cut to 123 bytes."""
+        """Close the connection after sending the queued messages; ``reason`` is truncated to 123 bytes."""
         self._connection.close_websocket(code, reason)
 
 
 class Exchange:
-    """One HTTP request and its answer."""
+    """One HTTP request and its response."""
 
     def __init__(self, connection: Connection, request: HttpRequest, grant: Grant) -> None:
         self.request = request
@@ -244,35 +255,35 @@ class Exchange:
 
     @property
     def is_open(self) -> bool:
-        """Return whether the client is still there and the answer has not ended."""
+        """Return whether the client is still connected and the response has not ended."""
         return self._connection.is_open
 
     @property
     def queue(self) -> SendQueue:
-        """Return the frames that wait for the client, and the counts."""
+        """Return the queue of data for the client, with its counters."""
         return self._connection.queue
 
     def respond(
         self, status: int, body: bytes, content_type: str = "text/plain; charset=utf-8", **headers: str
     ) -> None:
-        """Answer, and close the connection."""
+        """Send a complete response, and close the connection."""
         head = response_head(status, {**PLAIN_HEADERS, "Content-Type": content_type,
                                        "Content-Length": str(len(body)), **_dashed(headers)})  # fmt: skip
         self._connection.answer((head, body))
         self._connection.close_when_sent()
 
     def start(self, status: int, content_type: str, **headers: str) -> None:
-        """Start an answer whose parts follow, until :meth:`end`."""
+        """Start a response whose parts are sent with :meth:`send`, until :meth:`end` is called."""
         self._connection.answer(
             (response_head(status, {**PLAIN_HEADERS, "Content-Type": content_type, **_dashed(headers)}),)
         )
 
     def send(self, key: Hashable, *pieces: Piece, newest_only: bool = True) -> None:
-        """Send a part; older ones of ``key`` give way where the client is slow."""
+        """Send a part of the response; if the client is slow, older parts with ``key`` are dropped."""
         self._connection.stream(key, pieces, newest_only=newest_only)
 
     def end(self) -> None:
-        """End the answer after what waits."""
+        """End the response after sending the queued parts."""
         self._connection.close_when_sent()
 
 
@@ -287,7 +298,7 @@ def _file_failure(answer: FileAnswer, why: str) -> bytes:
 
 
 def frame_head(opcode: int, length: int) -> bytes:
-    """Return the head of a server's frame that is a whole message."""
+    """Return the header of a server's frame that contains a whole message."""
     if length < 126:
         return bytes((opcode, length))
     if length < 65536:

@@ -1,8 +1,9 @@
-"""One connection from a browser or program: an HTTP request comes in, then a response, a stream or a WebSocket goes out.
+"""One connection from a browser or program: an HTTP request, followed by a response, a stream or a WebSocket.
 
-This is the part with the transport: it feeds the protocol (:mod:`minirospy.web.server.websocket`) in the client's turn
-(:mod:`minirospy.web.server.turns`), calls the session or the page, queues their output (:mod:`minirospy.web.server.output`), and
-counts what the client holds (:mod:`minirospy.web.server.account`). Source: RFC 6455, RFC 9112.
+This module handles the transport: it feeds the protocol (:mod:`minirospy.web.server.websocket`) in the client's turn
+(:mod:`minirospy.web.server.turns`), calls the session or the page, queues their output
+(:mod:`minirospy.web.server.output`), and counts the memory that the client uses (:mod:`minirospy.web.server.account`). Source:
+RFC 6455, RFC 9112.
 """
 
 from __future__ import annotations
@@ -62,15 +63,19 @@ __all__ = [
 
 _log = logging.getLogger(__name__)
 
-_PONG = 0x8A  # first byte of a frame, and the key under which a pong waits
+_PONG = 0x8A  # first byte of a pong frame, and the key under which a pong is queued
 _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
-"""Of clients when the loop's time is shared. On loopback any program may write; the page of the dashboard has the token."""
-_NEW_WEIGHT = 0.25  # until the request is known: clients that are served do not wait for 250 handshakes
+"""Weights of clients when the loop's time is shared.
+
+On loopback any program may write; the dashboard's page has the owner's token.
+"""
+# until the request is known, so that clients that are served do not wait for 250 handshakes
+_NEW_WEIGHT = 0.25
 
 
 @dataclass
 class Traffic:
-    """The traffic of a client, and how often its reading was held back."""
+    """A client's traffic, and the number of times that reading from it was suspended."""
 
     received: int = 0
     received_bytes: int = 0
@@ -79,64 +84,67 @@ class Traffic:
 
 
 class _Phase(IntEnum):
-    """The life of a connection."""
+    """The phases of a connection's lifetime."""
 
     OPEN = 0
     CLOSING = 1
-    """Nothing more is handled or queued; what is queued may still be sent."""
+    """Nothing more is handled or queued; queued data may still be sent."""
     ENDED = 2
-    """The pipe has ended."""
+    """The pipe has closed."""
 
 
 class Connection:
-    """The state of one connection; the events of its pipe come in here."""
+    """The state of one connection, which receives the events from its pipe."""
 
     def __init__(self, site: Site, pipe: Pipe, peer: str, loop: asyncio.AbstractEventLoop) -> None:
         limits = site.limits
         now = loop.time()
         self.peer = peer  # the client's address
-        self.share = site.account.open(peer, self._shed)  # of the server's memory
-        self.traffic = Traffic()  # counts for people
-        self.session: Session | None = None  # from the handshake of a WebSocket until the end
-        self.client: WebClient | None = None  # from the handshake of a WebSocket on
-        self.exchange: Exchange | None = None  # from the request for a page until the end
-        self.rank = Rank.SILENT  # the rights; set by the listener when it admits the request
+        self.share = site.account.open(peer, self._shed)  # its share of the server's memory
+        self.traffic = Traffic()  # counters for display
+        self.session: Session | None = None  # set from a WebSocket's handshake until the connection closes
+        self.client: WebClient | None = None  # set once a WebSocket's handshake is complete
+        self.exchange: Exchange | None = None  # set from the request for a page until the connection closes
+        # the client's access rights; set by the listener when it admits the request
+        self.rank = Rank.SILENT
         self.active = now  # when the connection was opened, or last received a message or sent one
-        self.unfinished = 0  # bytes of a message that is not complete, or that the session works on
+        # bytes of incomplete messages, and of the message that the session is processing
+        self.unfinished = 0
         self._site = site  # the listener
-        self._limits = limits  # the listener's
+        self._limits = limits  # the listener's limits
         self._pipe = pipe  # the transport
         self._loop = loop
         self._websocket = WebSocket(self._select, limits.message, limits.messages_a_second)
         self._output = Output(pipe, SendQueue(limits.queue, share=self.share), self.share, loop, self._count)
-        self._jobs = Jobs(limits.queue, self.share)  # work for the client that is not about what it sent
+        # work for the client that is not a response to its messages
+        self._jobs = Jobs(limits.queue, self.share)
         self._liveness = Liveness(limits.silent_seconds, now)
-        self._turn = site.turns.join(self._work)  # the client's share of the loop
+        self._turn = site.turns.join(self._work)  # the client's share of the loop's time
         self._turn.weight = _NEW_WEIGHT
         self._endpoint: Endpoint | None = None  # set in the handshake, when the sub-protocol is chosen
         self._phase = _Phase.OPEN
-        self._is_held_back = False  # while the client has sent as many frames as it may in this second
-        self._is_paused = False  # while the session works on an earlier message, see hold()
+        self._is_held_back = False  # True if the client has used up its frame quota for the current second
+        self._is_paused = False  # True while the session works on an earlier message, see hold()
         self._worked_on = 0  # bytes of that message
-        self._are_jobs_held = False  # while a job goes on in a thread, see hold_jobs()
-        self._held = 0  # bytes that the session holds for the client, see session_holds()
-        self._is_in_turn = False  # while _work() runs
-        # Calls _handshake_late at first, then what watches an open connection, then _abort for a closing one.
+        self._are_jobs_held = False  # True while a job continues in a thread, see hold_jobs()
+        self._held = 0  # bytes that the session uses for the client, see session_holds()
+        self._is_in_turn = False  # True while _work() runs
+        # Calls _handshake_late at first, later the check of an open connection, and finally _abort for a closing one.
         self._timer = loop.call_later(limits.handshake_seconds, self._handshake_late)
 
     @property
     def queue(self) -> SendQueue:
-        """Return what waits to be sent."""
+        """Return the output queue."""
         return self._output.queue
 
     @property
     def is_open(self) -> bool:
-        """Return whether more may be sent."""
+        """Return whether more data may be sent."""
         return self._phase is _Phase.OPEN
 
     @property
     def is_silent(self) -> bool:
-        """Return whether no request has come."""
+        """Return whether the client has not sent a request yet."""
         return self.is_open and not (self.client or self.exchange)
 
     @property
@@ -147,15 +155,15 @@ class Connection:
     # --- from the pipe
 
     def received(self, data: bytes) -> None:
-        """Take over bytes from the client."""
+        """Process bytes received from the client."""
         if not self.is_open:
             return
         self._liveness.heard(self._loop.time())
         self.traffic.received_bytes += len(data)
         if self.exchange:
-            return  # a connection has one request
+            return  # a connection has only one request
         self._websocket.feed(data)
-        # A large message is read in large pieces, unless other clients wait for their turns.
+        # Read a large message in large pieces, unless other clients are waiting for their turns.
         is_alone = len(data) >= SMALL_READ and not self._site.turns.is_busy
         self._pipe.read_bytes = LARGE_READ if is_alone else SMALL_READ
         if self._is_held_back or self._is_paused or self._site.turns.start(self._turn):
@@ -163,11 +171,11 @@ class Connection:
         self._count_unfinished()
 
     def writable(self) -> None:
-        """Send more."""
+        """Send more of the queued data."""
         self._output.pump()
 
     def ended(self) -> None:
-        """Release everything: the pipe has ended."""
+        """Release all resources, because the pipe has closed."""
         if self._phase is _Phase.ENDED:
             return
         self._phase = _Phase.ENDED
@@ -191,10 +199,10 @@ class Connection:
     # --- to the pipe
 
     def answer(self, pieces: tuple[Piece, ...]) -> None:
-        """Send a message that is never dropped."""
+        """Send a message that must not be dropped."""
         if not self.is_open:
             return
-        # Checked before: a single answer, such as a mesh, may be larger than what may wait.
+        # Check this first, because a single response, such as a mesh, may be larger than the limit.
         if self.queue.is_overrun:
             _log.warning("%s reads no answers: disconnected", self.peer)
             self._abort()
@@ -204,7 +212,7 @@ class Connection:
         self._output.schedule()
 
     def answer_file(self, answer: FileAnswer) -> None:
-        """Send a file, which is never dropped."""
+        """Send a file, which must not be dropped."""
         if self.is_open:
             self.queue.put_file(answer)
             self._count()
@@ -221,14 +229,14 @@ class Connection:
             self._output.schedule()
 
     def close_when_sent(self) -> None:
-        """End the connection when everything that is queued has been sent."""
+        """Close the connection when all queued data has been sent."""
         self._close()
         self._output.close_when_sent()
         self._timer.cancel()
         self._timer = self._loop.call_later(self._limits.handshake_seconds, self._abort)
 
     def close_websocket(self, code: int, reason: str) -> None:
-        """Send a close frame, and end the connection when everything that is queued has been sent."""
+        """Send a close frame, and close the connection when all queued data has been sent."""
         if not self.is_open or not self._websocket.is_open:
             return
         self._websocket.close(code, reason)
@@ -236,19 +244,19 @@ class Connection:
         self.close_when_sent()
 
     def give_way(self) -> None:
-        """End the connection, since another client needs its place."""
+        """Close the connection, because another client needs its place."""
         self.close_websocket(CloseCode.TRY_AGAIN_LATER, "another client needs the place")
         if self.is_open or self._output.is_full:
             self._abort()
 
     def abort(self) -> None:
-        """End the connection now."""
+        """Close the connection immediately."""
         self._abort()
 
     # --- for the session
 
     def hold(self, *, is_held: bool) -> None:
-        """Stop or continue handling frames, while the session is busy with one; the client's bytes stay in its socket."""
+        """Stop or continue handling frames while the session is processing one; unread data stays in the client's socket."""
         self._is_paused = is_held
         if is_held:
             self._pipe.pause()
@@ -259,9 +267,10 @@ class Connection:
             self._site.turns.start(self._turn)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
-        """Do some work for the client in its turn, immediately if that is now; it keeps ``message`` until then.
+        """Run ``work`` in the client's turn, or immediately if it is the client's turn now.
 
-        The oldest work is dropped if more waits than may be sent.
+        ``work`` uses ``message``, whose bytes are counted until then. If the queued work exceeds the queue's limit, the
+        oldest is dropped.
         """
         if self._is_in_turn and not self._are_jobs_held:
             work()
@@ -274,13 +283,13 @@ class Connection:
             self._count()
 
     def hold_jobs(self, *, are_held: bool) -> None:
-        """Stop or continue the work for the client, while the last of it goes on in a thread."""
+        """Stop or continue the work for the client, while the last piece of work continues in a thread."""
         self._are_jobs_held = are_held
         if not are_held and self._jobs:
             self._site.turns.start(self._turn)
 
     def session_holds(self, count: int) -> None:
-        """Count the bytes that the session holds for the client."""
+        """Set the number of bytes that the session uses for the client."""
         self._held = count
         if self._phase is not _Phase.ENDED:
             self._count()
@@ -288,7 +297,7 @@ class Connection:
     # --- the client's turn
 
     def _work(self, end: float) -> bool:
-        """Work for the client up to a time; return whether more is left."""
+        """Do work for the client until a time; return whether more is left."""
         self._is_in_turn = True
         try:
             return self._do_jobs(end) or self._handle_frames(end)
@@ -315,7 +324,7 @@ class Connection:
         return False
 
     def _handle_frames(self, end: float) -> bool:
-        """Handle frames up to a time; return whether more are left, of what the client may send in this second."""
+        """Handle frames until a time; return whether more are left within the client's quota for this second."""
         if self.client is None:
             self._parse_head()
         websocket, rate, time_of = self._websocket, self._websocket.rate, self._loop.time
@@ -343,7 +352,8 @@ class Connection:
     def _framed(self, frame: Frame) -> None:
         event = self._websocket.event_of(frame)
         if isinstance(event, Ping):
-            # Only the newest ping needs an answer (RFC 6455, 5.5.3): at most one waits for a client that reads nothing.
+            # Only the newest ping needs a response (RFC 6455, 5.5.3), so at most one is queued for a client that
+            # reads nothing.
             self.stream(_PONG, (frame_head(_PONG, len(event.data)), event.data), newest_only=True)
         elif event:
             self._deliver(event)
@@ -369,7 +379,7 @@ class Connection:
             self._worked_on = len(data)
 
     def _hold_back(self, seconds: float) -> None:
-        """Stop reading from the client until the next second: it has sent all the frames that it may in this one."""
+        """Stop reading from the client until the next second, because it has used up its frame quota for this one."""
         self._is_held_back = True
         self.traffic.held_back += 1
         self._pipe.pause()
@@ -390,7 +400,8 @@ class Connection:
     def _parse_head(self) -> None:
         try:
             request = self._websocket.next_request()
-            # The target and Origin may be no URLs, with a thousand fields: the client is refused, not left connected.
+            # If the target or Origin is not a URL, or has a thousand fields, refuse the client instead of leaving it
+            # connected.
             found = self._admitted(read_head(request)) if request else None
         except ValueError as error:
             found = Refusal(400, f"not a request for this server: {escaped(str(error))[:200]}")
@@ -407,7 +418,10 @@ class Connection:
             self._open_websocket(request, seen, grant)
 
     def _admitted(self, head: RequestHead) -> tuple[HttpRequest, Grant, bool] | Refusal:
-        """Return a request, its rights and whether it is for a page, or why it is refused. Raise ValueError."""
+        """Return a request, its rights and whether it is for a page, or the reason for refusing it.
+
+        Raise ValueError if the request is invalid.
+        """
         grant = self._site.check(head.credentials, is_page=head.is_page)
         refusal = grant if isinstance(grant, Refusal) else self._site.admit(self, grant)
         if refusal:
@@ -432,7 +446,7 @@ class Connection:
         self.session = self._endpoint.open(self.client)
 
     def _select(self, offered: Sequence[str]) -> str | None:
-        """Choose the endpoint; return its sub-protocol. Raise NegotiationError."""
+        """Choose the endpoint; return its sub-protocol. Raise NegotiationError if no endpoint accepts the client."""
         why = "nothing is served here"
         for endpoint in self._site.endpoints:
             try:
@@ -470,11 +484,11 @@ class Connection:
         self._count()
 
     def _count(self) -> None:
-        """Count in the account what the client holds alone; this may make clients release memory, this one too."""
+        """Report the bytes that only this client uses. As a result, clients may have to release memory, including this one."""
         self.share.set(self.unfinished + self._held + self._jobs.size + self._output.size)
 
     def _shed(self) -> None:
-        """Release memory: messages that may be dropped, else the connection."""
+        """Release memory: drop messages if that is allowed, else close the connection."""
         if self.unfinished > self.queue.size + self.queue.answers + self._jobs.size and not self._held:
             self._refuse_unfinished()
             return
@@ -503,12 +517,12 @@ class Connection:
     # --- time
 
     def _watch(self, check: Callable[[], None]) -> None:
-        """Call ``check`` after the time between two pings, in place of what watched the connection until now."""
+        """Call ``check`` after the ping interval, instead of the previous check."""
         self._timer.cancel()
         self._timer = self._loop.call_later(self._limits.ping_seconds, check)
 
     def _ping(self) -> None:
-        """Ping the client, or disconnect it if it is gone."""
+        """Ping the client, or disconnect it if it no longer responds."""
         output = self._output
         verdict = self._liveness.check(self._loop.time(), output.progressed, is_full=output.is_full)
         if verdict in (Verdict.STUCK, Verdict.SILENT):

@@ -1,6 +1,6 @@
-"""Files that are sent to clients in pieces, each read in a worker when the client has taken the one before.
+"""Files that are sent to clients in pieces: a worker reads each piece after the client has received the one before.
 
-A mesh of 60 MB thus takes one piece of memory for each client, however many clients request it and read nothing.
+Thus a mesh of 60 MB uses the memory of only one piece for each client, even if many clients request it and read nothing.
 """
 
 from __future__ import annotations
@@ -17,44 +17,45 @@ __all__ = ["PIECE_BYTES", "FileAnswer", "FileSender"]
 
 _log = logging.getLogger(__name__)
 
-PIECE_BYTES = 128 * 1024  # read at a time: large enough for a worker's overhead, small for 256 clients
+# bytes to read at a time: large compared with a worker's overhead, small for 256 clients
+PIECE_BYTES = 128 * 1024
 
 
 @dataclass(frozen=True)
 class FileAnswer:
-    """An answer that has a file at its end. Nothing is opened or read before its turn comes."""
+    """A response that ends with a file, which is not opened before it reaches the front of the queue."""
 
     open: Callable[[], tuple[BinaryIO, int]]
-    """Return the file and its size. Blocking; raises BridgeError with the reason."""
+    """Returns the file and its size. Blocks; raises BridgeError, with the reason, if the file cannot be opened."""
     head: Callable[[int], bytes]
-    """Return what is sent before a file of this size."""
+    """Returns the data to send before a file of this size."""
     failure: Callable[[str], bytes]
-    """Return what is sent instead if the file cannot be opened."""
+    """Returns the data to send instead if the file cannot be opened."""
 
 
 class FileSender:
-    """The state of one file that is sent to one client. On the loop."""
+    """Sends one file to one client. Runs on the loop."""
 
     def __init__(
         self, answer: FileAnswer, loop: asyncio.AbstractEventLoop, on_piece: Callable[[], object]
     ) -> None:
-        """``on_piece`` is called when the next piece has been read, or the file has failed."""
+        """Create the sender. ``on_piece`` is called when the next piece has been read, or reading has failed."""
         self.is_done = False
-        """Whether everything has been taken."""
+        """True if all pieces have been taken."""
         self.has_failed = False
-        """Whether the file has become shorter or unreadable after its size was sent."""
+        """True if the file has become shorter or unreadable after its size was sent."""
         self._answer = answer
         self._loop = loop
         self._on_piece = on_piece
         self._file: BinaryIO | None = None
         self._left = 0
-        """Bytes of the file that have not been read."""
+        """Bytes of the file that have not been read yet."""
         self._piece: bytes | None = None
         self._reading: asyncio.Future[bytes] | None = None
         self._is_closed = False
 
     def take(self) -> bytes | None:
-        """Return the next piece; None while it is being read."""
+        """Return the next piece, or None while it is being read."""
         piece, self._piece = self._piece, None
         if piece is None:
             self._read()
@@ -64,7 +65,7 @@ class FileSender:
         return piece
 
     def close(self) -> None:
-        """Close the file, once it is not being read. Idempotent."""
+        """Close the file, or if it is being read, close it afterwards. Idempotent."""
         self._is_closed = True
         if self._file and not self._reading:
             self._file.close()
@@ -76,7 +77,7 @@ class FileSender:
             self._reading.add_done_callback(self._was_read)
 
     def _first(self) -> bytes:
-        """Open the file; return the first piece, with the head. In a worker."""
+        """Open the file; return the head and the first piece. Runs in a worker."""
         try:
             self._file, size = self._answer.open()
         except BridgeError as error:
@@ -85,7 +86,7 @@ class FileSender:
         return self._answer.head(size) + (self._next() if size else b"")
 
     def _next(self) -> bytes:
-        """Return the next piece of the file. In a worker."""
+        """Return the next piece of the file. Runs in a worker."""
         assert self._file
         piece = self._file.read(min(PIECE_BYTES, self._left))
         if not piece:

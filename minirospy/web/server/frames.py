@@ -1,4 +1,4 @@
-"""The library ``websockets``' protocol, made to stop after each frame. Source: RFC 6455."""
+"""The protocol class of the library ``websockets``, modified to stop after each frame. Source: RFC 6455."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ __all__ = ["FrameByFrame"]
 
 
 class FrameByFrame(ServerProtocol):
-    """The library's protocol, which parses all that has come in one call, made to stop after each frame."""
+    """The library's protocol, which parses all received data in one call, modified to stop after each frame."""
 
     reader: _GatedReader
 
     def feed(self, data: bytes) -> None:
-        """Add bytes that were received."""
+        """Add received bytes."""
         self.reader.feed_data(data)
 
     def next_request(self) -> Request | None:
-        """Return the request, once it has come whole; else None, and ``handshake_exc`` is set if it is not one."""
+        """Return the request, or None if it is incomplete; if it is not a request, ``handshake_exc`` is set."""
         next(self.parser)
         events = self.events_received()
         return events[0] if events and isinstance(events[0], Request) else None
 
     def next_frame(self) -> Frame | None:
-        """Return the next frame that has come whole, None if there is none."""
+        """Return the next complete frame, or None if there is none."""
         self.reader.is_open = True
         next(self.parser)
         event = self.events.pop() if self.events else None
@@ -36,18 +36,18 @@ class FrameByFrame(ServerProtocol):
 
     def limit(self, size: int) -> None:
         """Refuse larger messages from now on."""
-        # The name of the attribute depends on the library's release.
+        # The name of the attribute depends on the library's version.
         for name in ("max_message_size", "max_size"):
             if hasattr(self, name):
                 setattr(self, name, size)
 
     def parse(self) -> Generator[None]:
-        """See the library's: called once, before anything is read."""
+        """See the library's method. Called once, before anything is read."""
         self.reader = _GatedReader()
         yield from super().parse()
 
     def recv_frame(self, frame: Frame) -> None:
-        """Take over a frame, and stop; pings are answered by the connection."""
+        """Process a frame, and stop; the connection responds to pings."""
         if frame.opcode is Opcode.PING:
             self.events.append(frame)
         else:
@@ -56,12 +56,12 @@ class FrameByFrame(ServerProtocol):
 
 
 class _GatedReader(StreamReader):
-    """Stops the parser before each frame while it is not open."""
+    """Stops the parser before each frame unless ``is_open`` is set."""
 
     is_open = False
 
     def at_eof(self) -> Generator[None, None, bool]:
-        """See the library's: called by the parser before each frame. The end of the stream is the pipe's."""
+        """See the library's method, which the parser calls before each frame. The pipe detects the end of the stream."""
         while not (self.is_open and self.buffer):
             yield
         return False

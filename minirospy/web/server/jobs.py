@@ -1,4 +1,4 @@
-"""Work that waits for a client's turn: messages that are not encoded yet. Pure."""
+"""Work that is queued for a client's turn: messages that are not encoded yet. Pure."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from minirospy.web.server.account import LARGE_PIECE, Piece, Share
 
 __all__ = ["Jobs"]
 
-_MAX_JOBS = 1000  # of one client, each of which keeps a message that is not encoded yet
-_JOB_BYTES = 500  # of memory for a job: 290 were measured, and its message's record
+_MAX_JOBS = 1000  # maximum jobs of one client, each of which refers to a message that is not encoded yet
+_JOB_BYTES = 500  # bytes of memory for a job: 290 were measured, plus the record of its message
 
 Work = Callable[[], None]
 
@@ -22,24 +22,24 @@ class _Job(NamedTuple):
 
 
 class Jobs:
-    """The work of one client, oldest first, bounded in number and in the bytes of the messages that it keeps.
+    """The queued work for one client, oldest first, limited in number and in the bytes of the messages that it refers to.
 
-    Large messages are counted in the client's share of the server's memory, once for all clients for which they wait.
+    A large message counts in the client's share of the server's memory, but only once if it is queued for several clients.
     """
 
     def __init__(self, max_bytes: int, share: Share) -> None:
-        self.size = 0  # bytes of memory that the work takes for this client alone
+        self.size = 0  # bytes of memory that the work uses for this client alone
         self._max_bytes = max_bytes
         self._share = share
-        self._message_bytes = 0  # of all messages that are kept
+        self._message_bytes = 0  # total bytes of all messages that the work refers to
         self._waiting: deque[_Job] = deque()
 
     def __len__(self) -> int:
-        """Return the number of jobs that wait."""
+        """Return the number of queued jobs."""
         return len(self._waiting)
 
     def add(self, work: Work, message: Piece) -> int:
-        """Append work that keeps a message; return how many older jobs were dropped for it."""
+        """Append work that refers to a message; return the number of older jobs dropped because of it."""
         self._waiting.append(_Job(work, message))
         self._count(message, 1)
         self._share.hold((message,))
@@ -57,7 +57,7 @@ class Jobs:
         return work
 
     def clear(self) -> int:
-        """Drop all work; return the number of jobs."""
+        """Drop all work; return the number of dropped jobs."""
         dropped = len(self)
         while self._waiting:
             self.pop()

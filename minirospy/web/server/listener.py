@@ -1,4 +1,4 @@
-"""A listening socket and its connections, whose number is limited."""
+"""A listening socket and its connections, with a limit on their number."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _TOO_OFTEN = _refusal(429, 1, "too many new connections from this address: wait 
 
 
 class Listener:
-    """Serves endpoints (protocols over WebSocket) and pages (HTTP) at one port."""
+    """Serves endpoints (protocols over WebSocket) and pages (HTTP) on one port."""
 
     def __init__(
         self,
@@ -62,18 +62,21 @@ class Listener:
         account: Account | None = None,
         on_change: Callable[[int], object] = lambda _: None,
     ) -> None:
-        """``pages``: path -> what answers it; ``public_pages`` need no token. ``on_change`` gets the number of connections."""
+        """Create the listener. ``pages`` is a dict from path to handler; ``public_pages`` need no token.
+
+        ``on_change`` is called with the number of connections.
+        """
         self.endpoints = endpoints
         self.limits = limits or Limits()
         self.connections: set[Connection] = set()
         self.refused = 0
-        """Connections that were refused because there were too many, or too many new ones."""
+        """Number of connections refused because there were too many connections, or too many new ones."""
         self.rate = ConnectionRate(
             self.limits.connections_a_second, self.limits.connection_burst, time.monotonic
         )
         self.turns = FairTurns(_call_soon, time.monotonic, meter=cpu_meter())
         self.account = account or Account(self.limits.memory)
-        """The memory of all clients, also of other listeners of the server."""
+        """The memory of all clients, including those of the server's other listeners."""
 
         self.host = ""
         self.port = 0
@@ -91,7 +94,7 @@ class Listener:
         return self._tls is not None
 
     async def open(self, host: str, port: int) -> None:
-        """Listen; port 0 takes a free one. Raise BridgeError."""
+        """Start listening; port 0 means any free port. Raise BridgeError if the port cannot be opened."""
         loop = asyncio.get_running_loop()
         try:
             sock = tcp.bind(host, port)
@@ -118,7 +121,7 @@ class Listener:
             loop.add_reader(sock, self._accept, sock)
 
     async def close(self) -> None:
-        """End all connections. Idempotent."""
+        """Close all connections. Idempotent."""
         loop = asyncio.get_running_loop()
         for sock in self._socks:
             loop.remove_reader(sock)
@@ -139,17 +142,17 @@ class Listener:
     # --- Site
 
     def check(self, credentials: Credentials, *, is_page: bool) -> Grant | Refusal:
-        """Return a request's rights, or why it is refused."""
+        """Return a request's rights, or the reason for refusing it."""
         if is_page and unquote(urlsplit(credentials.target).path) in self._public_pages:
             return self._access.check_host(credentials.host) or Grant.READ
         return self._access.check(credentials)
 
     def page(self, path: str) -> HttpHandler | None:
-        """Return what answers a path."""
+        """Return the handler for a path, or None if there is none."""
         return self._pages.get(path)
 
     def admit(self, connection: Connection, grant: Grant) -> Refusal | None:
-        """Give a connection whose request is known a place; return why there is none."""
+        """Admit a connection whose request is known, or return the reason for refusing it."""
         rank = rank_of(grant)
         served = [each for each in self._open() if each.rank > Rank.SILENT]
         if len(served) >= self.limits.connections:
@@ -162,7 +165,7 @@ class Listener:
         return None
 
     def left(self, connection: Connection) -> None:
-        """Forget a connection."""
+        """Remove a connection that has closed."""
         self.connections.discard(connection)
         self._on_change(len(self.connections))
 
@@ -190,7 +193,7 @@ class Listener:
             self._connected(sock, str(address[0]))
 
     def _rest(self, listening: socket.socket) -> None:
-        """Accept nothing for a second: the listening socket stays readable, and the loop would spin."""
+        """Stop accepting for a second, because the listening socket stays readable, and the loop would spin."""
         loop = asyncio.get_running_loop()
         loop.remove_reader(listening)
 
@@ -216,7 +219,10 @@ class Listener:
         return self._add(Connection(self, pipe, peer, asyncio.get_running_loop()))
 
     def _refusal_of(self, peer: tuple[str, int], here: tuple[str, int]) -> bytes | None:
-        """Return the answer to a client that may not connect now. A client of this user always may."""
+        """Return the response for a client that may not connect now, or None if it may.
+
+        This user's clients may always connect.
+        """
         limits = self.limits
         is_full = len(self.connections) >= limits.connections + limits.reserve
         is_too_often = not self.rate.admits(peer[0])
@@ -233,11 +239,11 @@ class Listener:
         return refusal
 
     def _make_room(self, peer: str, rank: Rank, occupants: Sequence[Connection]) -> bool:
-        """Disconnect the one of these clients that gives way to a new one from ``peer``; return whether there was one."""
+        """Disconnect one of these clients for a new one from ``peer``, if the rules allow it; return whether one was found."""
         now = asyncio.get_running_loop().time()
         while found := displaced(peer, rank, occupants, now):
             if Rank.SILENT < found.rank < Rank.OWN and self._is_own(found):
-                found.rank = Rank.OWN  # not looked up before there was a reason
+                found.rank = Rank.OWN  # the user is not looked up before this is needed
                 continue
             _log.info("%s gives way to %s", found.peer, peer)
             found.give_way()
@@ -267,24 +273,24 @@ def _refuse(sock: socket.socket, answer: bytes) -> None:
         sock.send(answer)
         sock.shutdown(socket.SHUT_WR)
     with contextlib.suppress(OSError):
-        # A socket that is closed with unread bytes resets the connection, and with it the answer.
+        # Read first, because closing a socket with unread data resets the connection, and the response is lost.
         sock.recv(_REQUEST)
     sock.close()
 
 
 class Relay:
-    """The events of a pipe, for the connection that is made with the pipe."""
+    """Passes on a pipe's events to the connection, which is created after the pipe."""
 
     target: Connection
 
     def received(self, data: bytes) -> None:
-        """Pass on bytes."""
+        """Pass on received bytes."""
         self.target.received(data)
 
     def writable(self) -> None:
-        """Let the connection write more."""
+        """Tell the connection that more can be written."""
         self.target.writable()
 
     def ended(self) -> None:
-        """Let the connection end."""
+        """Tell the connection that the pipe has closed."""
         self.target.ended()

@@ -1,4 +1,4 @@
-"""Detection of WebSocket clients that are gone: they answer no ping, or read nothing. Pure."""
+"""Detect WebSocket clients that are gone: they do not respond to pings, or read nothing. Pure."""
 
 from __future__ import annotations
 
@@ -8,40 +8,41 @@ __all__ = ["Liveness", "Verdict"]
 
 
 class Verdict(Enum):
-    """The result of a check, and what to do."""
+    """The result of a check, which determines what to do."""
 
     PING = auto()
     """Send a ping."""
     WAIT = auto()
-    """Do nothing: output that the client has not taken yet is in front of a ping."""
+    """Do nothing, because a ping would be queued behind output that the client has not read yet."""
     SILENT = auto()
-    """Disconnect: the client has not answered a ping."""
+    """Disconnect, because the client has not responded to a ping."""
     STUCK = auto()
-    """Disconnect: the client has not read what was sent."""
+    """Disconnect, because the client has not read the output."""
 
 
 class Liveness:
-    """When a client was last heard, and whether it was pinged since. Times are in seconds of one clock."""
+    """The time of the last data from a client, and whether it was pinged after that. Times are in seconds of one clock."""
 
     def __init__(self, silent_seconds: float, now: float) -> None:
-        self.received = now  # when bytes last came from the client
+        self.received = now  # time of the last data from the client
         self._silent_seconds = silent_seconds
-        self._is_pinged = False  # from a ping until bytes come
+        self._is_pinged = False  # True from a ping until data arrives
 
     def heard(self, now: float) -> None:
-        """Record that bytes have come."""
+        """Record that data has arrived."""
         self.received = now
         self._is_pinged = False
 
     def is_stuck(self, now: float, progressed: float, *, is_full: bool) -> bool:
-        """Return whether the client has read nothing for too long; ``progressed``: when output was last written."""
+        """Return whether the client has read nothing for too long; ``progressed`` is the time when output was last written."""
         return is_full and now - progressed > self._silent_seconds
 
     def check(self, now: float, progressed: float, *, is_full: bool) -> Verdict:
-        """Return what to do with the client now."""
+        """Return the action to take for the client now."""
         if self.is_stuck(now, progressed, is_full=is_full):
             return Verdict.STUCK
-        # After a suspend the last bytes are old, and the client has not been pinged since.
+        # Check that a ping was sent: after the machine was suspended, the last data is old although no ping is
+        # unanswered.
         if self._is_pinged and now - self.received > self._silent_seconds:
             return Verdict.SILENT
         if is_full:

@@ -1,4 +1,4 @@
-"""The output of one connection: the queue, and what moves from it into the pipe."""
+"""The output of one connection: the queue, and the transfer from the queue to the pipe."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Output"]
 
-_BATCH_BYTES = 256 * 1024  # of small messages that are written with one call
+_BATCH_BYTES = 256 * 1024  # bytes of small messages that are written with one call
 _BATCH_PIECES = 128
-_PUMP_BYTES = 1024 * 1024  # written to a client that reads quickly, before the loop's next iteration
+_PUMP_BYTES = 1024 * 1024  # bytes written to a client that reads quickly, before the loop's next iteration
 
 
 class Output:
-    """Writes what is queued for a client as fast as its pipe takes it. On the loop."""
+    """Writes a client's queued data as fast as its pipe accepts it. Runs on the loop."""
 
     def __init__(
         self,
@@ -31,27 +31,31 @@ class Output:
         loop: asyncio.AbstractEventLoop,
         on_written: Callable[[], object],
     ) -> None:
-        """``on_written`` is called after output was written, to count what the client still holds."""
+        """Create the output.
+
+        ``on_written`` is called after each write, so that the caller can update the client's memory use.
+        """
         self.queue = queue
-        self.progressed = loop.time()  # when output was last written to the pipe
+        self.progressed = loop.time()  # time when output was last written to the pipe
         self._pipe = pipe
         self._share = share
         self._loop = loop
         self._on_written = on_written
         self._file: FileSender | None = None  # the file that is being sent
-        self._in_pipe: list[Piece] = []  # pieces that the pipe has not sent yet; their large ones are counted
-        self._is_scheduled = False  # from schedule() until the loop's next iteration
+        # pieces that the pipe has not sent yet; the large ones count in the share
+        self._in_pipe: list[Piece] = []
+        self._is_scheduled = False  # True from schedule() until the loop's next iteration
         self._is_closing = False  # set by close_when_sent()
         self._is_ended = False  # set by end()
 
     @property
     def is_full(self) -> bool:
-        """Return whether the client has not taken what was written."""
+        """Return whether the pipe still contains data that the client has not read."""
         return self._pipe.is_full
 
     @property
     def size(self) -> int:
-        """Return the bytes that wait for this client alone: large pieces are counted in its share."""
+        """Return the bytes queued for this client alone, without large pieces, which are counted in its share."""
         queue = self.queue
         size = queue.size + queue.answers - queue.large
         if self._pipe.is_full:
@@ -59,13 +63,13 @@ class Output:
         return size
 
     def schedule(self) -> None:
-        """Write in the loop's next iteration: messages that are queued until then are written with one call."""
+        """Write in the loop's next iteration, so that messages queued until then are written with one call."""
         if not self._is_scheduled and not self._pipe.is_full:
             self._is_scheduled = True
             self._loop.call_soon(self.pump)
 
     def pump(self) -> None:
-        """Write as much as the pipe takes."""
+        """Write as much as the pipe accepts."""
         self._is_scheduled = False
         if self._is_ended:
             return
@@ -81,12 +85,12 @@ class Output:
         self.schedule()
 
     def abort(self) -> None:
-        """Close the pipe; what is queued is not sent."""
+        """Close the pipe, without sending the queued data."""
         self._is_closing = True
         self._pipe.close(flush=False)
 
     def end(self) -> None:
-        """Free everything; the pipe has ended."""
+        """Release all data, because the pipe has closed."""
         self._is_ended = True
         self.queue.clear()
         if self._file:
@@ -117,7 +121,7 @@ class Output:
                 self._share.hold(batch)
 
     def _next_batch(self) -> list[Piece] | None:
-        """Return the pieces to write next; None if there are none now."""
+        """Return the pieces to write next, or None if there are none at present."""
         batch: list[Piece] = []
         size = 0
         while size < _BATCH_BYTES and len(batch) < _BATCH_PIECES and not self._file:
@@ -141,7 +145,8 @@ class Output:
         piece = file.take()
         if piece is None:
             if file.has_failed:
-                self.abort()  # the size has been sent: the client would take what follows for the file
+                # the size has been sent, so the client would mistake any further data for the file
+                self.abort()
             return None
         if file.is_done:
             self._file = None

@@ -1,6 +1,7 @@
-"""The user at the other end of a TCP connection on this machine. Linux only: elsewhere nobody knows.
+"""Find the user at the other end of a TCP connection on this machine. Linux only; on other systems the user is unknown.
 
-A look-up asks the kernel for one socket (sock_diag, 23 us); where that is not allowed, its table of all sockets is read.
+A look-up queries the kernel for one socket (sock_diag, 23 us). If that is not allowed, it reads the kernel's table of all
+sockets.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ _SOCK_DIAG_BY_FAMILY = 20
 _NLM_F_REQUEST = 1
 _ANY = 0xFFFFFFFF
 _LISTEN = 10
-"""The state of a listening socket, which the kernel returns where no connection fits."""
+"""The state of a listening socket, which the kernel returns if no connection matches."""
 _MESSAGE = struct.Struct("=IHHII")
 _REQUEST = struct.Struct("=BBBBI")
 _PORTS = struct.Struct("!HH")
@@ -35,14 +36,14 @@ _End = tuple[_Address, int]
 
 
 def is_own_user(peer: tuple[str, int], here: tuple[str, int]) -> bool:
-    """Return whether the peer of a connection is known to be a process of this user; ``here`` is this end."""
+    """Return whether a connection's peer is known to be a process of this user; ``here`` is the local end."""
     return sys.platform == "linux" and owner_of(peer, here) == os.getuid()
 
 
 def owner_of(end: tuple[str, int], other_end: tuple[str, int]) -> int | None:
-    """Return the user of the TCP socket of this machine at ``end`` that is connected to ``other_end``, in any state.
+    """Return the user of the local TCP socket at ``end`` that is connected to ``other_end``, in any state.
 
-    Return None if there is no such socket, or if no process has it open any more: the kernel lists those as root's.
+    Return None if there is no such socket, or if no process has it open any more, because the kernel lists it as root's.
     """
     try:
         ends = _parsed(end), _parsed(other_end)
@@ -53,12 +54,15 @@ def owner_of(end: tuple[str, int], other_end: tuple[str, int]) -> int | None:
     try:
         return _by_query(*ends)
     except (OSError, AttributeError, struct.error):
-        # No such sockets here, or they are forbidden.
+        # This system does not support such sockets, or does not allow them.
         return _by_table(*ends)
 
 
 def _by_query(end: _End, other_end: _End) -> int | None:
-    """Return the user by a query for one socket. Raise OSError. Source: sock_diag(7)."""
+    """Return the user, by querying the kernel for one socket. Source: sock_diag(7).
+
+    Raise OSError if the query fails.
+    """
     family = socket.AF_INET if end[0].version == 4 else socket.AF_INET6
     addresses = b"".join(each[0].packed.ljust(16, b"\0") for each in (end, other_end))
     id_ = _PORTS.pack(end[1], other_end[1]) + addresses + _REST_OF_ID.pack(0, _ANY, _ANY)
@@ -70,7 +74,7 @@ def _by_query(end: _End, other_end: _End) -> int | None:
         answer = asking.recv(4096)
     kind = _MESSAGE.unpack_from(answer)[1]
     if kind != _SOCK_DIAG_BY_FAMILY:
-        # An error: the same of no such socket and of what the kernel does not offer.
+        # This is an error, which is the same for a missing socket and for a query that the kernel does not support.
         return _by_table(end, other_end)
     if len(answer) < _ANSWER_SIZE or answer[_MESSAGE.size + 1] == _LISTEN:
         return None
@@ -79,7 +83,7 @@ def _by_query(end: _End, other_end: _End) -> int | None:
 
 
 def _by_table(end: _End, other_end: _End) -> int | None:
-    """Return the user by the table of all sockets. Source: proc_net_tcp of the kernel's documentation."""
+    """Return the user, from the kernel's table of all sockets. Source: proc_net_tcp in the kernel's documentation."""
     port = f":{end[1]:04X} "
     for table in _TABLES:
         try:
@@ -88,7 +92,7 @@ def _by_table(end: _End, other_end: _End) -> int | None:
             continue
         for line in lines:
             if port not in line:
-                continue  # most of thousands, without parsing
+                continue  # skip most of thousands of lines without parsing them
             _, local, remote, _, _, _, _, user, _, inode, *_ = line.split()
             if (_listed(local), _listed(remote)) == (end, other_end) and inode != "0":
                 return int(user)
@@ -96,17 +100,17 @@ def _by_table(end: _End, other_end: _End) -> int | None:
 
 
 def _parsed(end: tuple[str, int]) -> _End:
-    """Return an address as the socket API has it, and its port. Raise ValueError."""
+    """Parse an address, as the socket API returns it, and its port. Raise ValueError if the address is invalid."""
     return _unmapped(ipaddress.ip_address(end[0].partition("%")[0])), end[1]
 
 
 def _listed(text: str) -> _End:
-    """Return an address and a port of the kernel's table: words of 32 bits in the byte order of the machine."""
+    """Parse an address and port from the kernel's table: 32-bit words in native byte order."""
     host, _, port = text.partition(":")
     words = [int(host[at : at + 8], 16).to_bytes(4, sys.byteorder) for at in range(0, len(host), 8)]
     return _unmapped(ipaddress.ip_address(b"".join(words))), int(port, 16)
 
 
 def _unmapped(address: _Address) -> _Address:
-    """Return the IPv4 address in an IPv6 address that has one: a socket of IPv6 may be connected by IPv4."""
+    """Return the IPv4 address in an IPv4-mapped IPv6 address, because an IPv6 socket may have an IPv4 connection."""
     return (address.ipv4_mapped or address) if isinstance(address, ipaddress.IPv6Address) else address

@@ -1,7 +1,7 @@
-"""A socket on the event loop: bytes in by a callback, pieces out without joining them.
+"""A socket on the event loop: calls a callback with received bytes, and sends pieces without joining them.
 
-``PlainPipe`` hands the kernel the pieces as they are (``sendmsg``), so that an image is not copied for each client;
-``TlsPipe`` has asyncio encrypt them.
+``PlainPipe`` passes the pieces to the kernel unchanged (``sendmsg``), so that an image is not copied for each client;
+``TlsPipe`` lets asyncio encrypt them.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from minirospy.web.server.queue import Piece
 
 __all__ = ["LARGE_READ", "SMALL_READ", "Endpoints", "Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
 
-SMALL_READ = 64 * 1024  # bytes of one call: 250 clients that send are read in one iteration of the loop
-LARGE_READ = 256 * 1024  # of a client that is alone with a large message
+SMALL_READ = 64 * 1024  # bytes per receive: 250 sending clients are read in one loop iteration
+LARGE_READ = 256 * 1024  # bytes per receive for a large message, if no other client is waiting
 _MAX_PIECES = 128
-"""Pieces of one call of sendmsg; a system takes 1024 at most."""
+"""Maximum pieces per sendmsg call; systems accept 1024 at most."""
 
 
 class Endpoints(NamedTuple):
-    """The peer's port, and the address and port of this end; empty if it has ended, or is not one of TCP."""
+    """The peer's port, and the local address and port; empty if the connection is closed or does not use TCP."""
 
     peer_port: int = 0
     address: str = ""
@@ -32,22 +32,22 @@ class Endpoints(NamedTuple):
 
 
 class PipeEvents(Protocol):
-    """The callbacks of a pipe, on the loop."""
+    """The callbacks of a pipe, called on the loop."""
 
     def received(self, data: bytes) -> None:
-        """Take over bytes."""
+        """Process received bytes."""
 
     def writable(self) -> None:
-        """Write more: what was written before is with the kernel."""
+        """Write more, because the kernel has accepted everything that was written before."""
 
     def ended(self) -> None:
-        """Forget the connection, which has ended, however that was; called once."""
+        """Release a connection that has closed for whatever reason. Called once."""
 
 
 class Pipe(Protocol):
-    """One connection. ``is_full``: what was written is not with the kernel yet; ``copies``: it waits as a copy.
+    """One connection. ``is_full``: the kernel has not accepted all written data; ``copies``: the rest is stored as a copy.
 
-    ``read_bytes``: how many to take from the kernel at a time, where that can be chosen.
+    ``read_bytes``: the maximum number of bytes per receive, if it can be chosen.
     """
 
     read_bytes: int
@@ -90,21 +90,21 @@ class PlainPipe:
 
     @property
     def is_full(self) -> bool:
-        """Return whether something that was written waits for the kernel."""
+        """Return whether written data is waiting for the kernel to accept it."""
         return bool(self._rest)
 
     @property
     def unsent(self) -> int:
-        """Bytes that wait for the kernel."""
+        """Number of bytes that the kernel has not accepted yet."""
         return sum(map(len, self._rest))
 
     @property
     def endpoints(self) -> Endpoints:
-        """The ports of the peer and of this end, and this end's address."""
+        """The port of the peer, and the local address and port."""
         return _endpoints(self._sock)
 
     def write(self, pieces: Sequence[Piece]) -> None:
-        """Send pieces, or keep what the kernel does not take now."""
+        """Send pieces, and store the part that the kernel does not accept at present."""
         if self._is_closing:
             return
         was_full = bool(self._rest)
@@ -115,19 +115,19 @@ class PlainPipe:
                 self._loop.add_writer(self._sock, self._writable)
 
     def pause(self) -> None:
-        """Read no more for now."""
+        """Stop reading."""
         if self._is_reading:
             self._is_reading = False
             self._loop.remove_reader(self._sock)
 
     def resume(self) -> None:
-        """Read."""
+        """Start or continue reading."""
         if not self._is_reading and not self._is_closing:
             self._is_reading = True
             self._loop.add_reader(self._sock, self._readable)
 
     def close(self, *, flush: bool = True) -> None:
-        """End the connection, with ``flush`` after what was written has been sent. Idempotent."""
+        """Close the connection; with ``flush``, first send the written data. Idempotent."""
         self._is_closing = True
         if not flush or not self._rest:
             self._end()
@@ -178,7 +178,7 @@ class PlainPipe:
         self._loop.remove_reader(self._sock)
         self._loop.remove_writer(self._sock)
         with contextlib.suppress(OSError):
-            # The peer gets what was sent, also if it has sent more than was read.
+            # This way the peer receives the data that was sent, even if it has sent data that was not read.
             self._sock.shutdown(socket.SHUT_WR)
         self._sock.close()
         self._events.ended()
@@ -189,14 +189,14 @@ def _endpoints(sock: socket.socket) -> Endpoints:
         return Endpoints()
     try:
         return Endpoints(sock.getpeername()[1], *sock.getsockname()[:2])
-    except OSError:  # it has disconnected
+    except OSError:  # the peer has disconnected
         return Endpoints()
 
 
 def _send(sock: socket.socket, pieces: list[memoryview]) -> int:
     if hasattr(sock, "sendmsg"):
         return sock.sendmsg(pieces)
-    return sock.send(pieces[0])  # Windows
+    return sock.send(pieces[0])  # Windows has no sendmsg
 
 
 class TlsPipe(asyncio.Protocol):
@@ -205,45 +205,48 @@ class TlsPipe(asyncio.Protocol):
     copies = True
 
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
-        """``connected(pipe, peer's address)`` returns the events' target; None to refuse, after what it has written."""
+        """Create a connection. ``connected(pipe, peer's address)`` returns the object that receives the events.
+
+        It may return None to refuse the connection, after writing a response.
+        """
         self._connected = connected
-        self.read_bytes = LARGE_READ  # asyncio's own size
+        self.read_bytes = LARGE_READ  # the size that asyncio itself uses
         self._events: PipeEvents | None = None
         self._transport: asyncio.Transport | None = None
         self._is_paused = False
 
     @property
     def is_full(self) -> bool:
-        """Return whether more waits for the kernel than asyncio's bound."""
+        """Return whether more data is waiting for the kernel than asyncio's limit."""
         return self._is_paused
 
     @property
     def unsent(self) -> int:
-        """Bytes that wait for the kernel."""
+        """Number of bytes that the kernel has not accepted yet."""
         return self._transport.get_write_buffer_size() if self._transport else 0
 
     @property
     def endpoints(self) -> Endpoints:
-        """The ports of the peer and of this end, and this end's address."""
+        """The port of the peer, and the local address and port."""
         return _endpoints(self._transport.get_extra_info("socket")) if self._transport else Endpoints()
 
     def write(self, pieces: Sequence[Piece]) -> None:
-        """Send pieces."""
+        """Send pieces, or let asyncio store them."""
         if self._transport and not self._transport.is_closing():
             self._transport.writelines(pieces)
 
     def pause(self) -> None:
-        """Read no more for now."""
+        """Stop reading."""
         if self._transport and self._transport.is_reading():
             self._transport.pause_reading()
 
     def resume(self) -> None:
-        """Read."""
+        """Start or continue reading."""
         if self._transport and not self._transport.is_closing() and not self._transport.is_reading():
             self._transport.resume_reading()
 
     def close(self, *, flush: bool = True) -> None:
-        """End the connection. Idempotent."""
+        """Close the connection. Idempotent."""
         if self._transport:
             if flush:
                 self._transport.close()
@@ -251,7 +254,7 @@ class TlsPipe(asyncio.Protocol):
                 self._transport.abort()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Start."""
+        """Start: see asyncio.Protocol."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         peer = transport.get_extra_info("peername") or ("?",)
@@ -260,29 +263,32 @@ class TlsPipe(asyncio.Protocol):
             transport.close()
 
     def data_received(self, data: bytes) -> None:
-        """Pass on bytes."""
+        """Pass on received bytes."""
         if self._events:
             self._events.received(data)
 
     def pause_writing(self) -> None:
-        """Wait: the kernel takes no more."""
+        """Stop writing, because asyncio's buffer is full."""
         self._is_paused = True
 
     def resume_writing(self) -> None:
-        """Go on."""
+        """Continue writing."""
         self._is_paused = False
         if self._events:
             self._events.writable()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """End."""
+        """Report that the connection has closed."""
         events, self._events, self._transport = self._events, None, None
         if events:
             events.ended()
 
 
 def tls_context(certificate: str, key: str) -> ssl.SSLContext:
-    """Return what serves with a certificate and its key, both PEM files. Raise OSError, ssl.SSLError."""
+    """Return a server's TLS context with a certificate and its key, both PEM files.
+
+    Raise OSError or ssl.SSLError if they cannot be loaded.
+    """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     context.load_cert_chain(certificate, key or None)

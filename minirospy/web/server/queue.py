@@ -1,9 +1,9 @@
-"""The queue of what is to be sent to one client: bounded, oldest first, and always the newest message of each topic.
+"""The output queue of one client: limited in size, oldest first, and always with the newest message of each topic.
 
-Pure. A message waits under a key (its topic or subscription). Where the bound is passed, the key's own oldest message is
-dropped, then the oldest of the key that holds the most bytes; so a camera does not displace what is small. Answers
-(``put_answer``) are never dropped: a client that does not read them is disconnected by the caller. Bytes are those of
-memory: of a message and of its place in the queue, which is larger than a small message.
+Pure. A message is queued under a key (its topic or subscription). If the limit is exceeded, the key's own oldest message is
+dropped, then the oldest message of the key with the most bytes, so that a camera does not displace small messages. Responses
+(``put_answer``) are never dropped: the caller disconnects a client that does not read them. Sizes are bytes in memory: of a
+message and of its entry in the queue, which is larger than a small message.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
 __all__ = ["DEFAULT_LIMIT", "ENTRY_BYTES", "MAX_ANSWERS", "Piece", "SendQueue"]
 
 DEFAULT_LIMIT = 10_000_000
-"""Bytes of messages that may wait for a client."""
+"""Maximum bytes of messages queued for a client."""
 
 ENTRY_BYTES = 350
-"""Bytes of memory that an entry takes besides its pieces: measured with Python 3.11 are 340 to 360."""
+"""Bytes of memory that an entry takes in addition to its pieces; 340 to 360 were measured with Python 3.11."""
 
 MAX_ANSWERS = 64_000_000
-"""Bytes of answers that may wait for a client which does not read them."""
+"""Maximum bytes of responses queued for a client that does not read them."""
 
 
 _FILE_BYTES = 1000
-"""Memory of a file that waits to be opened, with its entry."""
+"""Bytes of memory for a file that has not been opened yet, including its entry."""
 
 
 class _Entry(NamedTuple):
-    """A message or, with the key None, an answer; ``size``: of its pieces, and of itself."""
+    """A message or, if the key is None, a response; ``size``: bytes of its pieces and of the entry."""
 
     key: Hashable | None
     pieces: tuple[Piece, ...] | FileAnswer
@@ -42,7 +42,7 @@ class _Entry(NamedTuple):
 
 
 class _Waiting:
-    """The messages that wait under one key."""
+    """The messages queued under one key."""
 
     __slots__ = ("numbers", "size")
 
@@ -52,29 +52,29 @@ class _Waiting:
 
 
 class SendQueue:
-    """The queue of one client, in the order of arrival."""
+    """The output queue of one client, in the order of arrival."""
 
     def __init__(
         self, limit: int = DEFAULT_LIMIT, entry_bytes: int = ENTRY_BYTES, share: Share | None = None
     ) -> None:
-        """``limit``: bytes of messages, each with ``entry_bytes``; a single one may be larger, and then waits alone.
+        """Create a queue for ``limit`` bytes of messages, each with ``entry_bytes`` in addition.
 
-        Large pieces are counted in ``share``.
+        A single message may be larger, and is then the only one in the queue. Large pieces are counted in ``share``.
         """
         self.limit = limit
         self.size = 0
-        """Bytes of the messages that wait, and of their entries."""
+        """Bytes of the queued messages, including their entries."""
         self.answers = 0
-        """The same of the answers."""
+        """Bytes of the queued responses, including their entries."""
         self.large = 0
-        """Bytes of large pieces among both, which are counted in the share."""
+        """Bytes of large pieces in messages and responses, which are counted in the share."""
         self.sent = 0
-        """Messages that were popped."""
+        """Number of messages removed by :meth:`pop`."""
         self.sent_bytes = 0
         self.dropped = 0
-        """How many messages gave way to newer ones."""
+        """Number of messages that were dropped in favour of newer ones."""
         self.dropped_of: Counter[Hashable] = Counter()
-        """The same by key, of the keys that are in use."""
+        """Number of dropped messages by key, for the keys in use."""
         self._share = share
         self._entry_bytes = entry_bytes
         self._number = 0
@@ -82,16 +82,16 @@ class SendQueue:
         self._waiting: dict[Hashable, _Waiting] = {}
 
     def __len__(self) -> int:
-        """Return the number of messages and answers that wait."""
+        """Return the number of queued messages and responses."""
         return len(self._entries)
 
     @property
     def is_overrun(self) -> bool:
-        """Return whether more answers wait than a client that reads would leave."""
+        """Return whether more responses are queued than is possible for a client that reads them."""
         return self.answers > MAX_ANSWERS
 
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:
-        """Append a message; older ones are dropped where the bound is passed, with ``newest_only`` all of its key."""
+        """Append a message. Drop older ones if the limit is exceeded, or with ``newest_only`` all others of its key."""
         size = sum(map(len, pieces)) + self._entry_bytes
         waiting = self._waiting.get(key)
         if waiting is None:
@@ -112,7 +112,7 @@ class SendQueue:
         self.size += size
 
     def put_answer(self, pieces: tuple[Piece, ...]) -> None:
-        """Append what is never dropped."""
+        """Append a response, which is never dropped."""
         size = sum(map(len, pieces)) + self._entry_bytes
         self._number += 1
         if size >= LARGE_PIECE:
@@ -121,13 +121,13 @@ class SendQueue:
         self.answers += size
 
     def put_file(self, answer: FileAnswer) -> None:
-        """Append a file, which is never dropped. It is not read before it is popped."""
+        """Append a file, which is never dropped, and is not read until it is popped."""
         self._number += 1
         self._entries[self._number] = _Entry(None, answer, _FILE_BYTES)
         self.answers += _FILE_BYTES
 
     def pop(self) -> tuple[Piece, ...] | FileAnswer | None:
-        """Return the oldest entry's pieces, or a file; None if nothing waits."""
+        """Remove the oldest entry and return its pieces, or a file; return None if the queue is empty."""
         if not self._entries:
             return None
         _, entry = self._entries.popitem(last=False)
@@ -144,7 +144,7 @@ class SendQueue:
         return entry.pieces
 
     def discard(self, key: Hashable) -> None:
-        """Remove the messages of a key, which nobody wants any more; they do not count as dropped."""
+        """Remove the messages of a key that is no longer used; they do not count as dropped."""
         self.dropped_of.pop(key, None)
         waiting = self._waiting.pop(key, None)
         if waiting:
@@ -153,13 +153,13 @@ class SendQueue:
             self.size -= waiting.size
 
     def drop_messages(self) -> None:
-        """Drop all messages, and keep the answers."""
+        """Drop all messages, but no responses."""
         for key in list(self._waiting):
             while key in self._waiting:
                 self._drop_oldest(key)
 
     def clear(self) -> None:
-        """Remove everything that waits; nothing of it counts as dropped."""
+        """Remove all messages and responses; they do not count as dropped."""
         if self.large:
             for entry in self._entries.values():
                 self._release(entry)
@@ -195,5 +195,5 @@ class SendQueue:
 
 
 def _large(pieces: tuple[Piece, ...]) -> int:
-    """Return the bytes of the large ones among some pieces."""
+    """Return the total bytes of those pieces that are large."""
     return sum(size for size in map(len, pieces) if size >= LARGE_PIECE)

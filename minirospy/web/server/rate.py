@@ -1,4 +1,4 @@
-"""How many new connections each address may open: a token bucket for each. Pure."""
+"""Limit the number of new connections from each address, with a token bucket per address. Pure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 __all__ = ["MAX_ADDRESSES", "ConnectionRate"]
 
 MAX_ADDRESSES = 1000
-"""Addresses that are remembered; the one that connected longest ago is forgotten first."""
+"""Maximum number of addresses to store; beyond that, the address that connected longest ago is forgotten."""
 
 
 class _Bucket(NamedTuple):
@@ -18,21 +18,24 @@ class _Bucket(NamedTuple):
 
 
 class ConnectionRate:
-    """The rate limit of new connections."""
+    """The rate limit for new connections."""
 
     def __init__(self, a_second: float, burst: int, clock: Callable[[], float]) -> None:
-        """``burst``: how many an address may open at once; ``clock`` returns seconds."""
+        """Create the limit.
+
+        ``burst``: number of connections that an address may open at the same time; ``clock`` returns seconds.
+        """
         self._a_second = a_second
         self._burst = burst
         self._clock = clock
         self._buckets: OrderedDict[str, _Bucket] = OrderedDict()
 
     def __len__(self) -> int:
-        """Return the number of addresses that are remembered."""
+        """Return the number of stored addresses."""
         return len(self._buckets)
 
     def admits(self, address: str) -> bool:
-        """Return whether an address may open a connection now, and count it."""
+        """Return whether an address may open a connection now, and count the connection."""
         now = self._clock()
         tokens, since = self._buckets.pop(address, _Bucket(self._burst, now))
         tokens = min(self._burst, tokens + (now - since) * self._a_second)

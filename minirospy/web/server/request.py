@@ -1,4 +1,4 @@
-"""The HTTP request that starts a connection: its credentials, its fields, and the response to a refused one. Pure.
+"""The HTTP request that starts a connection: its credentials and fields, and the response to a refused request. Pure.
 
 Source: RFC 9112, RFC 6455 section 4.2.
 """
@@ -22,23 +22,23 @@ __all__ = ["RequestHead", "read_head", "refusal_response"]
 _EXTRA_HEADERS: Mapping[int, Mapping[str, str]] = {
     401: {"WWW-Authenticate": "Bearer"},
     503: {"Retry-After": "5"},
-}  # of a refusal, by its status
+}  # additional headers of a refusal, by its status
 
 
 class RequestHead(NamedTuple):
-    """A request: its target, and its headers by their names in lower case."""
+    """A request: its target, and its headers, whose names are in lower case."""
 
     target: str
     headers: Mapping[str, str]
 
     @property
     def is_page(self) -> bool:
-        """Return whether the request is for a page, not for a WebSocket."""
+        """Return whether the request is for a page, as opposed to a WebSocket."""
         return self.headers.get("upgrade", "").lower() != "websocket"
 
     @property
     def credentials(self) -> Credentials:
-        """Return the fields by which access is decided. Raise ValueError if Referer is not a URL."""
+        """Return the fields that determine access. Raise ValueError if Referer is not a URL."""
         return Credentials(
             self.headers.get("host", ""),
             _origin(self.headers),
@@ -48,7 +48,10 @@ class RequestHead(NamedTuple):
         )
 
     def parsed(self, peer: str, endpoints: Endpoints) -> HttpRequest:
-        """Return the request for sessions and pages. Raise ValueError if the target is not a URL, or has too many fields."""
+        """Return the request as sessions and pages receive it.
+
+        Raise ValueError if the target is not a URL, or has too many fields.
+        """
         parts = urlsplit(self.target)
         fields = parse_qs(parts.query, keep_blank_values=True)
         query = {name: values[-1] for name, values in fields.items()}
@@ -56,12 +59,12 @@ class RequestHead(NamedTuple):
 
 
 def read_head(request: Request) -> RequestHead:
-    """Return the parts of a request that was received; of a header that is repeated, the last one."""
+    """Return the target and headers of a received request; of repeated headers, return the last."""
     return RequestHead(request.path, {name.lower(): value for name, value in request.headers.raw_items()})
 
 
 def refusal_response(refusal: Refusal) -> tuple[bytes, bytes]:
-    """Return the head and the body of the response to a refused request."""
+    """Return the head and body of the response to a refused request."""
     body = (refusal.text + "\n").encode()
     headers = {
         **PLAIN_HEADERS,
@@ -73,9 +76,9 @@ def refusal_response(refusal: Refusal) -> tuple[bytes, bytes]:
 
 
 def _origin(headers: Mapping[str, str]) -> str | None:
-    """Return the site of the page that sends a request; None if no page sends it.
+    """Return the site of the page that sends a request, or None if no page sends it.
 
-    A browser sends the site in Origin, but not for an image or a frame: for these it sends that the page is of another
+    A browser sends the site in Origin, but not for an image or a frame. For these it sends whether the page is from another
     site, and possibly the page's URL in Referer. Source: https://www.w3.org/TR/fetch-metadata/.
     """
     origin = headers.get("origin")

@@ -1,19 +1,19 @@
-"""Share the event loop between the clients of a server: the client that has used the least of it goes first. Pure.
+"""Share the event loop's time between a server's clients: the client that has used the least time is served first. Pure.
 
 Every client has a :class:`Share`, whose ``work`` handles what the client has sent. Work starts immediately while the clients
 together use less than half of the time; beyond that it is queued, and each iteration of the loop handles a few
 milliseconds of it.
 
-There are two queues, as the classes of a multilevel feedback scheduler: one for interactive clients, which send little at a time
-and then nothing until they are answered, and one for bulk clients, whose work is never done or takes long. Interactive clients go
-first, so that none of them waits for a slice of each of 250 clients that flood the server; bulk clients have at least a fifth of
-the time.
+There are two queues, like the classes in a multilevel feedback scheduler: one for interactive clients, which send little
+at a time and then nothing until they receive a response, and one for bulk clients, whose work never ends or takes long.
+Interactive clients are served first, so that none of them waits for a slice of each of 250 clients that flood the server;
+bulk clients get at least a fifth of the time.
 
-The order in each queue is fair queueing: a client's tag is the time that it has used, a client that was idle starts at
-the tag that is served now, and the one goes first that will end first, if its work takes as long as before. So a client that uses
-less than its part of the time waits at most for one slice of each other client, and not for long messages of others. A client
-that has more rights has a larger weight: the same time counts less. Source: Goyal, Vin, Cheng: Start-time Fair Queueing,
-SIGCOMM 1996.
+Each queue uses fair queueing: a client's tag is the time that it has used, a client that was idle starts at the tag
+that is currently served, and the client whose work will end first, if it takes as long as before, is served first.
+Therefore a client that uses less than its share of the time waits at most for one slice of each other client, and not
+for others' long messages. A client with more rights has a larger weight, so that the same time counts less. Source:
+Goyal, Vin, Cheng: Start-time Fair Queueing, SIGCOMM 1996.
 """
 
 from __future__ import annotations
@@ -29,24 +29,26 @@ __all__ = ["FairTurns", "Share", "cpu_meter"]
 
 _log = logging.getLogger(__name__)
 
-TURN_SECONDS = 0.004  # of each iteration of the loop, for the queued work of all clients together
-SLICE_SECONDS = 0.0001  # of one client before the next client's work: 250 of them are a wait of 25 ms
-NEW_PIECES = 8  # of work, by which a client is known; before it is expected to do as the last new clients did
-EXPECTED_DECAY = 0.9  # of what is expected, with each piece of work that takes less
+TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients together
+# seconds of one client's work before the next client's work; with 250 clients the wait is 25 ms
+SLICE_SECONDS = 0.0001
+# pieces of work after which a client is known; until then, its work is expected to take as long as other new clients'
+NEW_PIECES = 8
+EXPECTED_DECAY = 0.9  # decay of the expected seconds with each piece of work that takes less
 IMMEDIATE_SHARE = 0.5  # of the time, for work that starts without being queued
 # of one burst, 1 ms: a request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms. A new client has one slice, and one more
 # with each short burst: 250 new clients that flood the server go after its other clients as soon as each has had a slice.
 INTERACTIVE_SLICES = 10
-# of bulk clients: interactive ones alone may have 200 ms before bulk clients have a slice again
+# maximum debt of bulk clients: interactive clients alone may use 200 ms before bulk clients get a slice again
 MAX_DEBT_TURNS = 10
-BULK_SHARE = 0.2  # of the time, for bulk clients while interactive ones fill the rest
+BULK_SHARE = 0.2  # share of the time for bulk clients while interactive clients use the rest
 
 Work = Callable[[float], bool]
-"""Do some work, up to a time of the clock; return whether more is left."""
+"""Does some work until a time of the clock; returns whether more is left."""
 
 
 class Share:
-    """The part of the loop that one client has used; seconds are divided by its weight."""
+    """The loop time that one client has used; seconds are divided by its weight."""
 
     __slots__ = (
         "burst",
@@ -64,12 +66,12 @@ class Share:
 
     def __init__(self, work: Work, queue: _FairQueue) -> None:
         self.work = work
-        self.queue = queue  # that of interactive clients, or that of bulk clients
-        # seconds used; at least the tag that its queue served when the client last started
+        self.queue = queue  # the queue of interactive clients, or that of bulk clients
+        # seconds used; at least the tag that the queue was serving when the client last started
         self.tag = queue.served
         self.weight = 1.0  # set once the client's rights are known
-        self.expected = 0.0  # seconds that its next piece of work may take, from those before
-        self.pieces = 0  # of work that were done, while the client is new
+        self.expected = 0.0  # seconds that its next piece of work may take, estimated from earlier pieces
+        self.pieces = 0  # number of pieces of work done while the client is new
         self.burst = 0.0  # seconds used since the client last had nothing to do
         self.last_burst = 0.0  # seconds of the burst before
         self.short_bursts = 0  # in succession, up to INTERACTIVE_SLICES
@@ -78,7 +80,7 @@ class Share:
 
 
 class _Entry(NamedTuple):
-    """Work that is queued, in its order: the tag at which it may end; what breaks a tie; the tag at which it starts."""
+    """Queued work. The fields define the order: tag at which the work may end, tie-breaker, number, tag at which it starts."""
 
     end: float
     used: float
@@ -88,22 +90,22 @@ class _Entry(NamedTuple):
 
 
 class _FairQueue:
-    """The queued work of one class of clients."""
+    """The queued work of interactive or of bulk clients."""
 
     def __init__(self) -> None:
         self.entries: list[_Entry] = []  # a heap
-        # the tag of the work that was started last; if nothing waited then, the highest tag
+        # tag of the work that was started last, or the highest tag if the queue was empty then
         self.served = 0.0
-        self.highest = 0.0  # tag of a client that was served
+        self.highest = 0.0  # highest tag of a client that was served
 
     def update(self) -> None:
-        """Forget what clients have used if none of them waits: those that come now start at the same tag."""
+        """Reset the time that clients have used if none is queued: clients that start now have the same tag."""
         if not self.entries:
             self.served = self.highest
 
 
 class FairTurns:
-    """The work of all clients of a server. Used on one event loop."""
+    """Schedules the work of all clients of a server. Used on one event loop."""
 
     def __init__(
         self,
@@ -114,9 +116,9 @@ class FairTurns:
         turn: float = TURN_SECONDS,
         slice_: float = SLICE_SECONDS,
     ) -> None:
-        """``call_soon`` has a function called in the next iteration of the loop; ``clock`` returns seconds.
+        """Create the scheduler. ``call_soon`` schedules a call in the next loop iteration; ``clock`` returns seconds.
 
-        ``meter`` returns the seconds by which a client's use is measured, by default those of ``clock``.
+        ``meter`` returns the seconds by which clients' use is measured, by default those of ``clock``.
         """
         self._call_soon = call_soon
         self._clock = clock
@@ -125,13 +127,13 @@ class FairTurns:
         self._slice = slice_
         self._credit = turn  # seconds of work that may start without being queued
         self._credited = clock()  # when the credit was last updated
-        self._new_expected = slice_  # seconds that a piece of work of a new client may take
+        self._new_expected = slice_  # seconds that a new client's piece of work may take
         self._interactive = _FairQueue()
         self._bulk = _FairQueue()
-        self._bulk_credit = 0.0  # seconds for which bulk clients go first
+        self._bulk_credit = 0.0  # seconds for which bulk clients are served first
         self._numbers = itertools.count()
-        self._is_running = False  # while a client's work is done
-        self._is_scheduled = False  # from call_soon() until the turn
+        self._is_running = False  # True while a client's work runs
+        self._is_scheduled = False  # True from call_soon() until the callback runs
 
     def __len__(self) -> int:
         """Return the number of clients whose work is queued."""
@@ -140,7 +142,7 @@ class FairTurns:
 
     @property
     def is_busy(self) -> bool:
-        """Return whether a client waits for its turn."""
+        """Return whether a client is waiting for its turn."""
         return bool(self._interactive.entries or self._bulk.entries)
 
     def join(self, work: Work) -> Share:
@@ -149,11 +151,11 @@ class FairTurns:
         return Share(work, self._interactive)
 
     def leave(self, share: Share) -> None:
-        """Start its work no more. Idempotent."""
+        """Stop running the client's work. Idempotent."""
         share.is_closed = True
 
     def start(self, share: Share) -> bool:
-        """Do a client's work now or in its turn; return whether some is left. Without effect while it is queued."""
+        """Run a client's work now or in its turn; return whether work is left. Has no effect while the client is queued."""
         if share.is_queued or share.is_closed:
             return share.is_queued
         if self._is_running or self.is_busy or not self._may_start_now():
@@ -176,7 +178,7 @@ class FairTurns:
         queue = self._queue_of(share)
         queue.update()
         if queue is not share.queue:
-            # Tags of one queue mean nothing in the other.
+            # Tags of one queue are meaningless in the other queue.
             share.queue = queue
             share.tag = queue.served
         share.is_queued = True
@@ -209,7 +211,8 @@ class FairTurns:
             queue = self._next_queue()
             end_tag, *_, start, share = heapq.heappop(queue.entries)
             if self._end_of(share, start) > end_tag + self._slice:
-                self._push(share, start)  # more is expected of new clients than when it was queued
+                # more time is expected for new clients than when this one was queued
+                self._push(share, start)
                 continue
             share.is_queued = False
             before = self._clock()
@@ -228,12 +231,12 @@ class FairTurns:
 
     def _update_bulk_credit(self, queue: _FairQueue, seconds: float) -> None:
         change = -seconds * (1 - BULK_SHARE) if queue is self._bulk else seconds * BULK_SHARE
-        # Limited in both directions: what was used long ago does not count.
+        # Limit the credit in both directions, so that time used long ago does not count.
         most = self._turn_seconds
         self._bulk_credit = max(-MAX_DEBT_TURNS * most, min(most, self._bulk_credit + change))
 
     def _run(self, share: Share, start: float) -> bool:
-        """Do some of a client's work, which starts at a tag; return whether more is left."""
+        """Run some of a client's work, which starts at the tag ``start``; return whether more is left."""
         if share.is_closed:
             return False
         end, before = self._clock() + self._slice, self._meter()
@@ -261,9 +264,9 @@ class FairTurns:
 
 
 def cpu_meter() -> Callable[[], float]:
-    """Return the clock of this thread's CPU time, or the monotonic one where the former ticks too slowly (Windows: 16 ms).
+    """Return the clock of this thread's CPU time, or the monotonic clock if the former is too coarse (Windows: 16 ms).
 
-    By the time of day a client would pay for other processes, which take the processor while its work is done.
+    By the monotonic clock, a client would also pay for other processes that use the processor during its work.
     """
     is_fine = time.get_clock_info("thread_time").resolution < SLICE_SECONDS / 10
     return time.thread_time if is_fine else time.monotonic

@@ -1,8 +1,8 @@
 """The WebSocket protocol of one client: bytes in, messages and pings out, one frame at a time. Pure.
 
-The library ``websockets`` parses the bytes (its part without sockets); :mod:`minirospy.web.server.frames` stops it after each
-frame. :class:`minirospy.web.server.client.WebClient` writes the frames of messages, so that a message is sent to many clients
-without a copy for each. Source: RFC 6455.
+The sockets-free part of the library ``websockets`` parses the bytes; :mod:`minirospy.web.server.frames` stops it after
+each frame. :class:`minirospy.web.server.client.WebClient` writes the frames of messages, so that a message is sent to
+many clients without a copy for each. Source: RFC 6455.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FrameRate", "Message", "Ping", "WebSocket"]
 
-_MAX_REASON = 123  # bytes of a close frame's reason, by RFC 6455
+_MAX_REASON = 123  # maximum bytes of a close frame's reason, by RFC 6455
 
 
 class Message(NamedTuple):
@@ -34,7 +34,7 @@ class Message(NamedTuple):
 
 
 class Ping(NamedTuple):
-    """A ping from the client; ``data`` is to be sent back."""
+    """A ping from the client; ``data`` must be sent back."""
 
     data: bytes
 
@@ -43,45 +43,45 @@ class FrameRate:
     """The number of frames that a client may send in one second."""
 
     def __init__(self, max_frames: int) -> None:
-        self.count = 0  # frames that were handled in the present second
+        self.count = 0  # frames handled in the current second
         self._max_frames = max_frames
-        self._start = 0.0  # of the present second
+        self._start = 0.0  # start of the current second
 
     @property
     def is_used_up(self) -> bool:
-        """Return whether the client may send no more frames in the present second."""
+        """Return whether the client has used up its frame quota for the current second."""
         return self.count >= self._max_frames
 
     def update(self, now: float) -> None:
-        """Start a new second if the present one has passed."""
+        """Start a new second if the current one has passed."""
         if now - self._start >= 1.0:
             self._start, self.count = now, 0
 
     def seconds_left(self, now: float) -> float:
-        """Return the seconds until the client may send more."""
+        """Return the seconds until the client may send more frames."""
         return self._start + 1.0 - now
 
 
 class WebSocket:
-    """The protocol's state for one client: handshake, the unfinished message, close."""
+    """The protocol state for one client: the handshake, the incomplete message, the close."""
 
     def __init__(
         self, select: Callable[[Sequence[str]], str | None], max_size: int, max_frames_a_second: int
     ) -> None:
-        """``select(offered)`` returns the sub-protocol to use; it raises NegotiationError to refuse all."""
+        """Create the state. ``select(offered)`` returns the sub-protocol to use; it raises NegotiationError to refuse all."""
         self.rate = FrameRate(max_frames_a_second)
         self._frames = FrameByFrame(
             select_subprotocol=lambda _, offered: _select(select, offered),
             max_size=max_size,
             logger=_QUIET,
         )
-        self._fragments = bytearray()  # of a message whose last frame has not come
-        self._opcode = Opcode.BINARY  # of the frame that started the last message
+        self._fragments = bytearray()  # received fragments of an incomplete message
+        self._opcode = Opcode.BINARY  # opcode of the frame that started the last message
 
     # --- bytes in, events out
 
     def feed(self, data: bytes) -> None:
-        """Add bytes that were received."""
+        """Add received bytes."""
         self._frames.feed(data)
 
     def next_request(self) -> Request | None:
@@ -99,7 +99,7 @@ class WebSocket:
         return frame
 
     def event_of(self, frame: Frame) -> Message | Ping | None:
-        """Return the ping that a frame is, or the message that it completes, or None."""
+        """Return the ping in a frame, or the message that the frame completes, or None."""
         if frame.opcode in (Opcode.TEXT, Opcode.BINARY):
             self._opcode = frame.opcode
         elif frame.opcode is Opcode.PING:
@@ -118,16 +118,16 @@ class WebSocket:
 
     @property
     def has_unread(self) -> bool:
-        """Return whether bytes have come that are not parsed yet."""
+        """Return whether there are received bytes that have not been parsed yet."""
         return bool(self._frames.reader.buffer)
 
     @property
     def unfinished(self) -> int:
-        """Return the bytes of frames and messages that are not complete."""
+        """Return the number of bytes in incomplete frames and messages."""
         return len(self._frames.reader.buffer) + len(self._fragments)
 
     def discard_unfinished(self) -> None:
-        """Free the parts of frames and messages that have arrived."""
+        """Discard the received parts of incomplete frames and messages."""
         self._frames.reader.buffer.clear()
         self._fragments.clear()
 
@@ -153,23 +153,23 @@ class WebSocket:
         return self._frames.state in (State.CLOSING, State.CLOSED)
 
     def response_to(self, request: Request) -> Response:
-        """Return the response of the handshake; its status is 101 if the request is accepted."""
+        """Return the response to the handshake; its status is 101 if the request is accepted."""
         return self._frames.accept(request)
 
     def accept(self, response: Response) -> None:
-        """Open the WebSocket with the response of the handshake."""
+        """Open the WebSocket by sending the response to the handshake."""
         self._frames.send_response(response)
 
     def ping(self, data: bytes) -> None:
-        """Send a ping."""
+        """Queue a ping."""
         self._frames.send_ping(data)
 
     def close(self, code: int, reason: str) -> None:
-        """Send a close frame; a long reason is cut."""
+        """Queue a close frame; a long reason is truncated."""
         self._frames.send_close(code, reason.encode()[:_MAX_REASON].decode(errors="ignore"))
 
     def data_to_send(self) -> tuple[bytes, ...]:
-        """Return the bytes that the protocol has to send, and forget them."""
+        """Remove and return the bytes that the protocol has queued."""
         return tuple(piece for piece in self._frames.data_to_send() if piece)
 
 
@@ -181,7 +181,7 @@ def _select(
 
 
 _QUIET = logging.getLogger("minirospy.web.websockets")
-# The library logs each frame at DEBUG, and with the headers tokens.
+# The library logs each frame at DEBUG, and logs headers, which contain tokens.
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
 _QUIET.setLevel(logging.CRITICAL)

@@ -1,1 +1,1 @@
-"""tf2_web_republisher: chosen transforms for clients of rosbridge, at a rate of their own and only if they changed."""
+"""tf2_web_republisher: sends selected transforms to rosbridge clients, at a limited rate and only if they have changed."""

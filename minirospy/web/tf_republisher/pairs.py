@@ -1,4 +1,4 @@
-"""Pairs of frames, and when a client is to be sent their transform. Pure. Source: http://wiki.ros.org/tf2_web_republisher."""
+"""Pairs of frames, and when to send their transforms to a client. Pure. Source: http://wiki.ros.org/tf2_web_republisher."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ _MAX_FRAMES = 1000
 
 
 class FramePair:
-    """A source frame seen from a target frame: sent where it moved by more than a threshold (meters, radians)."""
+    """A source frame seen from a target frame. Its transform is sent if it has changed by more than a threshold (m, rad)."""
 
     def __init__(self, source: str, target: str, angle: float, distance: float) -> None:
         self.source = source
         self.target = target
         self.is_okay = True
-        """False from the first lookup that fails to the next one that does not."""
+        """False after a failed lookup, until one succeeds."""
 
         self._angle = angle
         self._distance = distance
         self._sent: Transform | None = None
 
     def is_to_be_sent(self, transform: Transform) -> bool:
-        """Return whether a transform (geometry_msgs/Transform) differs enough from the last that was sent, and is then."""
+        """Return whether a transform differs enough from the last one sent; if it does, record it as sent."""
         if not (
             self._sent is None
             or not self._angle
@@ -45,7 +45,10 @@ class FramePair:
 
 
 def pairs_of(request: TFSubscriptionGoal | RepublishTFsRequest) -> list[FramePair]:
-    """Return the pairs of a request's fields source_frames, target_frame, angular_thres and trans_thres. Raise BridgeError."""
+    """Return the pairs in a request, from its source_frames, target_frame, angular_thres and trans_thres.
+
+    Raise BridgeError if there are too many frames.
+    """
     if len(request.source_frames) > _MAX_FRAMES:
         raise BridgeError(f"a request has {_MAX_FRAMES} frames at most")
     target = request.target_frame.removeprefix("/")
@@ -60,7 +63,7 @@ def _distance(one: Vector3, other: Vector3) -> float:
 
 
 def _angle(one: Quaternion, other: Quaternion) -> float:
-    """Return the angle between two rotations as quaternions: half of that by which things turn, as the real node has it."""
+    """Return the angle between two rotations as quaternions. Like the real node's, it is half the angle of rotation."""
     first, second = ((each.x, each.y, each.z, each.w) for each in (one, other))
     norm = math.hypot(*first) * math.hypot(*second)
     if not norm:

@@ -32,20 +32,20 @@ _DEFAULT_RATE = 10.0
 _MAX_RATE = 1000.0
 _MAX_REQUESTS = 1000
 _A_TURN = 50
-"""Frames after which others have their turn."""
+"""Number of frames after which other tasks may run."""
 
 
 class _Closing(Protocol):
-    """A part that is closed with the republisher."""
+    """A part that must be closed together with the republisher."""
 
     async def close(self) -> None: ...
 
 
 class Republisher:
-    """Looks transforms up for its clients. On the node's loop."""
+    """Looks up transforms for its clients. Runs on the node's loop."""
 
     def __init__(self, node: Node, name: str = NAME) -> None:
-        """``name``: of the action, and the namespace of the topics that requests get."""
+        """Create the republisher. ``name`` is the action's name, and the namespace of the topics created for requests."""
         self.node = node
         self._name = name
         self._buffer = Buffer(node)
@@ -55,7 +55,7 @@ class Republisher:
         self._reporter = ErrorReporter(node.log, "republishing transforms")
 
     async def start(self) -> None:
-        """Listen to transforms, and serve."""
+        """Start listening to transforms, and offer the action and the service."""
         await self._buffer.start()
         server = ActionServer(self.node, self._name, TFSubscriptionAction, self._execute, concurrent=True)
         self._closing.append(server)
@@ -63,7 +63,7 @@ class Republisher:
         await server
 
     async def close(self) -> None:
-        """End everything. Idempotent."""
+        """Close all parts, and cancel all requests. Idempotent."""
         closing, self._closing = self._closing, []
         for part in closing:
             await part.close()
@@ -87,7 +87,7 @@ class Republisher:
             await self.node.sleep(period)
 
     async def _republish(self, request: RepublishTFsRequest) -> object:
-        """Publish transforms on a topic of the request's own until nobody subscribed to it for ``timeout``."""
+        """Publish transforms on a separate topic until it has had no subscribers for ``timeout``."""
         if len(self._requests) >= _MAX_REQUESTS:
             raise ServiceException(f"{_MAX_REQUESTS} requests are served: no more")
         try:
@@ -100,7 +100,7 @@ class Republisher:
         self._requests.add(task)
         task.add_done_callback(self._requests.discard)
         task.add_done_callback(self._reporter.of_task)
-        # A client of rosbridge subscribes without a type: the master must know the topic by then.
+        # A rosbridge client subscribes without a type, so the master must know the topic before the response is sent.
         await publisher
         self.node.log.info("Publishing requested TFs on topic %s", topic)
         return {"topic_name": topic}
@@ -129,7 +129,7 @@ class Republisher:
                 await self.node.sleep(period)
 
     async def _changed(self, pairs: list[FramePair]) -> list[TransformStamped]:
-        """Return the transforms that have to be sent."""
+        """Return the transforms that must be sent."""
         found = []
         for number, pair in enumerate(pairs, 1):
             if not number % _A_TURN:

@@ -1,1 +1,1 @@
-"""Topics' images over HTTP, with web_video_server's URLs: streams, snapshots, and a list of topics."""
+"""Images from topics over HTTP, with web_video_server's URLs: streams, snapshots, and a list of topics."""

@@ -29,7 +29,7 @@ class Capacity:
                 await turn
             except asyncio.CancelledError:
                 if not turn.cancelled():
-                    self.taken_units -= units  # the units had just been acquired
+                    self.taken_units -= units  # the units were acquired just before the cancellation
                 self._admit()
                 raise
         else:

@@ -28,7 +28,7 @@ _MAX_PIXELS = 10_000
 class Picture:
     """How to encode an image.
 
-    ``format``: jpeg or png, or "" to pass a compressed image unchanged; a None size keeps the size.
+    ``format``: jpeg or png, or "" to pass a compressed image unchanged. If a size is None, the image's size is kept.
     """
 
     format: str = "jpeg"
@@ -95,7 +95,7 @@ def part(data: bytes, content_type: str, nanoseconds: int) -> bytes:
 
 
 END = b"\r\n" + START
-"""The end of an image, including the next boundary, because a browser shows an image only after that boundary."""
+"""The end of an image. It includes the next boundary, because a browser shows an image only after that boundary."""
 
 
 def topics_page(topics: Mapping[str, str], token: str) -> bytes:

@@ -22,9 +22,9 @@ __all__ = ["VideoPages"]
 
 _SNAPSHOT_SECONDS = 10.0
 _MAX_FEEDS = 32
-"""Limit for concurrent feeds (a topic in one encoding), because each image is encoded once per feed."""
+"""Maximum number of concurrent feeds (a topic in one encoding), because each image is encoded once per feed."""
 _MAX_KEPT = 32_000_000
-"""Limit in bytes for the encoded images that all feeds together store for new clients; further ones are not stored."""
+"""Maximum total bytes of the encoded images that feeds store for new clients; further images are not stored."""
 _HTML = "text/html; charset=utf-8"
 
 
@@ -110,7 +110,7 @@ class _Shared:
 
 
 class VideoPages:
-    """Serves topics' images. Runs on the loop."""
+    """Serves images from topics. Runs on the loop."""
 
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
@@ -120,7 +120,7 @@ class VideoPages:
 
     @property
     def handlers(self) -> Mapping[str, HttpHandler]:
-        """Return the request handler of each path."""
+        """Return the request handler for each path."""
         return {
             "/": self._guarded(self._topics),
             "/stream": self._guarded(self._stream),

@@ -21,12 +21,13 @@ IMAGE = "sensor_msgs/Image"
 COMPRESSED = "sensor_msgs/CompressedImage"
 
 _FASTEST_PNG = 1
-MAX_PIXELS = 16_000_000  # in a compressed or an enlarged image
+MAX_PIXELS = 16_000_000  # maximum number of pixels in a compressed or an enlarged image
 _LENGTH = struct.Struct("<I")
 _STAMPED = 12  # bytes of a header's seq and stamp, before the length of its frame_id
-# Bytes of a file to search for the image's size: other data, such as a preview, may precede it.
+# Number of bytes in which to search a file for the image's size: other data, such as a preview, may precede it.
 _HEAD_BYTES = 100_000
-_ROWS = 256  # rows of a numeric image scaled at a time: as 64-bit numbers they take eight times the memory
+# rows of a numeric image to scale at a time; as 64-bit numbers they take eight times the memory
+_ROWS = 256
 _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/webp"}
 
 
@@ -69,7 +70,7 @@ def _content_type(data: bytes) -> str:
 
 
 def _is_as_wanted(data: bytes, picture: Picture) -> bool:
-    """Return whether a compressed image can be passed unchanged."""
+    """Return whether a compressed image can be passed to the client unchanged."""
     is_plain = not (picture.is_inverted or picture.width or picture.height) and picture.quality == 95
     found = _content_type(data)
     return bool(found) and is_plain and picture.format in ("", found.removeprefix("image/"))
@@ -92,7 +93,7 @@ def _colors(image: Pixels, encoding: str) -> Pixels:
 
 
 def _scaled(image: Pixels) -> Pixels:
-    """Return a numeric image in gray: the largest value is white; negative values, infinities and NaN are black."""
+    """Return a numeric image in gray. The largest value becomes white; negative values, infinities and NaN become black."""
     import numpy as np
 
     def values(start: int) -> Pixels:
@@ -109,7 +110,7 @@ def _scaled(image: Pixels) -> Pixels:
 
 
 def work_of(type_: str, body: bytes | memoryview) -> int:
-    """Return the number of pixels to process for a serialized message, as far as it is known in advance."""
+    """Return the number of pixels to process for a serialized message, as far as this is known in advance."""
     if type_ != COMPRESSED:
         return len(body) // 3
     try:
