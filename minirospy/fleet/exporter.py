@@ -1,4 +1,7 @@
-"""The robot half of a gateway: announces the robot's graph, sends topics that have readers, and delivers messages and calls."""
+"""The robot half of a gateway.
+
+It announces the robot's graph, sends topics that have readers, and delivers messages and calls.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,7 @@ __all__ = ["Exporter"]
 _log = logging.getLogger(__name__)
 _MAX_IN_FLOWS = 1_000
 _MAX_WANTED, _MAX_READERS = 10_000, 1_000
-"""Topics that readers may request, and readers per topic: limited because peers choose both."""
+"""Maximum number of topics that readers may request, and of readers per topic, because peers choose both."""
 
 
 class Exporter:
@@ -57,7 +60,7 @@ class Exporter:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """``hidden``: names of other robots whose topics are imported here, and which are not announced again."""
+        """Create the exporter. ``hidden`` contains the names of other robots, whose imported topics are not announced again."""
         self.claim = claim
         self.duplicates: tuple[Claim, ...] = ()
         self.graph = RobotGraph(node, definitions, claim, rules, hidden)
@@ -130,7 +133,7 @@ class Exporter:
     def _announce(self) -> None:
         keys = {topic_key(each) for each in self.graph.topics.values()}
         keys |= {service_key(each) for each in self.graph.services.values()}
-        # Declare new tokens before old ones are removed: a topic whose flags have changed always has a token.
+        # Declare new tokens before removing old ones, so that a topic whose flags have changed always has a token.
         for key in keys - self._tokens.keys():
             self._tokens[key] = self._network.declare_token(key)
         for key in self._tokens.keys() - keys:
@@ -188,7 +191,7 @@ class Exporter:
 
     async def _adjust(self) -> None:
         """Open and close outbound and inbound topics to match the graph and the readers' requests."""
-        # Closing awaits the master: meanwhile, other calls of this method change both tables.
+        # Closing awaits the master, and other calls of this method may change both tables in the meantime.
         for topic, outbound in list(self.outbound.items()):
             token = self.graph.topics.get(topic)
             if self.outbound.get(topic) is outbound and (
@@ -221,7 +224,7 @@ class Exporter:
     # --- messages, calls and questions of others
 
     def _inbound_of(self, topic: str) -> InboundTopic | None:
-        """Return the publisher for messages that arrive on a topic; the topic must have subscribers here."""
+        """Return the publisher for messages that arrive on a topic, which must have subscribers here."""
         inbound = self.inbound.get(topic)
         token = self.graph.topics.get(topic)
         if inbound is None and token is not None and token.is_subscribed:

@@ -1,4 +1,4 @@
-"""Find gateways that no longer respond, because the Zenoh tokens of robots that are lost together may remain for minutes.
+"""Finds gateways that no longer respond, because the Zenoh tokens of robots that are lost together may remain for minutes.
 
 All gateways are queried at regular intervals, and shortly after a robot has left. A gateway that has responded before and
 then misses two queries is lost until it responds again. A gateway that has never responded, for example because its
@@ -13,9 +13,9 @@ from collections.abc import Awaitable, Callable, Collection
 __all__ = ["Presence"]
 
 _REGULAR_SECONDS, _LOST_SECONDS = 60.0, 10.0
-"""Interval between checks, and the shorter interval while a gateway is lost, because it may have returned."""
+"""Seconds between checks, normally and while a gateway is lost, because that gateway may have returned."""
 _SETTLE_SECONDS = 2.0
-"""Delay after a robot has left, because robots that are lost together disappear one by one."""
+"""Seconds to wait after a robot has left, because robots that are lost together disappear one by one."""
 _ROUNDS, _ROUND_SECONDS = 2, 5.0
 
 
@@ -28,7 +28,9 @@ class Presence:
         gateways: Callable[[], Collection[str]],
         changed: Callable[[], object],
     ) -> None:
-        """``query()`` queries all gateways and returns those that responded in time, or None if it could not be sent.
+        """Create the tracker.
+
+        ``query()`` queries all gateways and returns those that responded in time, or None if it could not be sent.
 
         ``gateways()`` returns the gateways that have tokens. ``changed()`` is called when a gateway is lost or has
         returned.

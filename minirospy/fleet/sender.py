@@ -1,4 +1,4 @@
-"""Threads with queues that pass messages to and from Zenoh, so that neither direction has to wait for the event loop."""
+"""Threads with queues that pass messages to and from Zenoh, so that neither direction waits for the event loop."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
 _MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
 _MAX_OUTLETS = 64
-"""Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
+"""Maximum number of Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
 
-The least recently used is dropped.
+The least recently used one is dropped.
 """
 
 
@@ -38,7 +38,7 @@ class _Worker:
         self._is_closed = False
 
     def close(self) -> None:
-        """Stop the thread; if it is blocked in Zenoh, do not wait for it. Idempotent."""
+        """Stop the thread, but do not wait for it if it is blocked in Zenoh. Idempotent."""
         with self._condition:
             self._is_closed = True
             self._condition.notify_all()
@@ -74,7 +74,7 @@ class Outflow:
 
     @property
     def sent(self) -> int:
-        """Return how many messages were passed to Zenoh."""
+        """Return the number of messages passed to Zenoh."""
         return self._flow.passed
 
     @property
@@ -84,11 +84,11 @@ class Outflow:
 
     @property
     def dropped(self) -> int:
-        """Return how many messages were dropped in favour of newer ones because the network was slower."""
+        """Return how many messages were dropped in favour of newer ones because the network was too slow."""
         return self._flow.dropped
 
     def send(self, key: str, message: bytes, *, always: bool = False) -> None:
-        """Queue a message; with ``always``, regardless of the rate limit."""
+        """Queue a message; with ``always``, ignore the rate limit."""
         if not always and not self._throttle.allows(time.monotonic()):
             self.throttled += 1
             return
@@ -163,13 +163,13 @@ class Sender:
     """Sends messages, using one thread per priority, so that a large message that takes a second does not delay a command."""
 
     def __init__(self, network: FleetNetwork, clock: Callable[[], int] = time.time_ns) -> None:
-        """``clock`` returns the time in ns that is attached to each message."""
+        """Create the queues. ``clock`` returns the time in ns that is attached to each message."""
         self._priorities = {priority: _PriorityWorker(priority, network, clock) for priority in Priority}
 
     def flow(self, priority: Priority, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
         """Return a flow for a topic, limited to ``hertz`` (0: unlimited).
 
-        ``is_bare``: send messages without stamps, for other programs.
+        With ``is_bare``, send messages without stamps, for other programs.
         """
         return Outflow(self._priorities[priority], priority, hertz, is_bare)
 
@@ -184,7 +184,7 @@ _Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]
 
 
 class Flows:
-    """A receiver's flows by key, limited in number: the least recently used one is removed. Thread-safe."""
+    """A receiver's flows by key. Their number is limited: the least recently used flow is removed. Thread-safe."""
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -209,7 +209,7 @@ class Flows:
 class Receiver(_Worker):
     """Queues received messages until they are published, round-robin between robots' topics.
 
-    Publishing may block for some milliseconds for a slow subscriber, which would delay all robots in Zenoh's own thread.
+    Publishing to a slow subscriber may block for some milliseconds; in Zenoh's own thread, this would delay all robots.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Submodules that ROS's packages import with themselves: here each is imported when a program first uses it."""
+"""Imports, on first use, submodules that ROS's packages import together with themselves."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ _WIDTHS = {"time": 8, "duration": 8, "string": 4}
 
 @dataclass(frozen=True)
 class ActionCodec:
-    """Converts an action's messages; ``classes``: the types of its ROS 1 topics, by the last part of each topic's name."""
+    """Converts an action's messages. ``classes`` contains its ROS 1 topics' types, by the last part of each topic's name."""
 
     goal: Transcoder
     result: Transcoder
@@ -38,7 +38,7 @@ class ActionCodec:
 
 
 class ActionCodecs:
-    """The codecs for actions, by their types on both sides."""
+    """The codecs for actions, by the types on both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side

@@ -1,4 +1,4 @@
-"""A ROS 1 action that the bridge offers in ROS 2: goals are sent to ROS 1, feedback and results are sent back."""
+"""A ROS 1 action that the bridge offers in ROS 2: sends goals to ROS 1, and feedback and results to ROS 2."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 __all__ = ["MAX_GOALS", "GoalsToRos1"]
 
 _SERVER_SECONDS = 5.0
-"""Timeout for a ROS 1 server to connect, and to include a new goal in its statuses."""
+"""Timeout in seconds for a ROS 1 server to connect, and to include a new goal in its statuses."""
 MAX_GOALS = 1_000
-"""Goals that are passed on concurrently; further ones are refused."""
+"""Maximum number of goals passed on concurrently; further goals are rejected."""
 _PENDING_SECONDS = 0.5
-"""Time after which a pending goal counts as accepted, because ROS 2 has no such state."""
+"""Seconds after which a pending goal counts as accepted, because ROS 2 has no pending state."""
 _ENDS = {
     GoalState.SUCCEEDED: SUCCEEDED,
     GoalState.PREEMPTED: CANCELED,
@@ -49,7 +49,7 @@ _REFUSED = {GoalState.REJECTED, GoalState.RECALLED}
 
 
 class _Goal:
-    """A ROS 2 client's goal on a ROS 1 server."""
+    """A ROS 2 client's goal at a ROS 1 server."""
 
     def __init__(
         self, id: GoalId, feedback: Callable[[bytes], None], cancel: Callable[[_Goal], None]
@@ -62,7 +62,7 @@ class _Goal:
         self._cancel = cancel
 
     def cancel(self) -> None:
-        """Request the server to cancel the goal. May be called from any thread."""
+        """Send the server a cancel request. May be called from any thread."""
         self._cancel(self)
 
     def accept(self, is_accepted: bool) -> None:
@@ -110,8 +110,8 @@ class GoalsToRos1:
         self._server = self._side.action_server(self._link.action, self._link.ros2_type, self._accept)
 
     async def close(self) -> None:
-        """Close the action: abort running goals; goals whose result has arrived receive that result."""
-        # A result that has arrived is processed in the next loop iteration.
+        """Close the action. Running goals are aborted; goals whose result has already arrived receive that result."""
+        # A result that has already arrived is processed in the next loop iteration.
         await asyncio.sleep(0)
         self._is_closed = True
         for goal in list(self._goals.values()):
@@ -144,7 +144,7 @@ class GoalsToRos1:
         task = asyncio.ensure_future(self._send(data, feedback, accepted))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # Also needed if the task is cancelled, even before its first step.
+        # Cancel the future even if the task is cancelled before its first step.
         task.add_done_callback(lambda _: accepted.cancel())
 
     async def _send(
@@ -231,7 +231,7 @@ class GoalsToRos1:
         goal = self._goals.get(status.goal.id)
         if not goal:
             return
-        # Feedback has a separate connection: first process feedback that has already arrived.
+        # Feedback arrives on a separate connection, so first process the feedback that has already arrived.
         self._loop.call_soon(self._take_end, goal, status.state, body)
 
     def _take_end(self, goal: _Goal, state: int, body: bytes) -> None:

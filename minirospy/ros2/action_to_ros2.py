@@ -1,4 +1,4 @@
-"""A ROS 2 action that the bridge offers in ROS 1: goals are sent to ROS 2, feedback and results are sent back."""
+"""A ROS 2 action that the bridge offers in ROS 1: sends goals to ROS 2, and feedback and results to ROS 1."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ _KEPT_SECONDS = 5.0
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _REACH_SECONDS = 2.0
-"""Maximum time that opening this link delays other links while it waits for the server."""
+"""Maximum number of seconds by which opening this link delays other links while it waits for the server."""
 _ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
-"""Delay before a response, because Python's actionlib drops responses that arrive before its send_goal has returned."""
+"""Seconds to delay a response, because Python's actionlib drops responses that arrive before its send_goal has returned."""
 _QUEUE = 50
 _MAX_SENT = 4
-"""Goals that are sent and not yet accepted: a server's queue has 10 places, and further goals would be lost."""
+"""Maximum number of goals sent but not yet accepted: a server's queue has 10 places, and further goals would be lost."""
 MAX_GOALS = 1_000
-"""Stored goals, including recently ended ones; further goals are refused."""
+"""Maximum number of stored goals, including recently ended ones; further goals are rejected."""
 _EVENTS = {SUCCEEDED: GoalEvent.SUCCEED, CANCELED: GoalEvent.CANCEL}
 
 

@@ -1,4 +1,4 @@
-"""Open and close actions between the two sides, and convert their messages."""
+"""Opens and closes actions between the two sides, and converts their messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bridge's interface to ROS 2: implemented with rclpy in ``side.py``, with Zenoh in ``zenoh_side.py``, and by tests.
+"""The bridge's interface to ROS 2, implemented with rclpy in ``side.py``, with Zenoh in ``zenoh_side.py``, and in tests.
 
 ROS 2 calls back in its own threads. Types are ``pkg/Name``; messages are CDR.
 """
@@ -50,14 +50,14 @@ class Ros2Handle(Protocol):
 
 
 class Ros2Probe(Protocol):
-    """Sends requests that have no effect to a client's servers. Methods may be called from any thread."""
+    """Sends no-op requests to a client's servers. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
         """Return whether the servers are connected."""
 
     def reach(self) -> Future[None]:
-        """Send a request and return the future of its response. After that response, no response to the client is lost."""
+        """Send a request and return a future for its response. After that response, no response to the client is lost."""
 
     def close(self) -> None: ...
 
@@ -81,7 +81,7 @@ class Ros2Client(Reachable, Protocol):
     """A client of a service. Methods may be called from any thread."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return the future of the response, both as CDR. The future fails with BridgeError."""
+        """Send a request and return a future for the response, both as CDR. The future fails with BridgeError."""
 
     def close(self) -> None: ...
 
@@ -99,7 +99,7 @@ class Ros2ActionClient(Reachable, Protocol):
     """A client of an action. Methods may be called from any thread."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the future of the accepted goal, which is None if the goal is refused.
+        """Send a goal; return a future for the accepted goal, or for None if the goal is rejected.
 
         The future fails with BridgeError.
         """
@@ -123,7 +123,7 @@ Accept = Callable[[bytes, Callable[[bytes], None]], Future[GoalOfRos1 | None]]
 
 
 class Ros2Parameters(Protocol):
-    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread.
+    """Parameters of other ROS 2 nodes. All methods block, so call them in a worker thread.
 
     All raise BridgeError if the call fails.
     """
@@ -175,9 +175,9 @@ class Ros2Side(Protocol):
     def client(self, service: str, type_: str) -> Ros2Client: ...
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service: call ``answer`` with a request's CDR, in a thread.
+        """Offer a service. ``answer`` is called in a thread, with a request's CDR, and returns a future for the response.
 
-        A MinirospyError from its future fails the call.
+        The call fails if the future raises MinirospyError.
         """
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
@@ -186,7 +186,7 @@ class Ros2Side(Protocol):
     def action_client(self, action: str, type_: str) -> Ros2ActionClient: ...
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Offer an action: call ``accept``, in a thread, with a goal and the function that sends the goal's feedback."""
+        """Offer an action. ``accept`` is called in a thread, with a goal and the function that sends the goal's feedback."""
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
         """Offer the ROS 1 parameters as this node's parameters."""

@@ -1,8 +1,8 @@
-"""Wait until ROS 2 servers have discovered the bridge's client: earlier responses may be lost. Runs on the node's loop.
+"""Waits until ROS 2 servers have discovered the bridge's client, because earlier responses may be lost. Runs on the node's loop.
 
 A server discovers a client's endpoints later than the client discovers the server. Until then, rmw_fastrtps and
-rmw_cyclonedds buffer a response for 100 ms and then drop it. A client is not notified of the server's discovery, but a
-response proves it: a request without effect is repeated until a response arrives. A process announces its endpoints in
+rmw_cyclonedds buffer a response for 100 ms and then drop it. A client is not notified when a server has discovered it,
+but a response proves it, so a no-op request is repeated until a response arrives. A process announces its endpoints in
 the order of their creation, so the response to a client that was created later shows that earlier endpoints have been
 discovered, too.
 """
@@ -25,7 +25,7 @@ _LOOK_SECONDS = 0.02
 _AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
 _NO_PROBE_SECONDS = 1.0  # seconds to wait for servers that cannot be probed
 _MAX_SECONDS = 10.0
-"""Maximum wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
+"""Maximum number of seconds to wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
 
 
 class Reach:
@@ -48,7 +48,7 @@ class Reach:
     async def wait(self, seconds: float = math.inf) -> None:
         """Return once responses from the current servers can arrive, or after ``seconds``.
 
-        The maximum is ten seconds, so that unresponsive servers do not delay every request.
+        Wait for ten seconds at most, so that unresponsive servers do not delay every request.
         """
         servers = self._client.servers
         if servers is None or (self._reached is not None and servers <= self._reached):
@@ -64,7 +64,7 @@ class Reach:
         await asyncio.wait([self._reaching], timeout=max(0.0, seconds))
 
     async def close(self) -> None:
-        """Stop; pending waits return. Idempotent."""
+        """Stop probing; pending waits return. Idempotent."""
         self._is_closed = True
         if self._reaching:
             self._reaching.cancel()
@@ -107,7 +107,7 @@ class Reach:
 
 async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
     pause = _AGAIN_SECONDS
-    # Stop if a server's node has exited, because the node's services will never be ready again.
+    # Stop if a server's node has exited, because the node's services will never become ready again.
     while is_current():
         if not probe.is_ready:
             await asyncio.sleep(_LOOK_SECONDS)
@@ -117,7 +117,7 @@ async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
         except asyncio.TimeoutError:
             pass
         except BridgeError:
-            # The actual requests will fail for the same reason and report the error.
+            # Ignore the error: the actual requests will fail for the same reason and report it.
             await asyncio.sleep(pause)
         else:
             return True

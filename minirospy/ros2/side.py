@@ -1,4 +1,4 @@
-"""The ROS 2 backend with rclpy: topics, publishers and subscriptions of serialized messages.
+"""The ROS 2 backend with rclpy, for topics, publishers and subscriptions of serialized messages.
 
 Only this module and rclpy_*.py use rclpy. ROS 2 calls back in the thread of its executor.
 """
@@ -39,7 +39,7 @@ __all__ = ["RclpySide", "large_message_settings", "require_rclpy"]
 
 _log = logging.getLogger(__name__)
 _DRAINED = 200
-"""Messages read per callback of the executor, because a callback costs more than reading one message."""
+"""Maximum number of messages read per executor callback, because a callback costs more than reading a message."""
 
 
 # --- what is used of rclpy, which has no types where it is not installed
@@ -97,7 +97,7 @@ def require_rclpy() -> None:
 _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
 """Environment variables for Fast DDS's settings file.
 
-_OLD_DISTRIBUTIONS have version 2 or older, which uses the second one.
+The second one is for Fast DDS version 2 and older, which _OLD_DISTRIBUTIONS have.
 """
 _OLD_DISTRIBUTIONS = ("humble", "iron", "jazzy")
 _PACKAGE = re.compile(r"[a-z](_?[a-z0-9]+)*")
@@ -119,7 +119,7 @@ def large_message_settings(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 class RclpySide:
-    """The rclpy backend: one node and one executor, in one thread."""
+    """The rclpy backend, with one node and one executor in one thread."""
 
     def __init__(self, name: str) -> None:
         """Start the node. Raise BridgeError if ROS 2 reports an error."""
@@ -206,7 +206,7 @@ class RclpySide:
 
     def services(self) -> Mapping[str, str]:
         """Return the services of nodes other than this bridge, and their types."""
-        # Includes services that have clients but no server.
+        # This also contains services that have clients but no server.
         named = {str(name): _short(types[0]) for name, types in self._node.get_service_names_and_types()}
         if hasattr(self._node, "count_services"):
             own = tuple(self._served)
@@ -215,7 +215,7 @@ class RclpySide:
                 for name, type_ in named.items()
                 if self._node.count_services(name) > own.count(name)
             }
-        # Before ROS 2 Jazzy, query each node.
+        # Before ROS 2 Jazzy, each node must be queried.
         offered: dict[str, str] = {}
         for name, namespace in self.nodes():
             # The node has just exited.
@@ -266,7 +266,7 @@ class RclpySide:
         return ParameterServer(self._calls, str(self._node.get_name()), store, loop)
 
     def node_parameters(self) -> Ros2Parameters:
-        """Return access to the parameters of other nodes."""
+        """Return an object that accesses the parameters of other nodes."""
         return NodeParameters(self._calls)
 
     def close(self) -> None:
@@ -333,7 +333,7 @@ class RclpySide:
 
 
 class _Served:
-    """A service that the bridge offers; it is listed as the bridge's own until it is closed."""
+    """A service that the bridge offers. It is listed as the bridge's own until it is closed."""
 
     def __init__(self, calls: Calls, server: Ros2Handle, on_close: Callable[[], None]) -> None:
         self._calls = calls
@@ -405,7 +405,7 @@ class _Subscription:
 
 def _imported(type_: str, kind: str) -> object:
     package, _, name = type_.partition("/")
-    # The name comes from a remote node: importing an arbitrary module would execute it.
+    # Check the name, because it comes from a remote node, and importing an arbitrary module would execute it.
     if not (_PACKAGE.fullmatch(package) and _NAME.fullmatch(name) and _is_interface_package(package)):
         return None
     try:
@@ -421,13 +421,13 @@ def _is_interface_package(package: str) -> bool:
     try:
         found = importlib.util.find_spec(package)
     except (ImportError, ValueError):
-        # ValueError: a module without a spec was put into sys.modules.
+        # ValueError: a program has put a module without a spec into sys.modules.
         return False
     folders = found.submodule_search_locations if found else None
     return any(any(Path(folder).glob(f"{package}_s__rosidl_typesupport_*")) for folder in folders or ())
 
 
 def _short(type_: str) -> str:
-    """Return ``pkg/Name`` for ``pkg/msg/Name``."""
+    """Convert ``pkg/msg/Name`` to ``pkg/Name``."""
     package, _, rest = type_.partition("/")
     return f"{package}/{rest.rpartition('/')[2]}"

@@ -1,4 +1,4 @@
-"""The server's record of its goals: one StatusTracker per goal, and the ServerGoalHandle with which user code changes it.
+"""The server's record of its goals: one StatusTracker per goal, and ServerGoalHandles for user code.
 
 The transitions are a table in `minirospy.core.graph.goals`.
 """

@@ -42,9 +42,9 @@ _TOO_LATE = (
     "This goal handle was canceled by the action server because its timestamp is before the timestamp of "
     "the last cancel request"
 )
-_FEW_STATUSES = 50  # up to this many statuses are published immediately on each change
+_FEW_STATUSES = 50  # maximum number of statuses to publish immediately on each change
 
-# Pause after a longer list, per status in it, so that publishing does not use all the server's time.
+# For a longer list, seconds to pause per status in it, so that publishing does not use all CPU time.
 _SECONDS_A_STATUS = 1e-4
 
 
@@ -202,7 +202,7 @@ class ActionServer:
             self._publish(self.feedback_pub, message)
 
     def publish_status(self) -> None:
-        """Publish all goals' statuses: immediately if there are few, otherwise after a pause."""
+        """Publish all goals' statuses, immediately if they are few, otherwise after a pause."""
         with self.lock:
             pause = len(self._trackers) * _SECONDS_A_STATUS
             now = time.monotonic()
@@ -271,7 +271,7 @@ class ActionServer:
                 self.goal_callback(handle)
 
     def _meet_again(self, tracker: StatusTracker) -> None:
-        """Process a goal whose ID is known: the goal was sent twice, or cancelled before it arrived."""
+        """Process a goal whose ID is already known, because the goal was sent twice or cancelled before it arrived."""
         status = tracker.status
         rospy.logdebug(
             "Goal %s was already in the status list with status %i", status.goal_id.id, status.status

@@ -1,7 +1,7 @@
 """A serialized actionlib_msgs/GoalStatusArray: composed from serialized statuses, and parsed only on demand.
 
-A server publishes each goal's status for seconds after the goal has ended, so a busy server publishes thousands of statuses
-at a time. A client needs only those of its own goals.
+A server publishes each goal's status for a few seconds after the goal has ended, so a busy server publishes thousands of
+statuses at a time. A client needs only those of its own goals.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class StatusList(GoalStatusArray):
         key = _COUNT.pack(len(name)) + name
         if key not in self._data:
             return None
-        # Check the position: the same bytes may also occur in another goal's text.
+        # Check the position, because the same bytes may also occur in another goal's text.
         for start, end in self._bounds():
             if self._data.startswith(key, start + 8):
                 return self._status(start, end)

@@ -1,4 +1,4 @@
-"""rosgraph: the Master API, names and the environment, for Python programs."""
+"""rosgraph: the Master API, graph names and environment variables, for Python programs."""
 
 import sys
 from collections.abc import Sequence

@@ -33,7 +33,7 @@ class MasterException(Exception):
     """The master is unreachable or returned an error."""
 
 
-ROSMasterException = MasterException  # the older name
+ROSMasterException = MasterException  # an older name for MasterException
 
 
 class MasterFailure(MasterException):
@@ -41,7 +41,7 @@ class MasterFailure(MasterException):
 
 
 class MasterError(MasterException):
-    """The call was invalid, because of an unknown name or a bad argument."""
+    """The master rejected the call, because of an unknown name or a bad argument."""
 
 
 Error, Failure = MasterError, MasterFailure
@@ -60,7 +60,7 @@ class Master:
         # Remove the trailing slash, as ROS's rosgraph does.
         self.caller_id = make_caller_id(caller_id).rstrip("/")
         self._proxy = MasterProxy(uri, self.caller_id)
-        # ROS's Master has no close(): the connections are closed when the object is deleted.
+        # Close the connections when the object is deleted, because ROS's Master has no close().
         weakref.finalize(self, self._proxy.close)
 
     def _call(self, method: str, *args: object) -> Any:
@@ -77,7 +77,7 @@ class Master:
 
     @cached_property
     def handle(self) -> ServerProxy:
-        """Return the master as Python's `xmlrpc.client.ServerProxy`, whose methods return (code, text, value)."""
+        """Return a `xmlrpc.client.ServerProxy` for the master, whose methods return (code, text, value)."""
         from xmlrpc.client import ServerProxy
 
         return ServerProxy(self.master_uri)

@@ -1,4 +1,4 @@
-"""This machine's addresses, and connection headers, as in ROS's rosgraph.network.
+"""Functions for this machine's addresses and for connection headers, as in ROS's rosgraph.network.
 
 Source: http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/TCPROS.
 """
@@ -46,7 +46,7 @@ class ROSHandshakeException(Exception):
 
 
 def get_address_override() -> str | None:
-    """Return ROS_HOSTNAME, or ROS_IP, or None if neither is set. With MINIROSPY_LOCAL=1 return localhost."""
+    """Return ROS_HOSTNAME, or else ROS_IP, or else None. With MINIROSPY_LOCAL=1 return localhost."""
     if is_local(os.environ):
         return "localhost"
     return os.environ.get(ROS_HOSTNAME) or os.environ.get(ROS_IP) or None
@@ -93,7 +93,7 @@ def use_ipv6() -> bool:
 
 
 def get_bind_address(address: str | None = None) -> str:
-    """Return the address to which servers bind."""
+    """Return the address that servers should bind to."""
     return (Environment.read(host=address) if address else Environment.read()).bind_host
 
 

@@ -53,7 +53,7 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
 
 
 class XmlRpcHandler:
-    """The base class for the methods served by an :class:`XmlRpcNode`; names with a leading underscore are not served."""
+    """The base class for objects whose methods an :class:`XmlRpcNode` serves, except names with a leading underscore."""
 
     def _ready(self, uri: str) -> None:
         """Handle the server's start at ``uri``; subclasses override this method."""

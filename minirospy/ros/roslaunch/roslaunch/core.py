@@ -146,7 +146,7 @@ class Machine:
 
     @property
     def spec(self) -> MachineSpec:
-        """Return the machine as a launch file declares it."""
+        """Return the machine as a MachineSpec."""
         return MachineSpec(
             self.name, self.address, self.env_loader or "", self.user or "", self.password or "", self.ssh_port,
             self.timeout,
@@ -160,7 +160,7 @@ class Machine:
         )
 
     def config_equals(self, m2: object) -> bool:
-        """Return whether another machine has the same address and setup, regardless of its name."""
+        """Return whether the other machine has the same address and setup, regardless of its name."""
         return isinstance(m2, Machine) and self.config_key() == m2.config_key()
 
     def __eq__(self, other: object) -> bool:
@@ -253,7 +253,7 @@ class Node:
 
     @classmethod
     def of(cls, spec: NodeSpec) -> Node:
-        """Return the node that a launch file declares."""
+        """Convert a node from a launch file."""
         return cls(
             spec.package, spec.type, spec.base_name, spec.namespace, spec.machine or None, spec.args, spec.respawn,
             spec.respawn_delay, spec.remaps, spec.env, spec.output or None, spec.cwd or None, spec.launch_prefix, spec.required,
@@ -305,7 +305,7 @@ class Node:
 
     @property
     def spec(self) -> NodeSpec:
-        """Return the node as a launch file declares it."""
+        """Return the node as a NodeSpec."""
         return NodeSpec(
             name=f"{self.namespace}{self.name or ''}",
             package=self.package,
@@ -373,7 +373,7 @@ class Test(Node):
 
     @classmethod
     def of_test(cls, spec: TestSpec) -> Test:
-        """Return the test that a launch file declares."""
+        """Convert a test from a launch file."""
         node = spec.node
         return cls(
             spec.test_name, node.package, node.type, node.base_name, node.namespace, node.machine or None, node.args, node.remaps,
@@ -393,7 +393,7 @@ def _quoted(value: object) -> str:
 
 
 class _Handler:
-    """Receives one kind of lines: either errors or all others."""
+    """Receives either the error lines or all other lines."""
 
     def __init__(self, function: Callable[[str], object], *, errors: bool) -> None:
         self._function = function

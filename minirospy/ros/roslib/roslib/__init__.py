@@ -1,4 +1,4 @@
-"""roslib. Source: http://wiki.ros.org/roslib."""
+"""roslib: functions for packages, manifests and stacks. Source: http://wiki.ros.org/roslib."""
 
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ _interactive = [False]
 
 
 def is_interactive() -> bool:
-    """Return whether set_interactive() marked the process as interactive."""
+    """Return the value that set_interactive() has set: whether the process is interactive."""
     return _interactive[0]
 
 

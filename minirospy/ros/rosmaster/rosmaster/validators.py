@@ -1,6 +1,7 @@
 """rosmaster.validators: checks for the arguments of master calls.
 
-Each function returns a check ``(value, caller_id) -> value``, which raises ParameterInvalid with rosmaster's messages.
+Each function returns a check, which is called with (value, caller_id). The check returns the value, or raises
+ParameterInvalid with rosmaster's message.
 """
 
 from __future__ import annotations

@@ -175,7 +175,7 @@ def _names(name: str | None) -> list[str]:
 
 
 def _invalid_package(name: str) -> str:
-    """Return ROS's error message for a package that does not exist, which includes the searched folders."""
+    """Return ROS's error message for a package that does not exist; the message lists the searched folders."""
     from minirospy.workspace.packages import Packages
 
     roots = (f"\nROS path [{number}]={root}" for number, root in enumerate(Packages().roots))

@@ -56,12 +56,18 @@ class ROSMsgException(Exception):
 
 
 def get_msg_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """Return a message type's text: expanded, or as in its file if ``raw``. Raise ROSMsgException if the type is unknown."""
+    """Return a message type's definition, expanded or, if ``raw``, as in its file.
+
+    Raise ROSMsgException if the type is unknown.
+    """
     return _text(type_, raw, Kind.MESSAGE)
 
 
 def get_srv_text(type_: str, raw: bool = False, rospack: object = None) -> str:
-    """Return a service type's text: expanded, or as in its file if ``raw``. Raise ROSMsgException if the type is unknown."""
+    """Return a service type's definition, expanded or, if ``raw``, as in its file.
+
+    Raise ROSMsgException if the type is unknown.
+    """
     return _text(type_, raw, Kind.SERVICE)
 
 
@@ -128,8 +134,8 @@ def spec_to_str(msg_context: MsgContext, spec: MsgSpec, buff: TextIO | None = No
 def get_yaml_for_msg(msg: Message, prefix: str = "", *, flow_style_: bool | None = None) -> str:
     """Return a message as YAML with sorted fields, and ``prefix`` before each line.
 
-    ``flow_style_``: put everything in braces.
-    By default, flat values are in braces if a message or array has more than four entries, to save lines.
+    With ``flow_style_``, put everything in braces. By default, flat values are in braces if a message or array has more
+    than four entries, to save lines.
     """
     import yaml
 
@@ -178,14 +184,14 @@ def _run(mode: str, words: Sequence[str]) -> int:
 
 
 def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) -> list[str]:
-    """Return the names in a folder for whose path ``rfilter`` is true; none if the folder does not exist."""
+    """Return the names in a folder whose path ``rfilter`` accepts; none if the folder does not exist."""
     if not os.path.isdir(path):
         return []
     return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]
 
 
 def _msg_filter(ext: str) -> Callable[[str], bool]:
-    """Return a function that returns whether a path is a file with this extension."""
+    """Return a predicate that tells whether a path is a file with this extension."""
     return lambda path: os.path.isfile(path) and path.endswith(ext)
 
 
@@ -210,7 +216,7 @@ def _width(plain: object) -> int:
 
 
 def _get_package_paths(pkgname: str, rospack: RosPack) -> list[str]:
-    """Return the folders with a package's definitions, for programs that load them with genmsg."""
+    """Return the folders that contain a package's definitions, for programs that load them with genmsg."""
     return [rospack.get_path(pkgname)]
 
 

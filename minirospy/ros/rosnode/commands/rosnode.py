@@ -95,7 +95,7 @@ def _no_node_to_ping() -> Misuse:
     except MasterUnreachableError:
         return Misuse("please enter a node to ping", "Please enter a node to ping")
     available = "".join(f"\n{name}" for name in nodes)
-    # ROS prints the error twice, because its list of nodes contains the error message.
+    # Print the error twice, as ROS does, because its list of nodes contains the error message.
     ros = f"Please enter a node to ping. Available nodes are:{available}\n{_ping_parser().usage_line()}\n\n"
     return Misuse(
         f"please enter a node to ping: {' '.join(nodes) or 'there are none'}",
@@ -145,7 +145,7 @@ def _no_answer(error: NodeUnreachableError) -> str:
 
 
 def _ping_once(graph: Graph, node: NodeAddress, times: list[float]) -> None:
-    """Ping and print; append the milliseconds to ``times`` before the line is printed, in case Ctrl-C is pressed."""
+    """Ping and print the time. Append the milliseconds to ``times`` before printing, in case Ctrl-C is pressed."""
     times.append(ping_node(graph, node, _PING_SECONDS) * 1000.0)
     print(f"xmlrpc reply from {node.uri}\ttime={times[-1]:f}ms", flush=True)
 
@@ -287,7 +287,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """Return those of ``names`` that exist as nodes; print an error for each of the others."""
+    """Return those of ``names`` that are nodes; print an error for each other name."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:

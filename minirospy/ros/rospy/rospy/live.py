@@ -1,4 +1,4 @@
-"""Internal variables of rospy that programs read and set: each is a property of its module.
+"""rospy's internal variables that programs read and set, as properties of their modules.
 
 `import rospy` imports this module last, because it needs the others.
 """
@@ -30,9 +30,9 @@ _Put = Callable[[Any], object]
 
 
 def _install(module: ModuleType, **names: tuple[_Get, _Put]) -> None:
-    """Add attributes to ``module``; each has a function that returns the value, and one that sets it.
+    """Add attributes to ``module``; for each, ``names`` has a function that returns its value, and one that sets it.
 
-    Deleting an attribute restores its previous value, because unittest.mock ends a patch in this way.
+    Deleting an attribute restores its previous value, because unittest.mock deletes it at the end of a patch.
     """
 
     def attribute(get: _Get, put: _Put) -> property:
@@ -57,7 +57,7 @@ def _restart_unless(value: object) -> None:
         replace_session()
 
 
-# Programs set these flags to False to start another node after the first has shut down.
+# Programs set these flags to False in order to start another node after the first has shut down.
 _install(
     rospy.core,
     _shutdown_flag=(lambda: current_session().is_shutdown(), _restart_unless),

@@ -7,7 +7,7 @@
         async for pose in buffer.changes("map", "base"):
             print(pose.transform.translation.x)
 
-Everything belongs to the event loop of the node. Source: http://wiki.ros.org/tf2_ros. Examples: docs/tf.md.
+All objects belong to the node's event loop. Source: http://wiki.ros.org/tf2_ros. Examples: docs/tf.md.
 """
 
 from __future__ import annotations
@@ -40,13 +40,15 @@ __all__ = ["Broadcaster", "Buffer"]
 
 _T = TypeVar("_T")
 _LATEST = times.Time()
-_MAX_WAITING = 1000  # messages queued while the program is busy; older messages are dropped
+# maximum number of messages queued while the program is busy; older messages are dropped
+_MAX_WAITING = 1000
 
 
 class Buffer:
     """The frames published on /tf and /tf_static over the last ``cache_time`` seconds.
 
-    It listens inside ``async with Buffer(node) as buffer:``. If time jumps back, all non-static transforms are cleared.
+    It receives transforms inside ``async with Buffer(node) as buffer:``. If time jumps back, all non-static transforms
+    are removed.
     """
 
     def __init__(self, node: Node, cache_time: float = 10.0) -> None:
@@ -67,13 +69,13 @@ class Buffer:
         await self.close()
 
     async def start(self) -> None:
-        """Start listening; ``async with`` calls this first."""
+        """Start receiving transforms; ``async with`` calls this method first."""
         for topic, is_static in (("/tf", False), ("/tf_static", True)):
             subscription = await self._node.subscribe(topic, LazyTFMessage, queue_size=_MAX_WAITING)
             self._listening.append(asyncio.create_task(self._take(subscription, is_static)))
 
     async def close(self) -> None:
-        """Stop listening; received transforms can still be looked up. Idempotent."""
+        """Stop receiving transforms. Those received so far can still be looked up. Idempotent."""
         listening, self._listening = self._listening, []
         for task in listening:
             task.cancel()
@@ -86,11 +88,10 @@ class Buffer:
     ) -> TransformStamped:
         """Return the pose of the frame ``source`` in the frame ``target`` at ``time`` (default: the latest pose).
 
-        Wait for the transform for ``timeout`` seconds of the node's time (None: until the node shuts down). Raise
-        LookupException if a frame is unknown, ConnectivityException if the frames are not connected, ExtrapolationException if
-        there is no data for ``time``, InvalidArgumentException if a frame name is invalid, and ROSInterruptException if
-        the node
-        shuts down in the meantime.
+        Wait up to ``timeout`` seconds of the node's time for the transform (None: until the node shuts down). Raise
+        LookupException if a frame is unknown, ConnectivityException if the frames are not connected,
+        ExtrapolationException if there is no data for ``time``, InvalidArgumentException if a frame name is invalid, and
+        ROSInterruptException if the node shuts down in the meantime.
         """
         stamp = nanoseconds(time)
         found = await self._wait_for(lambda: self._tree.lookup(target, source, stamp), timeout)
@@ -117,18 +118,18 @@ class Buffer:
         return transform_stamped(target, source, found)
 
     def why_not(self, target: str, source: str, time: Moment = _LATEST) -> str | None:
-        """Return None if :meth:`lookup` would succeed now, else the reason for its failure."""
+        """Return None if :meth:`lookup` would succeed now, or else the reason why it would fail."""
         try:
             return self._tree.why_not(target, source, nanoseconds(time))
         except InvalidArgumentException as error:
             return str(error)
 
     async def changes(self, target: str, source: str) -> AsyncIterator[TransformStamped]:
-        """Yield the latest pose of ``source`` in ``target``, then each change; skip to the newest if the program is busy.
+        """Yield the latest pose of ``source`` in ``target``, then the pose after each change; skip poses if the program is busy.
 
         Stop when the node shuts down. Raise InvalidArgumentException if a frame name is invalid.
         """
-        # Raises InvalidArgumentException for invalid frame names.
+        # This call raises InvalidArgumentException for invalid frame names.
         self._tree.why_not(target, source, 0)
         end = asyncio.ensure_future(self._node.spin())
         last: StampedTransform | None = None
@@ -217,7 +218,10 @@ class Broadcaster:
         await self._moving.publish(TFMessage(list(transforms)))
 
     async def send_static(self, *transforms: TransformStamped) -> None:
-        """Publish transforms on /tf_static, latched, together with all earlier ones; the last one for a child frame wins."""
+        """Publish transforms on /tf_static, latched, together with all earlier ones.
+
+        A transform replaces earlier ones for its child frame.
+        """
         if self._static is None:
             self._static = self._node.advertise("/tf_static", TFMessage, queue_size=100, latch=True)
         self._kept |= {each.child_frame_id: each for each in transforms}
@@ -242,6 +246,6 @@ async def _first_of(changed: asyncio.Event, end: asyncio.Future[None]) -> None:
 
 
 async def _quietly(pause: Coroutine[object, object, None]) -> None:
-    """Wait; return early if the node shuts down or its time jumps."""
+    """Wait until ``pause`` ends, the node shuts down, or its time jumps."""
     with contextlib.suppress(ROSInterruptException):
         await pause

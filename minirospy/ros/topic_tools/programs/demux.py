@@ -1,4 +1,4 @@
-"""demux: forward a topic to one of several others, which services select.
+"""demux: forward a topic to one of several others, selected through services.
 
 Topic demux/selected (latched); services demux/select, demux/add, demux/list, demux/delete; ``__none`` selects no output.
 """
@@ -32,7 +32,7 @@ __all__ = ["Demux", "main"]
 
 _USAGE = "\nusage: demux IN_TOPIC OUT_TOPIC1 [OUT_TOPIC2 [...]]\n"
 _FIRST_SUBSCRIBER = 0.5
-"""Seconds for which an output's first message waits for a subscriber to connect, after the topic is advertised."""
+"""Maximum number of seconds for which an output's first message waits for a subscriber, after the topic is advertised."""
 
 
 def main() -> int:
@@ -46,7 +46,7 @@ def main() -> int:
 
 
 class Demux:
-    """Forwards a topic's messages to the selected output, unchanged."""
+    """Forwards a topic's messages unchanged to the selected output."""
 
     def __init__(self, source: str, targets: Sequence[str]) -> None:
         self._lock = threading.RLock()

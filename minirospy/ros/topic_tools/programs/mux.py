@@ -1,4 +1,4 @@
-"""mux: forward one of several topics, which services select.
+"""mux: forward one of several topics, selected through services.
 
 Topic mux/selected (latched); services mux/select, mux/add, mux/list, mux/delete, OUT_select; ``__none`` selects no input.
 Parameters: ~lazy (subscribe only to the selected topic, while the output has subscribers), ~latch, ~initial_topic.
@@ -46,7 +46,7 @@ def main() -> int:
 
 
 class Mux:
-    """Forwards the selected topic's messages, unchanged."""
+    """Forwards the selected topic's messages unchanged."""
 
     def __init__(self, target: str, sources: Sequence[str], *, is_lazy: bool, latch: bool) -> None:
         self._is_lazy = is_lazy

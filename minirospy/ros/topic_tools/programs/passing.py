@@ -1,4 +1,4 @@
-"""The code that the programs share: messages of any type are received and sent as bytes."""
+"""The code that the programs share. Messages of any type are received and sent as bytes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class _Connected(SubscribeListener):
 
 
 class Output:
-    """A topic with the type of the first forwarded message; latched if the input is latched, unless ``latch`` is given."""
+    """A topic with the type of the first forwarded message. It is latched if the input is latched, unless ``latch`` is given."""
 
     def __init__(
         self,
@@ -39,7 +39,10 @@ class Output:
         on_subscriber: Callable[[], object] = lambda: None,
         on_advertised: Callable[[], object] = lambda: None,
     ) -> None:
-        """Create the output. ``latch``: None means the same as the input; ``on_advertised`` is called after the first message."""
+        """Create the output.
+
+        ``latch`` None means the same as the input; ``on_advertised`` is called after the first message.
+        """
         self.topic = _checked(topic)
         self._latch = latch
         self._on_subscriber = on_subscriber
@@ -110,7 +113,7 @@ class Input:
         return self._subscriber is not None
 
     def open(self) -> None:
-        """Subscribe if not subscribed."""
+        """Subscribe, unless already subscribed."""
         with self._lock:
             if self._subscriber is None:
                 self._subscriber = rospy.Subscriber(
@@ -118,7 +121,7 @@ class Input:
                 )
 
     def close(self) -> None:
-        """Unsubscribe if subscribed."""
+        """Unsubscribe, if subscribed."""
         with self._lock:
             subscriber, self._subscriber = self._subscriber, None
         if subscriber is not None:
@@ -126,7 +129,7 @@ class Input:
 
 
 def base_name(topic: str) -> str:
-    """Return the last part of a topic's name, which is used in the node's name. Raise ValueError if it is empty."""
+    """Return the last part of a topic's name, which becomes part of the node's name. Raise ValueError if it is empty."""
     name = _checked(topic).rstrip("/").rpartition("/")[2].lstrip("~")
     if not name:
         raise ValueError(f"[{topic}] is not the name of a topic")
@@ -150,15 +153,15 @@ def run_node(
 ) -> int:
     """Run a program until its node shuts down; return its exit status.
 
-    ``name`` and ``start`` are called with the command-line arguments; if they raise ValueError, it is printed with the usage.
-    ``counts``: the allowed numbers of arguments.
+    ``name`` and ``start`` are called with the command-line arguments; if they raise ValueError, it is printed with the
+    usage. ``counts`` contains the allowed numbers of arguments.
     """
     words = rospy.myargv()[1:]
     try:
         if len(words) not in counts:
             raise ValueError("")
         rospy.init_node(name(words), anonymous=True)
-        # Keep a reference to the subscription or services.
+        # Keep a reference, so that the subscription or the services are not deleted.
         running = start(words)
         rospy.spin()
         del running

@@ -1,7 +1,8 @@
-"""throttle: forward a limited number of messages or bytes per second. drop: drop X of every Y messages.
+"""throttle forwards a limited number of messages or bytes per second. drop drops X of every Y messages.
 
-Parameters of throttle: ~lazy (subscribe only while the output has subscribers), ~wall_clock (use the machine's time, even if
-the node's is simulated), ~force_latch and ~force_latch_value (whether the output is latched, regardless of the input).
+Parameters of throttle: ~lazy (subscribe only while the output has subscribers), ~wall_clock (use the machine's time, even
+if the node's time is simulated), ~force_latch and ~force_latch_value (whether the output is latched, regardless of the
+input).
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ usage: drop IN_TOPIC X Y [OUT_TOPIC]
 """
 
 Passes = Callable[[float, int], bool]
-"""Returns whether a message passes, given the time in seconds and its size in bytes; counts the message if it passes."""
+"""Given the time in seconds and a message's size in bytes, returns whether the message passes; counts it if so."""
 
 
 def main() -> int:
@@ -129,7 +130,7 @@ class ByteLimit:
 
 
 def every(dropped: int, of: int) -> Passes:
-    """Return a filter that drops the first ``dropped`` of every ``of`` messages."""
+    """Return a function that drops the first ``dropped`` of every ``of`` messages."""
     seen = 0
 
     def passes(now: float, size: int) -> bool:
@@ -143,7 +144,7 @@ def every(dropped: int, of: int) -> Passes:
 
 
 class Filter:
-    """Forwards the messages that a filter selects, unchanged."""
+    """Forwards those messages unchanged that a function selects."""
 
     def __init__(
         self,
@@ -158,7 +159,8 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
-        # Handles a subscriber that arrives while the input is being closed: the input must be opened again.
+        # The lock covers a subscriber that arrives while the input is being closed, so that the input is opened
+        # again.
         self._lock = threading.Lock()
 
         self._output = Output(

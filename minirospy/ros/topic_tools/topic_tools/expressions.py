@@ -1,4 +1,4 @@
-"""transform and relay_field: publish the result of a Python expression on a topic's messages or on one of their fields.
+"""transform and relay_field: evaluate a Python expression for each message on a topic, or for a field, and publish the result.
 
 The user writes the expression, on the command line or in a launch file; ``m`` is the message or the field.
 Source: http://wiki.ros.org/topic_tools/transform, http://wiki.ros.org/topic_tools/relay_field.
@@ -91,7 +91,7 @@ def _transform(options: argparse.Namespace) -> rospy.Subscriber[Message]:
     modules: dict[str, ModuleType] = {}
     for name in options.modules:
         try:
-            # For the module tf.transformations, the expression can use the name tf.
+            # Store the top-level module, so that an expression that uses tf.transformations finds the name tf.
             modules[name.partition(".")[0]] = importlib.import_module(name.partition(".")[0])
             importlib.import_module(name)
         except ImportError as error:

@@ -26,7 +26,7 @@ _G = TypeVar("_G")
 _R = TypeVar("_R")
 _F = TypeVar("_F")
 
-# Pause after a list of statuses, per goal in it, so that publishing does not use all the server's time.
+# seconds to pause after publishing a status list, per goal in it, so that publishing does not use all CPU time
 _SECONDS_A_STATUS = 1e-4
 
 _EVENTS = {
@@ -41,7 +41,7 @@ class ServerGoal(Generic[_G, _F]):
 
     def __init__(self, server: ActionServer[_G, Any, _F], message: ActionGoal) -> None:
         self.request = cast("_G", message.goal)  # the goal message
-        self.is_cancel_requested = False  # set if a client has cancelled the goal, or a newer one has arrived
+        self.is_cancel_requested = False  # set when a client cancels the goal, or a newer goal preempts it
         self.text = ""  # the text sent with the goal's final status
         self._server = server
         self._status = GoalStatus(goal_id=cast("GoalID", message.goal_id))
@@ -69,10 +69,10 @@ class ServerGoal(Generic[_G, _F]):
             self._status.status, self._status.text = int(state), text
 
     def _make_way(self) -> None:
-        """Cancel the task that executes the goal. Repeated calls have no effect."""
+        """Cancel the goal's task, because the goal was cancelled or preempted. Repeated calls have no effect."""
         if self._task and not self.is_cancel_requested:
             self.is_cancel_requested = True
-            # A task that is cancelled before it starts would end without sending the client a result.
+            # If a task is cancelled before it starts, it never runs, and the client would get no result.
             if self._has_begun:
                 self._task.cancel()
 
