@@ -87,7 +87,7 @@ class Identity:
         return names.namespace_of(self.name) if self._namespace is None else self._namespace
 
     def be_called(self, name: str, namespace: str | None = None) -> None:
-        """Use the global name ``name`` until :meth:`take_name` is called; ``namespace``, if given, is reported as its namespace."""
+        """Use the global name ``name`` until :meth:`take_name` is called; report ``namespace``, if given, as its namespace."""
         self._name = name
         self._namespace = namespace
 
