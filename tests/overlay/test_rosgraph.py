@@ -159,3 +159,23 @@ def test_master_of_a_command_line_is_the_first_and_is_complete() -> None:
     for argument in ("__master:=", "__master:=a:=b"):
         with pytest.raises(ValueError, match="improperly specified"):
             get_master_uri(environment, [argument])
+
+
+def test_a_program_replaces_the_master_that_is_called(master: str) -> None:
+    client = rosgraph.Master("/tester")
+    assert client.is_online()
+    client.handle.getPid = lambda caller_id: (1, "", [caller_id])
+    assert client.getPid() == ["/tester"]
+    del client.handle
+    assert client.getPid() > 0
+    client.handle = ServerProxy("http://localhost:1")
+    assert not client.is_online()
+
+
+def test_a_master_changes_its_uri_and_its_caller(master: str) -> None:
+    client = rosgraph.Master("/tester", "http://localhost:1")
+    assert not client.is_online()
+    client._reinit(master)
+    client.caller_id = "/other"
+    client.registerService("/serve", "rosrpc://localhost:3", "http://localhost:1")
+    assert client.getSystemState()[2] == [["/serve", ["/other"]]]

@@ -11,6 +11,7 @@ from minirospy.ros.actionlib.actionlib import (
     StatusTracker,
     nop_cb,
 )
+from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "ActionException",
@@ -24,3 +25,5 @@ __all__ = [
     "StatusTracker",
     "nop_cb",
 ]
+
+__getattr__ = modules_on_first_use("actionlib.action_server", "rospy threading")

@@ -44,6 +44,7 @@ from minirospy.ros.rosbag.rosbag.private import (
     nanoseconds_of,
 )
 from minirospy.ros.rosbag.rosbag.readers import _BagReader, _BagReader200
+from minirospy.ros.submodules import modules_on_first_use
 
 if TYPE_CHECKING:
     from minirospy.base.times import Time
@@ -72,7 +73,12 @@ __all__ = [
     "found_lz4",
 ]
 
-found_lz4 = True  # set if LZ4 is available; programs check this name
+__getattr__ = modules_on_first_use(
+    "rosbag.bag",
+    "bisect bz2 collections genmsg genpy heapq os re roslib rospy struct sys threading time yaml",
+)
+
+found_lz4 = True  # whether LZ4 is available; programs check this name
 
 
 class Compression:

@@ -11,8 +11,10 @@ from typing import Any
 
 import rospy.client
 import rospy.core
+import rospy.names
 import rospy.rostime
 
+from minirospy.client.identity import Identity
 from minirospy.client.session import current_session, replace_session
 from minirospy.client.time import get_rostime
 from minirospy.ros.rospy.rospy.rostime import (
@@ -75,4 +77,27 @@ _install(
     rospy.rostime,
     _rostime_initialized=(is_rostime_initialized, set_rostime_initialized),
     _rostime_current=(lambda: None if is_wallclock() else get_rostime(), set_rostime),
+)
+
+
+def _identity() -> Identity:
+    return current_session().identity
+
+
+_install(
+    rospy.names,
+    _mappings=(lambda: _identity().mappings, lambda value: setattr(_identity(), "mappings", value)),
+    _resolved_mappings=(
+        lambda: _identity().remappings,
+        lambda value: setattr(_identity(), "remappings", value),
+    ),
+    # A new name keeps the namespace, as in rospy, where the two are separate variables.
+    _caller_id=(
+        lambda: _identity().name,
+        lambda value: _identity().be_called(value, _identity().namespace),
+    ),
+    _caller_namespace=(
+        lambda: _identity().namespace,
+        lambda value: _identity().be_called(_identity().name, value),
+    ),
 )

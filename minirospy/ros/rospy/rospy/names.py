@@ -26,6 +26,7 @@ from minirospy.ros.ros_names import (
     ns_join,
 )
 from minirospy.ros.rosgraph.rosgraph.names import resolve_name as resolve_name_for
+from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "ANYTYPE",
@@ -64,9 +65,13 @@ __all__ = [
     "valid_name_validator_unresolved",
 ]
 
+__getattr__ = modules_on_first_use("rospy.names", "os rosgraph struct sys")
 
-def _set_caller_id(name: str) -> None:
-    current_session().identity.be_called(name)
+
+def _set_caller_id(caller_id: str) -> None:
+    """Use another node name, without telling the master. Raise ValueError if ``caller_id`` is None."""
+    namespace(caller_id)
+    current_session().identity.be_called(caller_id)
 
 
 ANYTYPE = TOPIC_ANYTYPE = SERVICE_ANYTYPE = "*"
@@ -87,16 +92,16 @@ class ParameterInvalid(Exception):
 
 
 def get_mappings() -> dict[str, str]:
-    """Return the remappings as written on this node's command line, including ``__name`` and other special keys."""
-    arguments = current_session().identity.arguments
-    return {**arguments.remappings, **arguments.special}
+    """Return the remappings on this node's command line as written, including ``__name`` and other special keys.
+
+    :func:`initialize_mappings` applies changes to the dict.
+    """
+    return current_session().identity.mappings
 
 
 def get_resolved_mappings() -> dict[str, str]:
-    """Return the remappings with global names; empty before init_node."""
-    session = current_session()
-    identity = session.identity
-    return {**identity.remappings, **identity.arguments.special} if session.initialized else {}
+    """Return the remappings with global names; empty before init_node. Changes to the dict apply at once."""
+    return current_session().identity.remappings
 
 
 def reload_mappings(argv: Sequence[str]) -> None:
@@ -105,9 +110,10 @@ def reload_mappings(argv: Sequence[str]) -> None:
 
 
 def initialize_mappings(node_name: str) -> None:
-    """Resolve the remappings again, with the node name ``node_name``."""
+    """Resolve the remappings again, with the node name ``node_name``. Raise ValueError if it is None."""
+    namespace(node_name)
     identity = current_session().identity
-    identity.remappings = identity.arguments.resolved_remappings(node_name)
+    identity.remappings = identity.resolved_mappings(node_name)
 
 
 def resolve_name_without_node_name(name: str) -> str:
