@@ -271,6 +271,9 @@ class Session:
                 "shutdown request" + (f": {request[1]}" if (request := _REQUEST.match(reason)) else ""),
                 flush=True,
             )
+        if not self.lifecycle.is_shutdown_requested:
+            # Called after the hooks, when is_shutdown() has become true.
+            self.lifecycle.interrupts.append(self.signals.interrupt_later)
         self.lifecycle.signal_shutdown(reason)
 
     def _on_parameter(self, key: str, value: object) -> None:
