@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from minirospy.base.clock import Clock, WallClock, wait_for_event
 from minirospy.base.errors import ROSInitException
+from minirospy.client.callback_errors import CallbackErrors
 from minirospy.client.identity import Identity
 from minirospy.client.lifecycle import Lifecycle
 from minirospy.client.signals import SignalWatchdog
@@ -50,6 +51,8 @@ class Session:
         self.lifecycle = Lifecycle(self._leave)
         self.signals = SignalWatchdog(self.lifecycle, self._stop_leaving, self._is_sending)
 
+        self.callback_errors = CallbackErrors()
+        self.lifecycle.late_hooks.append(self.callback_errors.close)
         self.lock = threading.RLock()  # orders registrations, and guards the tables
         self.clock: Clock = previous.clock if previous else WallClock()
         # Notified of each new simulated time
