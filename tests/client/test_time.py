@@ -175,3 +175,36 @@ print(timer.is_alive(), other.is_alive(), rospy.is_shutdown())
         "ERROR Timer ends: its callback <function callback> called sys.exit(3)",
         "False True False",
     ]
+
+
+@pytest.mark.parametrize(
+    "sleep",
+    [
+        "rospy.sleep(1)",
+        "rospy.Rate(1).sleep()",
+        "rospy.Timer(rospy.Duration(1), print, oneshot=True).join()",
+    ],
+)
+def test_sleep_without_clock_names_it_once(sleep: str) -> None:
+    program = f"""
+{LOG}
+from minirospy.base import clock
+import rospy.rostime
+clock._SILENT_SECONDS = 0.1
+rospy.set_param("/use_sim_time", True)
+rospy.init_node("case")
+print_log()
+logged = threading.Event()
+class Handler(logging.Handler):
+    def emit(self, record):
+        logged.set()
+logging.getLogger("rosout").addHandler(Handler())
+for _ in range(2):
+    threading.Thread(target=lambda: {sleep}, daemon=True).start()
+logged.wait()
+threading.Event().wait(0.5)
+"""
+    assert run(program) == [
+        "WARNING /use_sim_time is set, and no time has arrived on /clock yet: sleep(), Rate and Timer wait for it. Start the "
+        "simulator or `rosbag play --clock`; or type `rosparam set use_sim_time false`, and restart this node"
+    ]
