@@ -23,6 +23,8 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
 import minirospy
 from minirospy import Node
 from minirospy.aio.raw import RawService, raw_class
+from minirospy.base import clock as clock_module
+from minirospy.base.clock import SILENT_CLOCK
 from minirospy.base.errors import (
     MasterUnreachableError,
     ROSException,
@@ -866,6 +868,27 @@ def test_simulated_time(master: str) -> None:
                 with pytest.raises(ROSTimeMovedBackwardsException) as raised:
                     await sleeping
                 assert raised.value.time == 12
+
+    run(main)
+
+
+def test_silent_clock_is_reported_once(
+    master: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 0.0)
+
+    async def main() -> None:
+        async with Node("n") as setting:
+            await setting.set_param("/use_sim_time", True)
+        async with Node("n") as node:
+            sleeping = [asyncio.ensure_future(node.sleep(5)) for _ in range(2)]
+            await until(lambda: SILENT_CLOCK in caplog.messages)
+            assert not any(sleep.done() for sleep in sleeping)
+            node.shutdown()
+            assert [type(error) for error in await asyncio.gather(*sleeping, return_exceptions=True)] == [
+                ROSInterruptException
+            ] * 2
+        assert caplog.messages.count(SILENT_CLOCK) == 1
 
     run(main)
 

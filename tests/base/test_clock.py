@@ -166,6 +166,22 @@ def test_sleep_before_the_first_time_starts_at_it() -> None:
     assert sleeping.end() is True
 
 
+def test_silent_clock_is_reported_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    reports: list[str] = []
+    clock = SimulatedClock(on_silence=lambda: reports.append("silent"))
+    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 1000.0)
+    sleeping = Sleeping(clock, SECOND)
+    sleeping.at(0)
+    assert reports == []
+    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 0.0)
+    sleeping.at(0)
+    sleeping.at(0)
+    assert reports == ["silent"]
+    sleeping.at(5 * SECOND)
+    clock.set(6 * SECOND)
+    assert sleeping.end() is True
+
+
 @pytest.mark.parametrize("now", [5 * SECOND, 0])
 def test_time_that_jumps_back_raises(now: int) -> None:
     clock = SimulatedClock(10 * SECOND)

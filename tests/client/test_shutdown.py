@@ -128,6 +128,54 @@ def test_a_second_signal_takes_the_place_of_the_interrupt(machine: ShutdownMachi
     assert timeline(machine, 0.5, 10.0) == [(2.0, Action.REPORT)]
 
 
+@pytest.mark.parametrize(
+    ("awareness", "interrupted_at"),
+    [
+        (Awareness.NONE, 12.0),
+        (Awareness.POLLS, 15.0),
+        (Awareness.CUT_SHORT, 15.0),
+        (Awareness.NOTIFIED, None),
+    ],
+)
+def test_request_interrupts_a_main_thread_that_goes_on(
+    machine: ShutdownMachine, awareness: Awareness, interrupted_at: float | None
+) -> None:
+    machine.main.awareness = awareness
+    machine.phase = Phase.HOOKS
+    machine.is_requested = True
+    # However long hooks take, the main thread is not interrupted meanwhile.
+    assert timeline(machine, 0.0, 9.9) == []
+    machine.phase = Phase.LEAVING
+    expected = [] if interrupted_at is None else [(interrupted_at, Action.INTERRUPT)]
+    assert timeline(machine, 10.0, 100.0) == expected
+
+
+def test_request_does_not_interrupt_a_main_thread_that_sees_it_in_time(machine: ShutdownMachine) -> None:
+    machine.main.awareness = Awareness.POLLS
+    machine.is_requested = True
+    machine.phase = Phase.LEFT
+    assert timeline(machine, 0.0, 4.9) == []
+    machine.main.awareness = Awareness.NOTIFIED
+    assert timeline(machine, 5.0, 100.0) == []
+
+
+def test_a_signal_after_a_request_shortens_the_wait(machine: ShutdownMachine) -> None:
+    machine.is_requested = True
+    machine.phase = Phase.LEFT
+    assert timeline(machine, 0.0, 0.9) == []
+    machine.signal(1.0)
+    assert timeline(machine, 1.0, 10.0) == [(1.0, Action.INTERRUPT), (3.0, Action.REPORT)]
+
+
+def test_a_signal_after_a_request_leaves_a_loop_that_polls_its_time(machine: ShutdownMachine) -> None:
+    machine.main.awareness = Awareness.POLLS
+    machine.is_requested = True
+    machine.phase = Phase.LEFT
+    machine.tick(0.0)
+    machine.signal(1.0)
+    assert timeline(machine, 1.0, 10.0) == [(3.0, Action.REPORT), (5.0, Action.INTERRUPT)]
+
+
 @pytest.fixture
 def lifecycle() -> Lifecycle:
     return Lifecycle(lambda: None)
