@@ -1,4 +1,4 @@
-"""Submodules that ROS's packages import with themselves: here each is imported when a program first uses it."""
+"""Submodules and other names that ROS's modules import for themselves: here each is imported when a program first uses it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from importlib import import_module
 from types import ModuleType
 
-__all__ = ["on_first_use"]
+__all__ = ["import_passed_on", "on_first_use"]
 
 
 def on_first_use(package: str, *names: str) -> Callable[[str], ModuleType]:
@@ -18,3 +18,12 @@ def on_first_use(package: str, *names: str) -> Callable[[str], ModuleType]:
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
 
     return find
+
+
+def import_passed_on(namespace: dict[str, object], name: str, place: str) -> object:
+    """Return what ``place``, `MODULE` or `MODULE:NAME`, means, and keep it in a module's ``namespace`` as ``name``."""
+    module, _, inner = place.partition(":")
+    found: object = import_module(module)
+    if inner:
+        found = getattr(found, inner)
+    return namespace.setdefault(name, found)
