@@ -3,7 +3,8 @@
 They re-export names from the modules of the same names here.
 
 The names that `import rosgraph.masterapi` provides are in `ros/rosgraph/rosgraph/masterapi.py`; the module in `overlay/`
-re-exports the names in `__all__`, and those that the module imports in the form `from x import y as y`. The build writes
+re-exports the names in `__all__`, and those that the module imports in the form `from x import y as y`. It finds the names that
+a star brings in real ROS from elsewhere (`os`, `rospy`: passed_on.py) when a program first uses them. The build writes
 `overlay/` (hatch_build.py), and `python -m minirospy.ros.overlay_modules` writes it again. This module reads the sources
 without importing them.
 """
@@ -18,9 +19,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from minirospy.ros.passed_on import PASSED_ON
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES
 
-__all__ = ["Origin", "exported", "modules", "overlay_files", "write_overlay"]
+__all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "write_overlay"]
 
 PACKAGE = Path(__file__).parents[1]
 _ALSO = {"RPi": PACKAGE / "board" / "pins"}
@@ -165,18 +167,67 @@ def _text(name: str, source: Path) -> str:
     where = source.relative_to(PACKAGE).as_posix()
     lines = [f'"""{name}, provided by minirospy: {_GENERATED}{where}."""', ""]
     by_module: dict[str, list[str]] = {}
-    for bound, (module, imported) in exported(source).items():
+    names_here = exported(source)
+    public = _read(source).public
+    passed_on = _passed_on(name, listed(source))
+    hook = names_here.pop("__getattr__", None) if passed_on else None
+    if hook:
+        names_here["_find_more"] = hook
+    for bound, (module, imported) in names_here.items():
         if imported:
             by_module.setdefault(module, []).append(f"{imported} as {bound}")
         else:
             lines.append(f"import {module} as {bound}")
     for module, names in by_module.items():
         lines += [f"from {module} import (", *_wrapped(names), ")"]
-    public = _read(source).public
     if public is not None:
-        listed = [f'"{each}"' for each in sorted(public) if not each.startswith("_")]
-        lines += ["", "__all__ = [", *_wrapped(listed), "]"]
+        lines += ["", "__all__ = [", *_wrapped(f'"{each}"' for each in listed(source)), "]"]
+    if passed_on:
+        here = [each for each in passed_on if each in names_here]
+        later = {each: place for each, place in passed_on.items() if each not in names_here}
+        start = "+=" if public is not None else "="
+        lines += _text_of_passed_on(
+            name, f"__all__ {start} {[*here]!r}".replace("'", '"'), later, has_hook=hook is not None
+        )
     return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def listed(source: Path) -> list[str]:
+    """Return the public names in the ``__all__`` of the module in a file."""
+    return sorted(name for name in _read(source).public or () if not name.startswith("_"))
+
+
+def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
+    """Return the names that a module's star brings from elsewhere, without its own: name -> `MODULE` or `MODULE:NAME`."""
+    found = {}
+    for place, names in PASSED_ON.get(module, {}).items():
+        for each in names.split():
+            name, _, there = each.partition("=")
+            found[name] = ":".join(filter(None, (place, there or name)))
+    return {name: found[name] for name in sorted(found.keys() - set(own))}
+
+
+def _text_of_passed_on(module: str, all_here: str, names: dict[str, str], has_hook: bool) -> list[str]:
+    """Return the lines that find these names at first use; type checkers and editors do not see them."""
+    missing = f"raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")"
+    return [
+        "",
+        "import typing as _typing",
+        "",
+        "if not _typing.TYPE_CHECKING:",
+        "    from minirospy.ros.submodules import import_passed_on as _import_passed_on",
+        "",
+        "    _PASSED_ON = {",
+        *(f"    {line}" for line in _wrapped(f'"{name}": "{place}"' for name, place in names.items())),
+        "    }",
+        f"    {all_here}",
+        "    __all__ += _PASSED_ON",
+        "",
+        "    def __getattr__(name):",
+        "        if name in _PASSED_ON:",
+        "            return _import_passed_on(globals(), name, _PASSED_ON[name])",
+        f"        {'return _find_more(name)' if has_hook else missing}",
+    ]
 
 
 def _wrapped(words: Iterable[str]) -> list[str]:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import ast
 import importlib
+import math
 import os
+import subprocess
+import sys
+import xmlrpc.client
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from minirospy.ros import overlay_modules
 from minirospy.ros.overlay_modules import PACKAGE, Origin, exported, modules, overlay_files, write_overlay
+from minirospy.ros.passed_on import PASSED_ON
 
 OVERLAY = PACKAGE / "overlay"
 NAMES = sorted(
@@ -33,7 +39,38 @@ def test_module_offers_what_its_source_names(name: str) -> None:
     module = importlib.import_module(name)
     listed = names_of(modules()[name])
     assert [each for each in listed if not hasattr(module, each)] == []
-    assert sorted(getattr(module, "__all__", [])) == sorted(each for each in listed if each[0] != "_")
+    later = getattr(module, "__all__", [])[len([each for each in listed if each[0] != "_"]) :]
+    assert sorted(set(getattr(module, "__all__", [])) - set(later)) == sorted(
+        each for each in listed if each[0] != "_"
+    )
+    assert set(later) == set(overlay_modules._passed_on(name, listed))
+
+
+@pytest.mark.parametrize("name", sorted(PASSED_ON))
+def test_star_brings_what_it_brings_in_real_ros(name: str) -> None:
+    names: dict[str, object] = {}
+    exec(f"from {name} import *", names)
+    assert set(overlay_modules._passed_on(name, [])) <= names.keys()
+
+
+def test_name_from_elsewhere_is_the_object_there() -> None:
+    import rosmaster.util
+    import rosnode
+
+    assert (rosnode.rosgraph, rosnode.sys) == (importlib.import_module("rosgraph"), sys)
+    assert rosmaster.util.ServerProxy is xmlrpc.client.ServerProxy
+    assert "os" not in vars(importlib.import_module("rospy.timer"))  # not in that of ROS either
+
+
+def test_names_from_elsewhere_are_imported_at_first_use() -> None:
+    program = "import sys, rosnode; print('optparse' in sys.modules); rosnode.OptionParser; print('optparse' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", f"import sys; sys.path[:] = {sys.path!r}; {program}"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == ["False", "True"]
 
 
 def test_every_package_with_a_python_module_is_offered() -> None:
@@ -112,6 +149,25 @@ def test_names_are_imported_from_where_they_are_defined(sources: Path) -> None:
         "time": Origin("time", ""),
     }
     assert exported(sources / "__init__.py") == {"first": Origin("pack", "first")}
+
+
+def test_missing_name_is_an_attribute_error(
+    sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        overlay_modules, "PASSED_ON", {"pack": {"": "os dom=xml.dom", "math": "pi tau=e run"}}
+    )
+    (sources / "__init__.py").write_text("__all__ = ['run']\nrun = 1\n")
+    text = overlay_files()["pack/__init__.py"]
+    start = text.index("import typing")
+    names: dict[str, Any] = {"__all__": ["run"], "__name__": "pack"}
+    exec(text[start:], names)
+    assert names["__all__"] == ["run", "dom", "os", "pi", "tau"]
+    found = names["__getattr__"]
+    assert (found("os"), found("tau")) == (os, math.e)
+    assert names["os"] is os
+    with pytest.raises(AttributeError, match="module 'pack' has no attribute 'nope'"):
+        found("nope")
 
 
 @pytest.mark.parametrize(
