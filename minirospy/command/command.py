@@ -92,7 +92,7 @@ class WordedError(MinirospyError):
 Wording = Mapping[str, RosText]
 """ROS's messages by the kind of a NotFoundError, ``no answer from`` + the kind of a NodeUnreachableError, or ``master``."""
 
-NO_MASTER = RosText("ERROR: Unable to communicate with master!")
+NO_MASTER = RosText(f"ERROR: {MasterUnreachableError.ros_text}")
 
 
 def ros_words(error: Exception, wording: Wording) -> RosText:

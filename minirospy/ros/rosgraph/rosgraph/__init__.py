@@ -4,7 +4,6 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from minirospy.base.names import parse_arguments
 from minirospy.ros.submodules import on_first_use
 
 if TYPE_CHECKING:
@@ -42,5 +41,8 @@ __getattr__ = on_first_use("rosgraph", "roslogging", "xmlrpc")
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:
-    """Return the command line without remappings and private parameters, as `rospy.myargv` does."""
-    return parse_arguments(sys.argv if argv is None else argv).plain
+    """Return the command line without each argument that contains ``:=``.
+
+    `rospy.myargv` keeps those that do not start with a name.
+    """
+    return [argument for argument in (sys.argv if argv is None else argv) if ":=" not in argument]
