@@ -55,8 +55,8 @@ class Command(NamedTuple):
 class Verb(NamedTuple):
     """One verb of a family: its name, one line of help, its parser, and the function that is called with the parsed arguments.
 
-    Without a line of help, the family's help does not list the verb. In a family that is a node, the function also takes ``arguments``, the remapping arguments. ``wording`` contains ROS's
-    messages for this verb's errors.
+    Without a line of help, the family's help does not list the verb. In a family that is a node, the function also takes
+    ``arguments``, the remapping arguments. ``wording`` contains ROS's messages for this verb's errors.
     """
 
     name: str

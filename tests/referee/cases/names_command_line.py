@@ -8,7 +8,20 @@ import rosgraph.network as network
 import rospy
 from referee import outcome, show
 
-WORDS = ["a", "b:=c", "d", "e=:=f", "__x:=1", "http://x:=y", ":=", "a b:=c d", "x:=", "_p:=1", ":=z", "--f:=1"]
+WORDS = [
+    "a",
+    "b:=c",
+    "d",
+    "e=:=f",
+    "__x:=1",
+    "http://x:=y",
+    ":=",
+    "a b:=c d",
+    "x:=",
+    "_p:=1",
+    ":=z",
+    "--f:=1",
+]
 show("# myargv")
 show(rosgraph.myargv(WORDS))
 show(rospy.myargv(WORDS))
