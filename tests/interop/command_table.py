@@ -88,9 +88,10 @@ rosnode list a b
 rosnode info /scene
 rosnode info -q scene
 rosnode info scene /scene -q
-rosnode info nope -q scene ## {_UNKNOWN}
+rosnode info nope -q scene
+rosnode info nope
 rosnode info
-rosnode info ~x -q ## {_UNKNOWN}
+rosnode info ~x -q
 rosnode list -ua
 rosnode machine
 rosnode machine localhost
@@ -99,7 +100,8 @@ rosnode ping -c 1 scene
 rosnode ping -c 2 scene
 rosnode ping -a
 rosnode ping -a -c 2
-rosnode ping nope ## {_UNKNOWN}
+rosnode ping nope
+rosnode ping -c 1 nope
 rosnode ping -c x scene
 rosnode ping scene -c1
 rosnode kill -a scene
@@ -122,6 +124,8 @@ rosservice args /ns/empty
 rosservice args /nope
 rosservice uri /set_led_state
 rosservice uri /nope
+rosservice node /set_led_state
+rosservice node /nope
 rosservice find std_srvs/SetBool
 rosservice find nope
 rosservice call /set_led_state True
@@ -257,6 +261,7 @@ rosservice find -h
 rosservice info -h
 rosservice list -h
 rosservice type -h
+rosservice node -h
 rosservice uri -h
 rosparam set -h
 rosparam get -h
@@ -308,6 +313,7 @@ rosservice info --nonsense
 rosservice list --nonsense
 rosservice type --nonsense
 rosservice uri --nonsense
+rosservice node --nonsense
 rosparam set --nonsense
 rosparam get --nonsense
 rosparam load --nonsense
@@ -344,6 +350,8 @@ rosservice find
 rosservice find a b
 rosservice info
 rosservice type
+rosservice node
+rosservice node a b
 rosservice list a b
 rosparam load
 rosparam set
@@ -519,11 +527,11 @@ rosparam list
 rosparam delete
 """
 
-UNREACHABLE = f"""
+UNREACHABLE = """
 rosnode info dead
 rosnode info unresolved
-rosnode ping -c 1 dead ## {_STATUS.format(1)}
-rosnode ping -c 1 unresolved ## {_STATUS.format(1)}
+rosnode ping -c 1 dead
+rosnode ping -c 1 unresolved
 rosnode cleanup <<< n\\n
 rosservice type /dead/srv
 rosservice info /dead/srv
@@ -531,6 +539,7 @@ rosservice args /dead/srv
 rosservice call /dead/srv
 rosservice call /unresolved/srv 1
 rosservice uri /dead/srv
+rosservice node /dead/srv
 rostopic info /t/dead
 rostopic type /t/dead
 rosnode machine
@@ -552,12 +561,25 @@ rosnode list
 rosnode info /a
 rosnode ping /a
 rosnode cleanup
+rosnode machine
+rosnode kill /a
 rosservice list
 rosservice call /a
+rosservice node /a
+rosservice uri /a
+rosgraph
 rosparam list
+rosparam dump
+rosparam delete /a
 rosparam get /a
 rosparam set /a 1
 rosparam load values.yaml
+rosrun topic_tools relay
+rosrun topic_tools throttle messages
+rosrun topic_tools drop a 1
+rosrun topic_tools drop a 1 0
+rosrun topic_tools mux a
+rosrun topic_tools mux_select a
 """
 
 OTHER_WORDS = {"rostopic pub -1 -v /out geometry_msgs/Point 1 -2.5 -3"}
@@ -685,6 +707,11 @@ def unexpected(rows: Iterable[Row]) -> str:
 def other_words(rows: Iterable[Row]) -> set[str]:
     """Return the command lines for which ROS has an error message that minirospy does not print first."""
     return {row.typed for row in rows if row.has_ros_words and not row.same_words}
+
+
+def more_words(rows: Iterable[Row]) -> set[str]:
+    """Return the command lines for which ROS prints an error, and minirospy more than that."""
+    return {row.typed for row in rows if row.has_ros_words and row.ours.err != row.real.err}
 
 
 def page(sections: dict[str, list[Row]]) -> str:

@@ -17,9 +17,18 @@ import rosgraph.xmlrpc
 import rostopic
 
 
-def test_myargv_has_the_rule_of_rospy() -> None:
+def test_myargv_drops_every_argument_with_an_assignment() -> None:
     words = ["prog", "a:=b", "--flag:=x", "http://h:=1", "_p:=1", "__name:=n", "-v"]
-    assert rosgraph.myargv(words) == ["prog", "--flag:=x", "http://h:=1", "-v"]
+    assert rosgraph.myargv(words) == ["prog", "-v"]
+
+
+def test_local_processes_ignore_an_address_on_the_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", ["prog", "__ip:=192.0.2.1"])
+    monkeypatch.delenv("MINIROSPY_LOCAL", raising=False)
+    assert rosgraph.network.get_host_name() == "192.0.2.1"
+    monkeypatch.setenv("MINIROSPY_LOCAL", "1")
+    assert rosgraph.network.get_address_override() == "localhost"
+    assert rosgraph.network.get_bind_address() == "127.0.0.1"
 
 
 def test_the_graph_as_edges(master: str) -> None:

@@ -38,6 +38,7 @@ FAMILY = Family(
     interrupted=INTERRUPTED,
     summary="record, play and change bags",
     help_status=HelpStatus(0, 0, 0, 0),
+    wording={},
 )
 """The verbs. `rosbag -h` lists those that ROS also has, in alphabetical order."""
 

@@ -174,4 +174,5 @@ FAMILY = Family(
     ),
     "Type rosconsole <command> -h for more detailed usage, e.g. 'rosconsole list -h'",
     is_node=True,
+    wording={},
 )

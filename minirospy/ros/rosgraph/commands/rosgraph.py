@@ -78,7 +78,13 @@ def _text(nodes: dict[str, Neighbours], services: Sequence[str]) -> str:
     return "\n".join([*lines, ""])
 
 
-COMMAND = Command("rosgraph", _parser, _rosgraph, wording={"master": NO_MASTER}, misuse_status=_MISUSE)
+COMMAND = Command(
+    "rosgraph",
+    _parser,
+    _rosgraph,
+    wording={"master": NO_MASTER._replace(status=0)},
+    misuse_status=_MISUSE,
+)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -4,8 +4,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from minirospy.base.names import parse_arguments
-from minirospy.ros.submodules import modules_on_first_use
+from minirospy.ros.submodules import on_first_use
 
 if TYPE_CHECKING:
     from minirospy.ros.rosgraph.rosgraph import masterapi as masterapi
@@ -42,5 +41,8 @@ __getattr__ = modules_on_first_use("rosgraph", "roslogging=rosgraph.roslogging s
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:
-    """Return the command line without remappings and private parameters, as `rospy.myargv` does."""
-    return parse_arguments(sys.argv if argv is None else argv).plain
+    """Return the command line without each argument that contains ``:=``.
+
+    `rospy.myargv` keeps those that do not start with a name.
+    """
+    return [argument for argument in (sys.argv if argv is None else argv) if ":=" not in argument]

@@ -318,9 +318,12 @@ class _File:
                 raise tag.error(
                     f"<machine>: '{key}' is not supported since ROS Fuerte: use env-loader instead"
                 )
-        if tag.element.children:
-            child = next(tag.children())
-            raise child.error(f"<machine>: <{child.name}> has no place in it: use env-loader instead")
+        for child in tag.children():
+            if child.name == "env":
+                raise child.error(
+                    "<machine>: <env> tag is not supported since ROS Fuerte: use env-loader instead"
+                )
+            self._spec.warnings.append(child.error(f"unrecognized '{child.name}' tag in <machine> tag"))
 
         timeout = tag.number("timeout", 10.0)
         if timeout <= 0:

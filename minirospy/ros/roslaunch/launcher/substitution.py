@@ -181,14 +181,14 @@ def convert(text: str, type_: str) -> object:
 
     Raise ValueError if the type is unknown or the text does not match it.
     """
-    kind = type_.lower()
+    kind = type_.strip().lower()
     if kind in ("", "auto"):
         return _guess(text)
     if kind in ("str", "string"):
         return text
     if kind == "int":
         return int(text)
-    if kind in ("double", "float"):
+    if kind == "double":  # ROS refuses "float"
         return float(text)
     if kind in ("bool", "boolean"):
         if text.strip().lower() not in ("true", "1", "false", "0"):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import logging
 import socket
 import uuid
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 from xml.sax.saxutils import escape
@@ -211,8 +212,8 @@ class Node:
         args: str | None = "",
         respawn: bool = False,
         respawn_delay: float = 0.0,
-        remap_args: Iterable[tuple[str, str]] | None = None,
-        env_args: Iterable[tuple[str, str]] | None = None,
+        remap_args: Sequence[Sequence[str]] | None = None,
+        env_args: Sequence[tuple[str, str]] | None = None,
         output: str | None = None,
         cwd: str | None = None,
         launch_prefix: str | None = None,
@@ -246,8 +247,9 @@ class Node:
         self.machine: Machine | None = None
         self.process_name: str | None = None
 
-        self.remap_args = [list(pair) for pair in remap_args or ()]
-        self.env_args = [tuple(pair) for pair in env_args or ()]
+        # The caller's own list, as in ROS, also if the caller changes it later.
+        self.remap_args: Sequence[Sequence[str]] = remap_args or []
+        self.env_args: Sequence[tuple[str, str]] = env_args or []
         self.output = output
         self.cwd = cwd
         self.launch_prefix = launch_prefix or None
@@ -259,8 +261,8 @@ class Node:
         """Convert a node from a launch file."""
         return cls(
             spec.package, spec.type, spec.base_name, spec.namespace, spec.machine or None, spec.args, spec.respawn,
-            spec.respawn_delay, spec.remaps, spec.env, spec.output or None, spec.cwd or None, spec.launch_prefix, spec.required,
-            spec.file,
+            spec.respawn_delay, [[*pair] for pair in spec.remaps], [*spec.env], spec.output or None, spec.cwd or None,
+            spec.launch_prefix, spec.required, spec.file,
         )  # fmt: skip
 
     def give_name(self) -> None:
@@ -339,8 +341,8 @@ class Test(Node):
         namespace: str | None = "/",
         machine_name: str | None = None,
         args: str | None = "",
-        remap_args: Iterable[tuple[str, str]] | None = None,
-        env_args: Iterable[tuple[str, str]] | None = None,
+        remap_args: Sequence[Sequence[str]] | None = None,
+        env_args: Sequence[tuple[str, str]] | None = None,
         time_limit: float | None = None,
         cwd: str | None = None,
         launch_prefix: str | None = None,
@@ -379,8 +381,9 @@ class Test(Node):
         """Convert a test from a launch file."""
         node = spec.node
         return cls(
-            spec.test_name, node.package, node.type, node.base_name, node.namespace, node.machine or None, node.args, node.remaps,
-            node.env, spec.time_limit, node.cwd or None, node.launch_prefix, spec.retry, node.file,
+            spec.test_name, node.package, node.type, node.base_name, node.namespace, node.machine or None, node.args,
+            [[*pair] for pair in node.remaps], [*node.env], spec.time_limit, node.cwd or None, node.launch_prefix, spec.retry,
+            node.file,
         )  # fmt: skip
 
 
@@ -404,7 +407,10 @@ class _Handler:
 
     def __call__(self, level: int, text: str) -> None:
         if (level >= ERROR) == self.errors:
-            self._function(text)
+            try:
+                self._function(text)
+            except Exception:  # the program's own function; as in ROS, the line is printed anyway
+                logging.getLogger("roslaunch").debug("a handler of roslaunch's output raised", exc_info=True)
 
 
 def add_printlog_handler(h: Callable[[str], object]) -> None:

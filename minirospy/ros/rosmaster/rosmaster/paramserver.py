@@ -28,10 +28,12 @@ class ParamDictionary:
         return self._tree.names()
 
     def search_param(self, ns: str, key: str) -> str | None:
-        """Return the name of the closest parameter, searching upwards from a namespace.
+        """Return the closest parameter, searched from a namespace upwards.
 
-        Raise ValueError if the namespace is not global.
+        Raise ValueError if the key is empty or private, or the namespace is not global.
         """
+        if not key or key[0] == "~":
+            raise ValueError("invalid key")
         if not ns or ns[0] != "/":
             raise ValueError("namespace must be global")
         return self._tree.search(ns, key)

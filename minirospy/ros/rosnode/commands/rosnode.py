@@ -84,7 +84,7 @@ def _ping(node: str | None, all: bool, count: int) -> int:
         try:
             return _ping_one(graph, find_node(graph, name), count)
         except NodeUnreachableError as error:
-            raise WordedError(error, RosText(_no_answer(error))) from error
+            raise WordedError(error, RosText(_no_answer(error), 0)) from error
 
 
 def _no_node_to_ping() -> Misuse:
@@ -124,15 +124,13 @@ def _ping_one(graph: Graph, node: NodeAddress, count: int) -> int:
 def _ping_all(graph: Graph) -> int:
     nodes = graph.addresses(list_nodes(graph))
     print("Will ping the following nodes: \n" + "".join(f" * {node.name}\n" for node in nodes))
-    silent = 0
     for node in nodes:
         print(f"pinging {node.name} with a timeout of {_PING_SECONDS}s", flush=True)
         try:
             _ping_once(graph, node, [])
         except NodeUnreachableError as error:
             complain("rosnode", error, ros_text=_no_answer(error))
-            silent += 1
-    return 1 if silent else 0
+    return 0
 
 
 def _no_answer(error: NodeUnreachableError) -> str:
@@ -202,7 +200,6 @@ def _info(nodes: Sequence[str], quiet: bool) -> int:
             except NotFoundError as error:
                 print(node_text(NodeDetail(error.name, None, [], [], [])))
                 complain("rosnode", error, ros_text=f"cannot contact [{error.name}]: unknown node")
-                failed += 1
                 continue
 
             print(node_text(detail))
@@ -371,7 +368,7 @@ FAMILY = Family(
             "test connectivity to node",
             _ping_parser,
             _ping,
-            {"node": RosText("cannot ping [{name}]: unknown node")},
+            {"node": RosText("cannot ping [{name}]: unknown node", 0)},
         ),
         Verb("list", "list active nodes", _list_parser, _list),
         Verb("info", "print information about node", _info_parser, _info),

@@ -330,6 +330,6 @@ def _graph(
         with Graph(MasterProxy(uri, ID), NAME) if isinstance(uri, str) else Graph.open(NAME) as graph:
             yield graph
     except MasterUnreachableError as error:
-        raise unreachable(str(error)) from error
+        raise unreachable(error.ros_text) from error
     except MinirospyError as error:
         raise ROSNodeException(str(error)) from error

@@ -263,6 +263,6 @@ def _named() -> Iterator[None]:
     try:
         yield
     except MasterUnreachableError as error:
-        raise RosParamIOException(str(error)) from error
+        raise RosParamIOException(error.ros_text) from error
     except MinirospyError as error:
         raise RosParamException(str(error)) from error

@@ -206,7 +206,14 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 
 def is_topic(param_name: str) -> Validator:
     """Return a check that the argument ``param_name`` is a topic name. The check raises ParameterInvalid if it is not."""
-    return valid_name(param_name)
+    resolved = valid_name(param_name)
+
+    def check(param_value: object, caller_id: str) -> str:
+        if param_value == "/":
+            raise ParameterInvalid(f"ERROR: parameter [{param_name}] cannot be the global namespace")
+        return resolved(param_value, caller_id)
+
+    return check
 
 
 def _given_reason(h: Callable[[object], object]) -> Callable[[], object]:

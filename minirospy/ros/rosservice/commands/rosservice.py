@@ -84,6 +84,15 @@ def _uri(service: str, arguments: Arguments | None = None) -> None:
         print(services.service_uri(graph, graph.resolve(service)))
 
 
+def _node_parser() -> Parser:
+    return _service_parser("node", "Print the node that provides a service.")
+
+
+def _node(service: str, arguments: Arguments | None = None) -> None:
+    with Graph.open("rosservice", arguments=arguments) as graph:
+        print(services.service_offer(graph, graph.resolve(service)).node)
+
+
 def _find_parser() -> Parser:
     parser = Parser(
         "rosservice find",
@@ -265,6 +274,8 @@ FAMILY = Family(
             {"service": RosText("ERROR: unknown service")},
         ),
         Verb("list", "list active services", _list_parser, _list),
+        # ROS has this verb, but its help does not list it.
+        Verb("node", "", _node_parser, _node, {"service": RosText("Unknown service: {name}")}),
         Verb(
             "type",
             "print service type",

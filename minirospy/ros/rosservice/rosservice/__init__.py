@@ -199,8 +199,11 @@ def _graph() -> Iterator[Graph]:
     try:
         with Graph.open("rosservice") as graph:
             yield graph
-    except (MasterUnreachableError, NodeUnreachableError) as error:
-        raise ROSServiceIOException(str(error)) from error
+    except MasterUnreachableError as error:
+        raise ROSServiceIOException(error.ros_text) from error
+    except NodeUnreachableError as error:
+        text = f"Unable to communicate with service [{error.name}], address [{error.uri}]"
+        raise ROSServiceIOException(text) from error
     except NotFoundError as error:
         text = f"Service [{error.name}] is not available." if error.kind == "service" else str(error)
         raise ROSServiceException(text) from error

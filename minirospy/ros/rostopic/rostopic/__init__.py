@@ -211,7 +211,7 @@ def get_api(master: masterapi.Master, caller_id: str) -> str:
     except masterapi.MasterException:
         return f"unknown address {caller_id}"
     except OSError as error:
-        raise ROSTopicIOException(str(error)) from error
+        raise ROSTopicIOException(MasterUnreachableError.ros_text) from error
 
 
 def create_publisher(
@@ -410,6 +410,6 @@ def _graph(unreachable: type[Exception] = ROSTopicIOException) -> Iterator[Graph
         with Graph.open(NAME) as graph:
             yield graph
     except MasterUnreachableError as error:
-        raise unreachable(str(error)) from error
+        raise unreachable(error.ros_text) from error
     except MinirospyError as error:
         raise ROSTopicException(str(error)) from error

@@ -6,7 +6,7 @@ Topic demux/selected (latched); services demux/select, demux/add, demux/list, de
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from std_msgs.msg import String
 from topic_tools.srv import (
@@ -26,7 +26,7 @@ from topic_tools.srv import (
 
 from minirospy import client as rospy
 from minirospy.client.topics import AnyMsg
-from minirospy.ros.topic_tools.programs.passing import NONE, Input, Output, base_name, run_node
+from minirospy.ros.topic_tools.programs.passing import NONE, Input, Output, base_name, checked_topic, run_node
 
 __all__ = ["Demux", "main"]
 
@@ -40,9 +40,14 @@ def main() -> int:
     return run_node(
         _USAGE,
         lambda words: f"{base_name(words[0])}_demux",
-        lambda words: Demux(words[0], words[1:]),
+        _prepare,
         range(2, 10_000),
     )
+
+
+def _prepare(words: Sequence[str]) -> Callable[[], Demux]:
+    source, *targets = map(checked_topic, words)
+    return lambda: Demux(source, targets)
 
 
 class Demux:

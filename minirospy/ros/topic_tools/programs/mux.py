@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from std_msgs.msg import String
 from topic_tools.srv import (
@@ -28,7 +28,15 @@ from topic_tools.srv import (
 
 from minirospy import client as rospy
 from minirospy.client.topics import AnyMsg
-from minirospy.ros.topic_tools.programs.passing import NONE, Input, Output, base_name, flag, run_node
+from minirospy.ros.topic_tools.programs.passing import (
+    NONE,
+    Input,
+    Output,
+    base_name,
+    checked_topic,
+    flag,
+    run_node,
+)
 
 __all__ = ["Mux", "main"]
 
@@ -40,9 +48,14 @@ def main() -> int:
     return run_node(
         _USAGE,
         lambda words: f"{base_name(words[0])}_mux",
-        lambda words: Mux(words[0], words[1:], is_lazy=flag("lazy"), latch=flag("latch")),
+        _prepare,
         range(2, 10_000),
     )
+
+
+def _prepare(words: Sequence[str]) -> Callable[[], Mux]:
+    target, *sources = map(checked_topic, words)
+    return lambda: Mux(target, sources, is_lazy=flag("lazy"), latch=flag("latch"))
 
 
 class Mux:
