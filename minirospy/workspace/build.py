@@ -26,6 +26,7 @@ from minirospy.workspace.packages import Packages, built_in_roots, crawl, is_pyt
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, read_plan
 from minirospy.workspace.python_setup import PythonSetup, read_python_setup
 from minirospy.workspace.setup_files import SetUp, setup_files
+from minirospy.workspace.stand_ins import StandIns, find_stand_ins
 from minirospy.workspace.unlisted import with_unlisted
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "find_workspace",
     "own_set_up",
     "read_plans",
+    "stand_in_files",
     "write_set_up",
 ]
 
@@ -150,12 +152,17 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 
 
 class Report(NamedTuple):
-    """The result of building a package. ``made``: the generated parts, as a string; empty if nothing has changed."""
+    """The result of building a package.
+
+    ``made``: the generated parts, as a string; empty if nothing has changed. ``stand_ins``: the names of minirospy's
+    programs and modules that replace compiled ones, as a string.
+    """
 
     plan: Plan
     made: str
     changed: bool
     warnings: tuple[str, ...]
+    stand_ins: str = ""
 
 
 def build(
@@ -241,7 +248,12 @@ class _Builder:
         setup = read_python_setup(plan.folder) if plan.has_setup else None
         warnings += setup.warnings if setup else ()
 
-        relays = {**_relays(setup, self._workspace.devel), **_programs(plan, setup, self._workspace.devel)}
+        stand_ins = find_stand_ins(plan)
+        relays = {
+            **_relays(setup, self._workspace.devel),
+            **_programs(plan, setup, self._workspace.devel),
+            **stand_in_files(plan, stand_ins, self._workspace.devel),
+        }
         changed = [path for path, text in relays.items() if write_if_changed(path, text)]
         for path in changed:
             if path.suffix != ".py" or path.read_bytes().startswith(b"#!"):
@@ -256,7 +268,7 @@ class _Builder:
                 and all(map(os.path.exists, before["outputs"]))
                 and not changed
             ):
-                return Report(plan, "", False, warnings)
+                return Report(plan, "", False, warnings, stand_ins.names())
             warnings += self._check_messages(plan)
             modules = self._compile(plan, bool(setup and plan.name in setup.packages))
             changed += [path for path, text in modules.items() if write_if_changed(path, text)]
@@ -269,7 +281,7 @@ class _Builder:
 
         outside = sorted(self._closure(plan.message_depends) - self._plans.keys())
         self._finish(stamp, outputs, outside)
-        return Report(plan, _counts(plan, setup), bool(changed), warnings)
+        return Report(plan, _counts(plan, setup), bool(changed), warnings, stand_ins.names())
 
     def remove_gone(self) -> None:
         """Remove the outputs of packages that are no longer in the workspace."""
@@ -452,12 +464,25 @@ def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, 
         if rule.python and not rule.optional:
             sources = [plan.folder / name for name in rule.sources]
             places.update({devel / rule.destination / path.name: path for path in sources})
-    return {
-        place: _PROGRAM.format(python=_SHEBANG, name=path.name, folder=str(path.parent))
-        + _RELAY_RUN.format(file=str(path))
-        for place, path in places.items()
-        if is_python(path)
-    }
+    return {place: _program(path) for place, path in places.items() if is_python(path)}
+
+
+def _program(path: Path) -> str:
+    """Return the text of a program that runs another one."""
+    head = _PROGRAM.format(python=_SHEBANG, name=path.name, folder=str(path.parent))
+    return head + _RELAY_RUN.format(file=str(path))
+
+
+def stand_in_files(plan: Plan, found: StandIns, prefix: Path) -> dict[Path, str]:
+    """Return the programs and modules that run minirospy's in place of compiled ones: file below ``prefix`` -> text."""
+    texts = {prefix / "lib" / plan.name / name: _program(path) for name, path in found.programs.items()}
+    for name, path in found.modules.items():
+        end = "/__init__.py" if path.name == "__init__.py" else ".py"
+        head = f"# Made by catkin_make: minirospy's {name!r} stands in for the compiled one.\n\n"
+        texts[prefix / DIST_PACKAGES / (name.replace(".", "/") + end)] = head + _RELAY_RUN.format(
+            file=str(path)
+        )
+    return texts
 
 
 def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
