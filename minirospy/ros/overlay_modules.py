@@ -16,6 +16,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from minirospy.core.idl.own_packages import own_definitions
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES
 
 __all__ = ["Origin", "exported", "modules", "overlay_files", "write_overlay"]
@@ -54,6 +55,9 @@ _GENERATED = "generated from minirospy/"  # in the docstring of each module
 _METADATA = "rospy-1.17.0.egg-info"  # programs ask importlib.metadata for rospy's version
 _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: rospy as minirospy has it\n"
 _WIDTH = 118  # characters in a line
+
+_DEFINED = {"msg": ("msg", "action"), "srv": ("srv",)}
+"""Module of generated classes -> the folders of the definitions."""
 
 _HOOKS = {"__getattr__", "__dir__"}
 """Functions by which a module answers for names that it does not have (PEP 562)."""
@@ -174,7 +178,34 @@ def _text(name: str, source: Path) -> str:
     if public is not None:
         listed = [f'"{each}"' for each in sorted(public) if not each.startswith("_")]
         lines += ["", "__all__ = [", *_wrapped(listed), "]"]
+    if source.name == "__init__.py" and name not in _ALSO:
+        lazy = _lazy(name, has_hook="__getattr__" in exported(source))
+        lines += ["", *lazy] if lazy and lines[-1] else lazy
     return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _lazy(package: str, *, has_hook: bool) -> list[str]:
+    """Return the code that imports a package's submodules, and the standard library's, when they are first used.
+
+    Type checkers do not see it, so that they report names that do not exist.
+    """
+    depth = package.count(".") + 1
+    names = [
+        each.rpartition(".")[2]
+        for each in modules()
+        if each.startswith(f"{package}.") and each.count(".") == depth
+    ]
+    definitions = own_definitions() / package
+    names += [kind for kind, of in _DEFINED.items() if any((definitions / each).is_dir() for each in of)]
+    needs_hook = bool(names) and not has_hook
+    used = ["offer_standard_library"] * ("." not in package) + ["on_first_use"] * needs_hook
+    lines = [f"from minirospy.ros.submodules import {', '.join(used)}", ""] if used else []
+    if "." not in package:
+        lines += ["offer_standard_library()"]
+    if needs_hook:
+        listed = [f'"{name}"' for name in [package, *sorted(names)]]
+        lines += ['globals()["__getattr__"] = on_first_use(', *_wrapped(listed), ")"]
+    return lines
 
 
 def _wrapped(words: Iterable[str]) -> list[str]:
