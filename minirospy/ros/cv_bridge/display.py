@@ -104,7 +104,7 @@ def _labels(image: Pixels) -> Pixels:
     import numpy as np
 
     colors = np.frombuffer(_LABEL_COLORS, np.uint8).reshape(-1, 3)[:, ::-1]
-    result = colors[image % len(colors)]
+    result: Pixels = colors[image % len(colors)]
     result[image < 0] = 0
     return result
 
@@ -121,4 +121,5 @@ def _scaled(image: Pixels, low: float, high: float) -> Pixels:
     # OpenCV multiplies in float32 all types except these.
     exact = np.dtype(np.float64 if image.dtype.name in ("int32", "float64") else np.float32)
     shown = np.rint(values.astype(exact) * exact.type(255.0 / (high - low)))
-    return np.clip(np.nan_to_num(shown, nan=0.0), 0, 255).astype(np.uint8)
+    scaled: Pixels = np.clip(np.nan_to_num(shown, nan=0.0), 0, 255).astype(np.uint8)
+    return scaled
