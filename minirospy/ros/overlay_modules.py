@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from minirospy.ros.passed_on import PASSED_ON
+from minirospy.core.idl.own_packages import own_definitions
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES
 
 __all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "write_overlay"]
@@ -58,6 +58,9 @@ _GENERATED = "generated from minirospy/"  # marks generated modules, in their do
 _METADATA = "rospy-1.17.0.egg-info"  # programs query rospy's version through importlib.metadata
 _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: rospy as minirospy has it\n"
 _WIDTH = 118  # maximum line length in characters
+
+_DEFINED = {"msg": ("msg", "action"), "srv": ("srv",)}
+"""Module of generated classes -> the folders of the definitions."""
 
 _HOOKS = {"__getattr__", "__dir__"}
 """Module functions that provide names that are not defined in the module (PEP 562)."""
@@ -181,53 +184,36 @@ def _text(name: str, source: Path) -> str:
     for module, names in by_module.items():
         lines += [f"from {module} import (", *_wrapped(names), ")"]
     if public is not None:
-        lines += ["", "__all__ = [", *_wrapped(f'"{each}"' for each in listed(source)), "]"]
-    if passed_on:
-        here = [each for each in passed_on if each in names_here]
-        later = {each: place for each, place in passed_on.items() if each not in names_here}
-        start = "+=" if public is not None else "="
-        lines += _text_of_passed_on(
-            name, f"__all__ {start} {[*here]!r}".replace("'", '"'), later, has_hook=hook is not None
-        )
+        listed = [f'"{each}"' for each in sorted(public) if not each.startswith("_")]
+        lines += ["", "__all__ = [", *_wrapped(listed), "]"]
+    if source.name == "__init__.py" and name not in _ALSO:
+        lazy = _lazy(name, has_hook="__getattr__" in exported(source))
+        lines += ["", *lazy] if lazy and lines[-1] else lazy
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
-def listed(source: Path) -> list[str]:
-    """Return the public names in the ``__all__`` of the module in a file."""
-    return sorted(name for name in _read(source).public or () if not name.startswith("_"))
+def _lazy(package: str, *, has_hook: bool) -> list[str]:
+    """Return the code that imports a package's submodules, and the standard library's, when they are first used.
 
-
-def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
-    """Return the names that a module's star brings from elsewhere, without its own: name -> `MODULE` or `MODULE:NAME`."""
-    found = {}
-    for place, names in PASSED_ON.get(module, {}).items():
-        for each in names.split():
-            name, _, there = each.partition("=")
-            found[name] = ":".join(filter(None, (place, there or name)))
-    return {name: found[name] for name in sorted(found.keys() - set(own))}
-
-
-def _text_of_passed_on(module: str, all_here: str, names: dict[str, str], has_hook: bool) -> list[str]:
-    """Return the lines that find these names at first use; type checkers and editors do not see them."""
-    missing = f"raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")"
-    return [
-        "",
-        "import typing as _typing",
-        "",
-        "if not _typing.TYPE_CHECKING:",
-        "    from minirospy.ros.submodules import import_passed_on as _import_passed_on",
-        "",
-        "    _PASSED_ON = {",
-        *(f"    {line}" for line in _wrapped(f'"{name}": "{place}"' for name, place in names.items())),
-        "    }",
-        f"    {all_here}",
-        "    __all__ += _PASSED_ON",
-        "",
-        "    def __getattr__(name):",
-        "        if name in _PASSED_ON:",
-        "            return _import_passed_on(globals(), name, _PASSED_ON[name])",
-        f"        {'return _find_more(name)' if has_hook else missing}",
+    Type checkers do not see it, so that they report names that do not exist.
+    """
+    depth = package.count(".") + 1
+    names = [
+        each.rpartition(".")[2]
+        for each in modules()
+        if each.startswith(f"{package}.") and each.count(".") == depth
     ]
+    definitions = own_definitions() / package
+    names += [kind for kind, of in _DEFINED.items() if any((definitions / each).is_dir() for each in of)]
+    needs_hook = bool(names) and not has_hook
+    used = ["offer_standard_library"] * ("." not in package) + ["on_first_use"] * needs_hook
+    lines = [f"from minirospy.ros.submodules import {', '.join(used)}", ""] if used else []
+    if "." not in package:
+        lines += ["offer_standard_library()"]
+    if needs_hook:
+        listed = [f'"{name}"' for name in [package, *sorted(names)]]
+        lines += ['globals()["__getattr__"] = on_first_use(', *_wrapped(listed), ")"]
+    return lines
 
 
 def _wrapped(words: Iterable[str]) -> list[str]:

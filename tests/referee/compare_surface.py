@@ -160,7 +160,6 @@ REASONS = {
         ),
         "FdoDetect recognizes it by os-release",
     ),
-    "cvtColorForDisplay": "for the window of image_view",
     **dict.fromkeys(("LINEDEBUG", "id"), "the generator's inside"),
     "ForkingXMLRPCServer": "a server that forks: not on every system",
     "isstring": "a leftover of Python 2",

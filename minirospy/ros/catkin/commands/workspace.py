@@ -74,6 +74,8 @@ def build_packages(
             print(
                 f"       {report.plan.name}: skipped, they need a C++ compiler: {', '.join(report.plan.skipped)}"
             )
+        if report.stand_ins:
+            print(f"       {report.plan.name}: minirospy's own are used instead: {report.stand_ins}")
         for warning in report.warnings:
             print(f"WARNING: {warning}", file=sys.stderr)
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 __all__ = ["is_interactive", "load_manifest", "set_interactive"]
 
-__getattr__ = on_first_use("roslib", "manifest", "stacks")
+__getattr__ = on_first_use("roslib", "manifest", "message", "names", "stacks")
 
 _interactive = [False]
 
