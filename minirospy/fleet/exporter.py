@@ -38,7 +38,7 @@ __all__ = ["Exporter"]
 
 _log = logging.getLogger(__name__)
 _MAX_IN_FLOWS = 1_000
-_MAX_WANTED, _MAX_READERS = 10_000, 1_000
+MAX_WANTED, MAX_READERS = 10_000, 1_000
 """Topics that readers may request, and readers per topic: limited because peers choose both."""
 
 
@@ -142,10 +142,10 @@ class Exporter:
         want = parse_want(key)
         if want is None:
             return
-        if is_there and want.topic not in self._readers and len(self._readers) >= _MAX_WANTED:
+        if is_there and want.topic not in self._readers and len(self._readers) >= MAX_WANTED:
             return
         readers = self._readers.setdefault(want.topic, set())
-        if is_there and len(readers) < _MAX_READERS:
+        if is_there and len(readers) < MAX_READERS:
             readers.add(want.reader)
             outbound = self.outbound.get(want.topic)
             if outbound:

@@ -63,11 +63,11 @@ _T = TypeVar("_T")
 MAX_TEXT = 16 << 20  # bytes read from a query or a reply: a service's response or a definition
 MAX_REPLIES = 10_000  # accepted for one query: peers choose the number; a fleet has at most 5,000 gateways
 EARLY_SHARE = 0.9  # of the timeout: a query that ends before this without replies has lost its link
-_RETRY_SECONDS = 1.0
-_LINGER_SECONDS = 2.0
-_QUERIES = 200
+RETRY_SECONDS = 1.0
+LINGER_SECONDS = 2.0
+MAX_QUERIES = 200
 """Service calls and parameter queries handled concurrently; further ones are refused."""
-_CONTROL_QUERIES = 50
+MAX_CONTROL_QUERIES = 50
 """Concurrently handled pings and queries for status or definitions; their separate limit prevents delays by blocked calls."""
 
 
@@ -79,7 +79,7 @@ async def _remove_linger() -> None:
     remover = LingerRemover()
     while True:
         remover.look()
-        await asyncio.sleep(_LINGER_SECONDS)
+        await asyncio.sleep(LINGER_SECONDS)
 
 
 class QueryFailed(MinirospyError):
@@ -98,8 +98,8 @@ class FleetNetwork:
         # One thread preserves the order: peers see declarations in the order in which they were made.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
-        self._calls = _Share(_QUERIES)
-        self._control = _Share(_CONTROL_QUERIES)
+        self._calls = _Share(MAX_QUERIES)
+        self._control = _Share(MAX_CONTROL_QUERIES)
         self._is_closed = False
         self._reporter = ErrorReporter(_log, "taking a message or query of the fleet")
         reporter = ErrorReporter(_log, "the search for links of Zenoh")
@@ -137,7 +137,7 @@ class FleetNetwork:
             if not is_reported:
                 _log.warning("nothing of the fleet answers at %s yet%s. Will keep trying.", endpoints, why)
                 is_reported = True
-            await asyncio.sleep(_RETRY_SECONDS)
+            await asyncio.sleep(RETRY_SECONDS)
 
     @property
     def peers(self) -> int:

@@ -21,7 +21,7 @@ _CLOSE_SECONDS = 2.0
 _MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
 _MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
-_MAX_OUTLETS = 64
+MAX_OUTLETS = 64
 """Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
 
 The least recently used is dropped.
@@ -145,7 +145,7 @@ class _PriorityWorker(_Worker):
     def _put(self, outflow: Outflow, key: str, message: bytes) -> None:
         outlet = outflow._outlets.pop(key, None)
         if outlet is None:
-            while len(outflow._outlets) >= _MAX_OUTLETS:
+            while len(outflow._outlets) >= MAX_OUTLETS:
                 oldest = next(iter(outflow._outlets))
                 outflow._numbers.pop(oldest, None)
                 outflow._outlets.pop(oldest).undeclare()

@@ -17,9 +17,9 @@ MAX_CONCURRENT = 64
 
 _MAX_CONCURRENT_RETRIES = 32
 """Concurrent retries; limited separately, so that retries do not delay first queries."""
-_QUERY_SECONDS = 5.0
-_AGAIN_SECONDS = 10.0  # before a node that did not respond is queried again
-_REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
+QUERY_SECONDS = 5.0
+AGAIN_SECONDS = 10.0  # before a node that did not respond is queried again
+REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
 """Pause after a refused query, base and increment per failed query.
 
 A refused query is cheap, and a killed server may be restarted soon, so refused queries are retried sooner; 500 dead nodes
@@ -96,9 +96,9 @@ class NodeQueries(Generic[_Key, _Found]):
         """Query once; return True if there is a result and its key is still present."""
         started = asyncio.get_running_loop().time()
         try:
-            found = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
+            found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)
         except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
-            is_quick = asyncio.get_running_loop().time() - started < _REFUSED_SECONDS
+            is_quick = asyncio.get_running_loop().time() - started < REFUSED_SECONDS
             self._failed(key, is_quick=is_quick)
         except Exception as error:  # noqa: BLE001 - of one node: it is tried again, as those that do not answer
             self._reporter.report(error)
@@ -115,6 +115,6 @@ class NodeQueries(Generic[_Key, _Found]):
 
     def _failed(self, key: _Key, *, is_quick: bool = False) -> None:
         if key in self._present:
-            refused = max(_REFUSED_SECONDS, _REFUSED_EACH * len(self._not_before))
-            pause = min(refused, _AGAIN_SECONDS) if is_quick else _AGAIN_SECONDS
+            refused = max(REFUSED_SECONDS, _REFUSED_EACH * len(self._not_before))
+            pause = min(refused, AGAIN_SECONDS) if is_quick else AGAIN_SECONDS
             self._not_before[key] = asyncio.get_running_loop().time() + pause

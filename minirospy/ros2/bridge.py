@@ -51,9 +51,9 @@ __all__ = ["Ros2Bridge", "Ros2Options"]
 _ORIGIN = "ros2_domain"
 """Connection header field that marks publishers of ROS 2 data, so that no bridge to the same domain sends the data back."""
 _MIN_REFRESH_INTERVAL = 0.25
-_QUERY_SECONDS = 3.0
+QUERY_SECONDS = 3.0
 """Timeout, after which topics are bridged even if publishers have not responded."""
-_JOIN_SECONDS = 2.0
+JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
 _DEPTH = 1000
 _DEPTH_OF_LARGE = 20
@@ -241,7 +241,7 @@ class Ros2Bridge:
             for node in snapshot.publishers.get(topic, ())
             if not is_bridge(node)
         ]
-        await self._headers.look(present, _QUERY_SECONDS)
+        await self._headers.look(present, QUERY_SECONDS)
 
     async def _header(self, key: tuple[str, str]) -> Header:
         return await self._texts.header_of(*key)
@@ -323,7 +323,7 @@ class _ToRos2(_Passing):
     async def _wait_for_subscribers(self) -> None:
         """Wait until the existing subscribers are connected, because they would miss messages published before that."""
         loop = asyncio.get_running_loop()
-        end = loop.time() + _JOIN_SECONDS
+        end = loop.time() + JOIN_SECONDS
         while not self._publisher.subscribers and loop.time() < end:
             await asyncio.sleep(_JOIN_LOOK)
 

@@ -44,7 +44,7 @@ __all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "VIDEO_PORT", "Bridge", "BridgeOpt
 FOXGLOVE_PORT = 8765
 ROSBRIDGE_PORT = 9090
 VIDEO_PORT = 8080
-_DIAGNOSTICS_SECONDS = 1.0
+DIAGNOSTICS_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
@@ -268,7 +268,7 @@ class Bridge:
 
         before: Mapping[str, int] = {}
         while True:
-            await asyncio.sleep(_DIAGNOSTICS_SECONDS)
+            await asyncio.sleep(DIAGNOSTICS_SECONDS)
             dropped: dict[str, int] = {}
             array = DiagnosticArray()
             array.header.stamp = self.node.now()

@@ -387,7 +387,7 @@ def test_publishers_of_a_topic_share_its_registration(graph: MasterProxy) -> Non
 
 
 def test_node_publish_reaches_subscribers(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.aio.topics._JOIN_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.aio.topics.JOIN_SECONDS", 60.0)
 
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
@@ -506,7 +506,7 @@ def test_node_shutdown_ends_waiting_for_peers(master: str) -> None:
 
 
 def test_first_messages_all_arrive(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.aio.topics._JOIN_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.aio.topics.JOIN_SECONDS", 60.0)
 
     async def main() -> None:
         async with Node("a") as talker, Node("b") as listener:

@@ -32,7 +32,7 @@ EMPTY = "std_srvs/Empty", "d41d8cd98f00b204e9800998ecf8427e"
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Raise the time limits, so that nothing is lost if the machine stalls and no log line is repeated."""
     monkeypatch.setattr(ros1_keys, "LOST_SECONDS", SECONDS)
-    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger._SECONDS", 1000.0)
+    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger.INTERVAL_SECONDS", 1000.0)
 
 
 @pytest.fixture

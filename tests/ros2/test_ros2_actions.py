@@ -136,7 +136,7 @@ def test_rules_name_actions_and_their_fields() -> None:
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Send no request before the server is reachable."""
-    monkeypatch.setattr("minirospy.ros2.reach._MAX_SECONDS", LIMIT)
+    monkeypatch.setattr("minirospy.ros2.reach.MAX_SECONDS", LIMIT)
 
 
 def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any]) -> None:
@@ -203,8 +203,8 @@ async def end_of(goal: Any) -> tuple[GoalState, list[int]]:
 
 @pytest.mark.usefixtures("master")
 def test_a_goal_waits_until_responses_of_the_server_arrive(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros2.action_to_ros2._REACH_SECONDS", 0.01)
-    monkeypatch.setattr("minirospy.ros2.reach._AGAIN_SECONDS", 0.01)
+    monkeypatch.setattr("minirospy.ros2.action_to_ros2.REACH_SECONDS", 0.01)
+    monkeypatch.setattr("minirospy.ros2.reach.AGAIN_SECONDS", 0.01)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         side.offered = SEND_GOAL
@@ -439,7 +439,7 @@ def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
 
 def test_server_of_rclpy_is_destroyed_once_results_are_sent(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sending a result takes several rounds of the executor: destroying the server earlier leaves its client waiting."""
-    monkeypatch.setattr("minirospy.ros2.rclpy_actions._CLOSE_SECONDS", LIMIT)
+    monkeypatch.setattr("minirospy.ros2.rclpy_actions.CLOSE_SECONDS", LIMIT)
     order: list[str] = []
     tasks: queue.Queue[Callable[[], object] | None] = queue.Queue()
 

@@ -554,7 +554,7 @@ def test_messages_from_ros2_are_not_sent_back() -> None:
 
 @pytest.mark.usefixtures("master")
 def test_publishers_that_do_not_answer_keep_no_topic_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros2.bridge._QUERY_SECONDS", 1.0)
+    monkeypatch.setattr("minirospy.ros2.bridge.QUERY_SECONDS", 1.0)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         topics = [f"/dead{number}" for number in range(40)]
@@ -562,7 +562,7 @@ def test_publishers_that_do_not_answer_keep_no_topic_waiting(monkeypatch: pytest
             uri = f"http://127.0.0.1:{silent.getsockname()[1]}/"
             async with Node("dead", rosout=False) as dead:
                 for topic in topics:
-                    await dead._node.master("registerPublisher", topic, "std_msgs/String", uri)
+                    await dead.call_master("registerPublisher", topic, "std_msgs/String", uri)
             await node.advertise("/live", raw("std_msgs/String"))
             side.graph = {topic: Ros2Topic(subscribers=(STRING,)) for topic in [*topics, "/live"]}
             await asyncio.wait_for(bridge.look(), 60.0)
@@ -606,7 +606,7 @@ def test_link_that_cannot_be_opened_leaves_nothing_open() -> None:
         side.subscribe = subscribe  # type: ignore[method-assign]
         await bridge.look()
         assert list(bridge.topics.refused.values()) == ["no room"]
-        assert "/t" not in (await fetch(node._node.master)).publishers
+        assert "/t" not in (await fetch(node.call_master)).publishers
         assert subscription.topic == "/t"
 
     bridged(scene)
@@ -665,7 +665,7 @@ def test_static_transforms_over_the_limit_are_reported(
 
 @pytest.mark.usefixtures("master")
 def test_types_that_peers_make_up_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.introspect.type_texts._MAX_NAMES", 10)
+    monkeypatch.setattr("minirospy.introspect.type_texts.MAX_NAMES", 10)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         texts = bridge._texts

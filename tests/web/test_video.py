@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wait longer for an image than a machine may stall."""
-    monkeypatch.setattr("minirospy.web.video.pages._SNAPSHOT_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.web.video.pages.SNAPSHOT_SECONDS", 60.0)
 
 
 def image(encoding: str, array: np.ndarray[Any, Any]) -> Image:

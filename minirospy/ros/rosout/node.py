@@ -49,7 +49,7 @@ _MAX_SUBSCRIBERS = 200
 _LARGE, _MAX_LARGE = 16 * 1024, 100
 """Bytes, messages: a subscriber with this many queued messages receives no larger messages until it has read some."""
 
-_STEP_LETTERS = 1024  # characters of text written per step; escaping one may take a microsecond
+STEP_LETTERS = 1024  # characters of text written per step; escaping one may take a microsecond
 
 
 class RosoutNode:
@@ -179,8 +179,8 @@ class RosoutNode:
         parts: list[str] = []
         # A message may have several lines, as in the real log file; the other fields may not.
         for text, keep in ((head, ""), (message.msg, "\n\t")):
-            for at in range(0, len(text), _STEP_LETTERS):
-                parts.append(escaped(text[at : at + _STEP_LETTERS], keep))
+            for at in range(0, len(text), STEP_LETTERS):
+                parts.append(escaped(text[at : at + STEP_LETTERS], keep))
                 if at:
                     yield None
         file.text("".join(parts))

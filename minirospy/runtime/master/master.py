@@ -46,9 +46,9 @@ _log = logging.getLogger(__name__)
 _CHECK_SECONDS = 3.0
 _CHECK_TRIES = 3
 _MAX_CONCURRENT_CHECKS = 100
-_QUICK_CHECK_SECONDS = 1.0
+QUICK_CHECK_SECONDS = 1.0
 _TOUCH_SECONDS = 30.0
-_LOCK_SECONDS = 3.0
+LOCK_SECONDS = 3.0
 # Seconds between attempts: the system may release a killed master's port before its journal's lock
 _LOCK_PAUSE = 0.02
 
@@ -60,7 +60,7 @@ _COLLECT = (2000, 5, 1_000_000_000)
 collected automatically.
 """
 
-_SWEEP_SECONDS = 10.0  # between the checks for dead nodes if the master is nearly full
+SWEEP_SECONDS = 10.0  # between the checks for dead nodes if the master is nearly full
 _MAX_FORGOTTEN_PER_ITERATION = 20  # dead nodes to forget per loop iteration
 
 _OWN_NODE = "/rosout"
@@ -374,7 +374,7 @@ class Master(MasterApi):
 
     async def _anybody_lives(self, nodes: Mapping[str, str]) -> bool:
         rpc = AsyncRpcClient(same_host=self._same_host)
-        calls = [_lives(rpc, name, uri, _QUICK_CHECK_SECONDS) for name, uri in nodes.items()]
+        calls = [_lives(rpc, name, uri, QUICK_CHECK_SECONDS) for name, uri in nodes.items()]
         try:
             return any(await asyncio.gather(*calls))
         finally:
@@ -408,7 +408,7 @@ class Master(MasterApi):
         Without this they would stay full, because this master, like rosmaster, keeps a killed node's registrations.
         """
         while True:
-            await asyncio.sleep(_SWEEP_SECONDS)
+            await asyncio.sleep(SWEEP_SECONDS)
             if not self.registry.is_crowded:
                 continue
             rpc, count = AsyncRpcClient(same_host=self._same_host), 0
@@ -435,7 +435,7 @@ async def _lock(journal: Journal) -> None:
     """Lock the journal; if another process has locked it, retry for a moment. The caller has bound the port."""
     from minirospy.runtime.master.journal import JournalBusyError
 
-    end = time.monotonic() + _LOCK_SECONDS
+    end = time.monotonic() + LOCK_SECONDS
     while True:
         try:
             journal.lock()

@@ -26,19 +26,19 @@ __all__ = ["Notifier", "State"]
 _log = logging.getLogger(__name__)
 
 _MASTER = "/master"
-_MAX_CONCURRENT_CALLS = 200
-_CALLS_TO_SUSPECTS = 50
+MAX_CONCURRENT_CALLS = 200
+CALLS_TO_SUSPECTS = 50
 _MAX_SUSPECTS = 10000
 _LONG_LIST = 200
 _SECONDS_PER_PUBLISHER = 50e-6
 _TICK = 0.001
-_HOLD_SECONDS = 0.02
+HOLD_SECONDS = 0.02
 _HOLD_TICK = 0.01
 
 _SECONDS_PER_TURN = 0.003  # time limit per loop iteration for starting calls
 
 # Pending parameter notifications per node; if there are more, one notification per subscribed key replaces them
-_MAX_PARAMETERS = 32
+MAX_PARAMETERS = 32
 
 _LARGE_BYTES = 32 * 1024 * 1024  # maximum total size of large calls in progress; the next one is queued
 
@@ -99,8 +99,8 @@ class Notifier:
         # (URI, topic) -> earliest time at which its next notification may be sent, earliest first.
         self._held: dict[tuple[str, str], float] = {}
 
-        self._line = _Line(_MAX_CONCURRENT_CALLS)
-        self._suspect_line = _Line(_CALLS_TO_SUSPECTS)
+        self._line = _Line(MAX_CONCURRENT_CALLS)
+        self._suspect_line = _Line(CALLS_TO_SUSPECTS)
         self._suspects: set[str] = set()
         self._starts_soon = False
         self._closed = False
@@ -126,7 +126,7 @@ class Notifier:
             del self._held[next(iter(self._held))]
         self._held.pop((uri, topic), None)
         # Round up to a tick, so that the master wakes up once for all delays that end within one tick.
-        self._held[uri, topic] = (now // _HOLD_TICK + 1) * _HOLD_TICK + _HOLD_SECONDS
+        self._held[uri, topic] = (now // _HOLD_TICK + 1) * _HOLD_TICK + HOLD_SECONDS
 
     def send(self, notice: Notice) -> None:
         """Call the node that the notification is for, soon."""
@@ -152,7 +152,7 @@ class Notifier:
             node.parameters += 1
         node.notices[key] = notice
 
-        if node.parameters > _MAX_PARAMETERS:
+        if node.parameters > MAX_PARAMETERS:
             self._summarize(node)
         if is_idle:
             self._go_on(node)

@@ -31,7 +31,7 @@ __all__ = ["Node"]
 
 _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
-_MAX_IDLE = 200  # idle connections to the Slave API; a graph has about as many as this node has peers
+MAX_IDLE = 200  # idle connections to the Slave API; a graph has about as many as this node has peers
 
 _STALE_SECONDS = 5.0  # during which the master may still send lists of publishers after an unsubscription
 
@@ -124,7 +124,7 @@ class Node:
             bind_host=host,
             port=xmlrpc_port,
             ports=ports,
-            most_idle=_MAX_IDLE,
+            most_idle=MAX_IDLE,
             access=self._access,
             known_as=(self.environment.uri_host,) if self.environment.same_host else (),
         )

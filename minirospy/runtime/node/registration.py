@@ -38,7 +38,7 @@ _CALL_SECONDS = 30.0
 # time limit for the check whether this node is registered; short, because the check is repeated soon
 _LOOK_SECONDS = 5.0
 
-_SILENT_SECONDS, _STILL_SILENT_SECONDS = 10.0, 2.0
+SILENT_SECONDS, STILL_SILENT_SECONDS = 10.0, 2.0
 """A closing node gives up if the master sends no response for this many seconds; the shorter limit applies if the master
 was already silent before. The total time is not limited: the node waits for a busy master that continues to respond.
 """
@@ -46,7 +46,7 @@ was already silent before. The total time is not limited: the node waits for a b
 _CLOSING_CALL_SECONDS = 3600.0
 _PROBE_SECONDS = 3.0  # between a closing node's checks whether the master still responds
 
-_NOTICE_SECONDS = 3.0  # before a closing node logs that it is still waiting for the master
+NOTICE_SECONDS = 3.0  # before a closing node logs that it is still waiting for the master
 
 _MAX_CALLS_PER_MULTICALL = 100  # unregistrations per system.multicall
 
@@ -105,7 +105,7 @@ class Registrations:
         """Unregister everything, and register nothing more; the first call is sent before anything else is done.
 
         Waits while the master continues to respond; does not wait if it refuses connections, and gives up if it sends no
-        response for ``_SILENT_SECONDS``. ``announces``: whether to log a line when this takes long.
+        response for ``SILENT_SECONDS``. ``announces``: whether to log a line when this takes long.
         """
         self._closed = True
         if self._watching:
@@ -318,9 +318,9 @@ class Registrations:
         """
         loop = asyncio.get_running_loop()
         uri = self._environment.master_uri
-        patience = _STILL_SILENT_SECONDS if self._is_master_silent else _SILENT_SECONDS
+        patience = STILL_SILENT_SECONDS if self._is_master_silent else SILENT_SECONDS
         text = "waiting for the master at %s to unregister this node; it is given up when it answers nothing for %g s"
-        notice = loop.call_later(_NOTICE_SECONDS, _log.warning, text, uri, patience) if announces else None
+        notice = loop.call_later(NOTICE_SECONDS, _log.warning, text, uri, patience) if announces else None
 
         self._answered = loop.time()
         pending = set(tasks)

@@ -50,7 +50,7 @@ __all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription", "Unrea
 
 _log = logging.getLogger(__name__)
 
-_SETTLE_SECONDS = 10.0  # within which all nodes register again with a master that has lost its state
+SETTLE_SECONDS = 10.0  # within which all nodes register again with a master that has lost its state
 
 # Failures before reporting a publisher that refuses; a publisher that is shutting down has exited by then
 _WARN_AFTER = 3
@@ -356,7 +356,7 @@ class Subscription:
         """
         if self._settling:
             self._settling.cancel()
-        self._settling = asyncio.get_running_loop().call_later(_SETTLE_SECONDS, self._settle)
+        self._settling = asyncio.get_running_loop().call_later(SETTLE_SECONDS, self._settle)
         self.publishers_changed(uris)
 
     def close(self) -> None:

@@ -32,7 +32,7 @@ _RECEIVE = 65536
 _LARGE = 65536
 _KEEP_PER_SERVER = 8
 _KEEP_AT_MOST = 100
-_KEEP_SECONDS = 10.0
+KEEP_SECONDS = 10.0
 
 # 10035 is WSAEWOULDBLOCK, which Windows reports while connecting.
 _UNDER_WAY = {errno.EINPROGRESS, errno.EWOULDBLOCK, 10035}
@@ -121,7 +121,7 @@ class AsyncRpcClient:
         loop = asyncio.get_running_loop()
         connection.used = loop.time()
         if self._sweep is None:
-            self._sweep = loop.call_later(_KEEP_SECONDS, self._close_idle)
+            self._sweep = loop.call_later(KEEP_SECONDS, self._close_idle)
 
     def drop(self, connection: _Connection) -> None:
         """Remove an idle connection that has closed."""
@@ -134,10 +134,10 @@ class AsyncRpcClient:
     def _close_idle(self) -> None:
         """Close connections that have not been used for a while, because each may occupy a thread in the server."""
         loop = asyncio.get_running_loop()
-        end = loop.time() - _KEEP_SECONDS / 2
+        end = loop.time() - KEEP_SECONDS / 2
         for connection in [each for kept in self._idle.values() for each in kept if each.used < end]:
             self.drop(connection)
-        self._sweep = loop.call_later(_KEEP_SECONDS, self._close_idle) if self._idle else None
+        self._sweep = loop.call_later(KEEP_SECONDS, self._close_idle) if self._idle else None
 
 
 class _Connection:

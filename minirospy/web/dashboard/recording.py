@@ -23,7 +23,7 @@ __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
 """Timeouts for stopping; long, because after SIGINT the file is completed, possibly on a slow disk."""
 
-_TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
+TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
 """Short timeouts while no file is open: a starting interpreter may lose a SIGINT that arrives in a callback of importlib."""
 
 _MAX_LINES = 20
@@ -146,7 +146,7 @@ class Recording:
 
     def _stop(self) -> None:
         has_file = any(path.exists() for path in self._paths)
-        end_processes([self._process], _TIMEOUTS if has_file else _TIMEOUTS_BEFORE_FILE, lambda _: None)
+        end_processes([self._process], _TIMEOUTS if has_file else TIMEOUTS_BEFORE_FILE, lambda _: None)
         self._reader.join()
         self._guardian.remove(self._process)
         self._guardian.close()

@@ -47,7 +47,7 @@ _TYPE_NAMES: Mapping[type, str] = {
 _MAX_PREVIEW = 200
 """Maximum characters of a value shown while the user types it."""
 
-_REPORT_SECONDS = 2.0
+REPORT_SECONDS = 2.0
 _MAX_CONCURRENT = 4
 """Concurrent requests from one client, because nodes that do not respond take seconds."""
 
@@ -113,7 +113,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             for session in tuple(self._watching):
                 session.report(data)
             # If nodes respond slowly, pause for longer.
-            await asyncio.sleep(max(_REPORT_SECONDS, 2 * (time.monotonic() - started)))
+            await asyncio.sleep(max(REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
     def topic_types(self) -> Mapping[str, str]:
         """Return the topic types that the master knows; ``*`` if there are only subscribers to any type."""

@@ -20,7 +20,7 @@ from minirospy.web.video.pictures import COMPRESSED, IMAGE, MAX_PIXELS, encoded,
 
 __all__ = ["VideoPages"]
 
-_SNAPSHOT_SECONDS = 10.0
+SNAPSHOT_SECONDS = 10.0
 _MAX_FEEDS = 32
 """Limit for concurrent feeds (a topic in one encoding), because each image is encoded once per feed."""
 _MAX_KEPT = 32_000_000
@@ -189,11 +189,11 @@ class VideoPages:
 
         def is_late() -> None:
             leave()
-            _refuse(exchange, 504, f"no image came on [{request.topic}] in {_SNAPSHOT_SECONDS:.0f} seconds")
+            _refuse(exchange, 504, f"no image came on [{request.topic}] in {SNAPSHOT_SECONDS:.0f} seconds")
 
         def start() -> None:
             nonlocal late, leave
-            late = asyncio.get_running_loop().call_later(_SNAPSHOT_SECONDS, is_late)
+            late = asyncio.get_running_loop().call_later(SNAPSHOT_SECONDS, is_late)
             leave = self._join(exchange, request, show)
 
         self._graph.spawn(self._when_published(exchange, request, start))

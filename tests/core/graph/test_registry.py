@@ -319,7 +319,7 @@ def test_topics_and_services_are_counted() -> None:
 
 
 def test_as_many_old_types_are_remembered_as_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(topic_types, "_MAX_OLD", 3)
+    monkeypatch.setattr(topic_types, "MAX_OLD", 3)
     registry = Registry()
     registry.register_publisher("/n", "/published", "a/B", "u")
     registry.register_subscriber("/n", "/subscribed", "a/B", "u")
@@ -344,7 +344,7 @@ def test_old_types_take_no_more_than_4_mib() -> None:
 
 
 def test_types_of_topics_that_are_gone_are_forgotten_one_day(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(topic_types, "_MAX_OLD", 10)
+    monkeypatch.setattr(topic_types, "MAX_OLD", 10)
     registry = Registry()
     registry.register_publisher("/n", "/kept", "a/B", "u")
     for number in range(100):

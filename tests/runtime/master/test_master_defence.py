@@ -227,14 +227,14 @@ def loop() -> Iterator[LoopThread]:
 
 
 def test_a_request_that_never_ends_is_hung_up_on(monkeypatch: pytest.MonkeyPatch, master: str) -> None:
-    monkeypatch.setattr(connections, "_REQUEST_SECONDS", 0.05)
+    monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.05)
     assert exchange(master, b"POST / HTTP/1.1\r\nContent-Length: 10\r\n\r\nabc") == b""
 
 
 def test_a_client_that_never_reads_is_hung_up_on(monkeypatch: pytest.MonkeyPatch, master: str) -> None:
     with ServerProxy(master) as proxy:
         proxy.setParam("/test", "/large", "x" * 1_000_000)
-        monkeypatch.setattr(connections, "_REQUEST_SECONDS", 0.3)
+        monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.3)
         with socket.create_connection(("127.0.0.1", int(master.rsplit(":", 1)[1])), 20) as sock:
             hung_up = False
             while not hung_up:
@@ -273,8 +273,8 @@ def test_of_many_connections_the_longest_silent_go(loop: LoopThread) -> None:
 def test_large_requests_are_refused_while_too_many_are_on_their_way(
     monkeypatch: pytest.MonkeyPatch, master: str
 ) -> None:
-    monkeypatch.setattr(rpc_server, "_MAX_HELD", 100_000)
-    monkeypatch.setattr(rpc_server, "_LARGE", 50_000)
+    monkeypatch.setattr(rpc_server, "MAX_HELD", 100_000)
+    monkeypatch.setattr(rpc_server, "LARGE_REQUEST", 50_000)
     half = post(b"x" * 300_000)[:150_000]
     assert exchange(master, half).startswith(b"HTTP/1.1 503")
     with ServerProxy(master) as proxy:

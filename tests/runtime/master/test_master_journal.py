@@ -208,7 +208,7 @@ def test_old_session_is_recovered_only_if_a_node_answers(
             os.utime(path, (time.time() - 86400 * 3,) * 2)
         if lives:
             # On a busy machine its answer may arrive late.
-            monkeypatch.setattr(master_module, "_QUICK_CHECK_SECONDS", 30.0)
+            monkeypatch.setattr(master_module, "QUICK_CHECK_SECONDS", 30.0)
         second = await start(path)
         assert call(second, "getParamNames", "/x") == (["/p"] if lives else [])
         assert set(second.registry.nodes()) == ({"/a"} if lives else set())
@@ -356,7 +356,7 @@ def test_damaged_journal_is_recovered_up_to_the_damage(path: Path, damage: str) 
 
 
 def test_two_masters_never_share_a_journal(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(master_module, "_LOCK_SECONDS", 0.0)
+    monkeypatch.setattr(master_module, "LOCK_SECONDS", 0.0)
 
     async def test() -> None:
         first = await start(path)
@@ -378,7 +378,7 @@ def test_two_masters_never_share_a_journal(path: Path, monkeypatch: pytest.Monke
 def test_journal_of_another_master_is_written_once_that_one_has_ended(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(master_module, "_LOCK_SECONDS", 0.0)
+    monkeypatch.setattr(master_module, "LOCK_SECONDS", 0.0)
     monkeypatch.setattr(journal_module, "RETRY_SECONDS", 0.0)
 
     async def test() -> None:
@@ -416,7 +416,7 @@ def test_master_without_the_port_never_locks_the_journal(path: Path) -> None:
 
 
 def test_master_waits_for_the_lock_of_one_that_exits(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(master_module, "_LOCK_SECONDS", 20.0)
+    monkeypatch.setattr(master_module, "LOCK_SECONDS", 20.0)
 
     async def test() -> None:
         ending = Journal(path, lambda: [["set", "/", {"p": 1}]])
@@ -647,8 +647,8 @@ def random_call(rng: random.Random) -> tuple[Any, ...]:
 def test_journal_replays_to_the_same_state_after_any_calls(
     path: Path, seed: int, compact: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(journal_module, "_COMPACT_BYTES", compact)
-    monkeypatch.setattr(journal_module, "_COMPACT_FACTOR", 1)
+    monkeypatch.setattr(journal_module, "COMPACT_BYTES", compact)
+    monkeypatch.setattr(journal_module, "COMPACT_FACTOR", 1)
 
     async def test() -> None:
         rng = random.Random(seed)

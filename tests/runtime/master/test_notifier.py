@@ -24,8 +24,8 @@ class Scene:
     """A notifier whose calls the test answers."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(notifier_module, "_MAX_CONCURRENT_CALLS", 4)
-        monkeypatch.setattr(notifier_module, "_CALLS_TO_SUSPECTS", 1)
+        monkeypatch.setattr(notifier_module, "MAX_CONCURRENT_CALLS", 4)
+        monkeypatch.setattr(notifier_module, "CALLS_TO_SUSPECTS", 1)
         self.under_way: dict[str, Callable[[bytes | RpcError], None]] = {}
         self.bodies: list[tuple[str, bytes]] = []
         """The calls in order: the node's URI, and the request."""
@@ -166,7 +166,7 @@ def test_notices_of_one_node_keep_their_order(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_many_parameters_become_one_notice_for_each_subscription(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(notifier_module, "_MAX_PARAMETERS", 3)
+    monkeypatch.setattr(notifier_module, "MAX_PARAMETERS", 3)
 
     async def scene(clock: ManualLoop) -> None:
         scene = Scene(monkeypatch)

@@ -120,7 +120,7 @@ def test_a_peer_that_requests_an_unknown_topic_gets_an_error(
 
 
 def test_clients_that_only_connect_leave_room_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(node_module, "_MAX_IDLE", 20)
+    monkeypatch.setattr(node_module, "MAX_IDLE", 20)
 
     async def scene() -> None:
         async with running() as node:

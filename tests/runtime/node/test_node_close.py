@@ -262,8 +262,8 @@ def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.Monke
 def test_close_gives_up_on_a_master_that_is_silent(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(registration, "_SILENT_SECONDS", 0.2)
-    monkeypatch.setattr(registration, "_NOTICE_SECONDS", 0.1)
+    monkeypatch.setattr(registration, "SILENT_SECONDS", 0.2)
+    monkeypatch.setattr(registration, "NOTICE_SECONDS", 0.1)
 
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:

@@ -216,7 +216,7 @@ def test_publisher_of_garbage_is_reported_and_retried_with_backoff(
         await tcp.receive_header(sock)
 
     async def scene() -> None:
-        monkeypatch.setattr("minirospy.core.graph.subscription._FIRST_DELAY", 0.001)
+        monkeypatch.setattr("minirospy.core.graph.subscription.FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             foreign, box = Foreign(garbage), Box()
             subscription = await subscribe_to(foreign, monkeypatch, b, box, on_loop=on_loop)
@@ -242,7 +242,7 @@ def test_a_publisher_whose_header_is_none_is_diagnosed_in_one_line(
         await asyncio.get_running_loop().sock_sendall(sock, answer)
 
     async def scene() -> None:
-        monkeypatch.setattr("minirospy.core.graph.subscription._FIRST_DELAY", 0.001)
+        monkeypatch.setattr("minirospy.core.graph.subscription.FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             foreign = Foreign(bad_header)
             subscription = await subscribe_to(foreign, monkeypatch, b, Box())
@@ -270,7 +270,7 @@ def test_an_address_that_cannot_be_reached_is_diagnosed_in_one_line(
     uri: str, advice: str, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def scene() -> None:
-        monkeypatch.setattr("minirospy.core.graph.subscription._FIRST_DELAY", 0.001)
+        monkeypatch.setattr("minirospy.core.graph.subscription.FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             subscription = b.make_subscription("/t", STRING, Box())
             subscription.publishers_changed([uri])
@@ -326,7 +326,7 @@ def test_many_publishers_that_cannot_be_reached_are_some_lines_and_a_number(
                 subscription._retry(uri, TimeoutError("no answer"))
             subscription.close()
 
-    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger._SECONDS", 1e9)
+    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger.INTERVAL_SECONDS", 1e9)
     run(scene)
     lines = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
     assert len(lines) == 11
@@ -831,7 +831,7 @@ def test_node_at_the_limit_of_threads_registers_with_restarted_masters(
 
 
 def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(topics, "_SETTLE_SECONDS", 0.01)
+    monkeypatch.setattr(topics, "SETTLE_SECONDS", 0.01)
 
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):

@@ -195,7 +195,7 @@ def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
 
 def test_a_kept_connection_ends_with_its_server(monkeypatch: pytest.MonkeyPatch) -> None:
     # The connection is closed with its server, not because it was idle.
-    monkeypatch.setattr("minirospy.runtime.rpc.async_client._KEEP_SECONDS", 1000.0)
+    monkeypatch.setattr("minirospy.runtime.rpc.async_client.KEEP_SECONDS", 1000.0)
 
     async def test() -> None:
         client, server = AsyncRpcClient(same_host=False), RpcServer(lambda *_: 5)

@@ -237,7 +237,7 @@ def test_a_master_is_reached_by_each_of_its_names(uri: str) -> None:
 def test_a_socket_name_of_another_user_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
     # As if this process, which took the name, belonged to a user who is neither this one nor root.
-    monkeypatch.setattr(local, "_TRUSTED", frozenset())
+    monkeypatch.setattr(local, "TRUSTED_USERS", frozenset())
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         taken = local.bind("127.0.0.1", port)

@@ -275,7 +275,7 @@ def test_chosen_topics_are_recorded(
 async def _subscribed(node: Any) -> list[str]:
     from minirospy.introspect.snapshot import fetch
 
-    return [topic for topic, nodes in (await fetch(node._node.master)).subscribers.items() if nodes]
+    return [topic for topic, nodes in (await fetch(node.call_master)).subscribers.items() if nodes]
 
 
 def json_error(page: Client) -> str:
@@ -352,7 +352,7 @@ def test_recorder_that_loses_the_signal_before_it_has_a_file_is_ended(
         return start_process(name, [sys.executable, "-c", program], **options)
 
     monkeypatch.setattr(recording, "start_process", ignoring)
-    monkeypatch.setattr(recording, "_TIMEOUTS_BEFORE_FILE", Timeouts(interrupt=0.1))
+    monkeypatch.setattr(recording, "TIMEOUTS_BEFORE_FILE", Timeouts(interrupt=0.1))
     started = Recording(tmp_path / "run.bag", ["/a"], "none", master)
     wait_until(lambda: "up" in started._lines)
     asyncio.run(started.stop())
