@@ -465,7 +465,7 @@ def test_topic_is_unsubscribed_and_subscribed_again_immediately(graph: MasterPro
 def test_cancelled_close_still_unregisters(graph: MasterProxy, monkeypatch: pytest.MonkeyPatch) -> None:
     async def main() -> None:
         async with Node("n") as node:
-            ask = node._node._registrations.call
+            ask = node._node.registrations.call
             slowly = asyncio.Event()
 
             async def answer_late(method: str, *args: Any) -> Any:
@@ -473,7 +473,7 @@ def test_cancelled_close_still_unregisters(graph: MasterProxy, monkeypatch: pyte
                 await slowly.wait()
                 return answer
 
-            monkeypatch.setattr(node._node._registrations, "call", answer_late)
+            monkeypatch.setattr(node._node.registrations, "call", answer_late)
             for handle in (node.subscribe("t", String), node.advertise("u", String)):
                 await until(lambda: bool(graph.get_system_state().subscribers.get("/t")))
                 with pytest.raises(asyncio.TimeoutError):
@@ -938,7 +938,7 @@ def test_unreachable_master_is_an_error(master: str) -> None:
     async def main() -> None:
         async with Node("n", master_uri=master) as node:
             node._environment = node._environment._replace(master_uri="http://localhost:1")
-            node._node._registrations._environment = node._environment
+            node._node.registrations._environment = node._environment
             with pytest.raises(MasterUnreachableError):
                 await node.get_param("/x")
 

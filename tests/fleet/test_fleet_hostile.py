@@ -80,10 +80,10 @@ def test_wants_of_peers_are_limited() -> None:
     spawned: list[Any] = []
     made = exporter(spawned)
     for number in range(MAX_WANTED + 5):
-        made._want_changed(want_key("robot1", "0" * 16, Want(f"/t{number}", "0" * 16)), True)
+        made.want_changed(want_key("robot1", "0" * 16, Want(f"/t{number}", "0" * 16)), True)
     for number in range(MAX_READERS + 5):
-        made._want_changed(want_key("robot1", "0" * 16, Want("/t0", f"{number:016x}")), True)
-    assert (len(made._readers), len(made._readers["/t0"])) == (MAX_WANTED, MAX_READERS)
+        made.want_changed(want_key("robot1", "0" * 16, Want("/t0", f"{number:016x}")), True)
+    assert (len(made.readers), len(made.readers["/t0"])) == (MAX_WANTED, MAX_READERS)
     for work in spawned:
         work.close()
 
@@ -114,10 +114,10 @@ def test_readers_that_come_and_go_leave_no_publishers_behind() -> None:
     sender = Sender(stub(outlet=outlet))
     flow = sender.flow(Priority.DATA)
     for number in range(3 * MAX_OUTLETS):
-        sender._priorities[Priority.DATA]._put(flow, f"reader{number}", b"")
-        sender._priorities[Priority.DATA]._put(flow, "all", b"")
-    assert len(there) == len(flow._outlets) == len(flow._numbers) == MAX_OUTLETS
-    assert flow._numbers["all"] == 3 * MAX_OUTLETS
+        sender.priorities[Priority.DATA].put(flow, f"reader{number}", b"")
+        sender.priorities[Priority.DATA].put(flow, "all", b"")
+    assert len(there) == len(flow.outlets) == len(flow.numbers) == MAX_OUTLETS
+    assert flow.numbers["all"] == 3 * MAX_OUTLETS
 
 
 def test_a_topic_that_is_closed_while_its_type_is_queried_is_not_published() -> None:

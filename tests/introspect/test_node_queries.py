@@ -55,7 +55,7 @@ def queried(scene: Callable[[Nodes, NodeQueries[str, str]], Awaitable[None]]) ->
             await asyncio.wait_for(scene(nodes, queries), LIMIT)
         finally:
             await queries.close()
-        assert not queries._tasks
+        assert not queries.tasks
 
     asyncio.run(run())
 
@@ -111,7 +111,7 @@ def test_answer_of_a_removed_node_is_discarded() -> None:
         await until(lambda: nodes.queried)
         await queries.look([], 0.0)
         nodes.may_answer.set()
-        await until(lambda: not queries._tasks)
+        await until(lambda: not queries.tasks)
         assert not queries.found
 
         nodes.dead.add("moved")
@@ -139,9 +139,9 @@ def test_a_node_that_failed_is_queried_again_after_a_pause() -> None:
         nodes.dead.add("a")
         await queries.look(["a"], LIMIT)
         await queries.look(["a"], LIMIT)
-        await until(lambda: not queries._tasks)
+        await until(lambda: not queries.tasks)
         assert nodes.queried == ["a"]
-        queries._not_before["a"] -= node_queries.AGAIN_SECONDS
+        queries.not_before["a"] -= node_queries.AGAIN_SECONDS
         nodes.dead.clear()
         await queries.look(["a"], LIMIT)
         await until(lambda: queries.found)
@@ -188,7 +188,7 @@ def test_a_query_that_takes_too_long_has_failed(monkeypatch: pytest.MonkeyPatch)
     async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
         nodes.silent.add("a")
         await queries.look(["a"], LIMIT)
-        assert "a" in queries._not_before
+        assert "a" in queries.not_before
 
     queried(scene)
 
@@ -234,7 +234,7 @@ def test_a_service_that_cannot_be_reached_is_not_reported(caplog: pytest.LogCapt
 
         queries = NodeQueries(answer, ErrorReporter(logging.getLogger("test"), "the query"))
         await queries.look(["/dead"], LIMIT)
-        assert "/dead" in queries._not_before
+        assert "/dead" in queries.not_before
         await queries.close()
 
     asyncio.run(asyncio.wait_for(run(), LIMIT))

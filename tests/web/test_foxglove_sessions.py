@@ -425,7 +425,7 @@ def test_restarted_publisher_is_connected_again(bridge: Running) -> None:
     assert text_of(client.next_binary(1))[1] == "first"
 
     async def restart() -> None:
-        bridge.bridge.graph._max_refresh_interval = 1000.0
+        bridge.bridge.graph.max_refresh_interval = 1000.0
         await node.close()
         again = Node("talker", rosout=False)
         await again.start()

@@ -439,7 +439,7 @@ def test_unadvertised_topic_lasts_for_the_timeout(run_bridge: Callable[..., Runn
     client.synchronize()
 
     async def unadvertised() -> None:
-        await until(lambda: "/x" not in bridge.bridge.graph._publishers)
+        await until(lambda: "/x" not in bridge.bridge.graph.publishers)
 
     bridge.run(asyncio.wait_for(unadvertised(), 30))
 
@@ -746,7 +746,7 @@ def test_operation_of_a_client_that_has_left_is_never_started(bridge: Running) -
         session.ended()
 
     async def settle() -> None:
-        await asyncio.gather(*bridge.bridge.graph._tasks, return_exceptions=True)
+        await asyncio.gather(*bridge.bridge.graph.tasks, return_exceptions=True)
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

@@ -31,7 +31,7 @@ def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running,
             await asyncio.sleep(0)
         publication.close()
         # Raise the exceptions of the tasks.
-        await asyncio.wait_for(asyncio.gather(*graph._tasks), 30)
+        await asyncio.wait_for(asyncio.gather(*graph.tasks), 30)
         assert "/short" not in graph.node._published
 
     bridge.run(advertise_and_close())

@@ -281,9 +281,9 @@ def test_client_that_leaves_early_leaves_no_subscription(camera: Running, path: 
     exchange: Any = Mock(request=request, is_open=False)
 
     async def serve() -> None:
-        bridge._video.handlers[path](exchange)
-        await asyncio.gather(*bridge.graph._tasks)
+        bridge.video.handlers[path](exchange)
+        await asyncio.gather(*bridge.graph.tasks)
 
     camera.run(serve())
-    assert not bridge._video._feeds
+    assert not bridge.video.feeds
     assert "/camera/image" not in bridge.graph.topics

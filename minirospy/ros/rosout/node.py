@@ -92,7 +92,7 @@ class RosoutNode:
             self.node.make_subscription(
                 "/rosout",
                 type_,
-                InTurns(self._on_message, self._turns.start, _MAX_BYTES, self._on_left_out),
+                InTurns(self.on_message, self._turns.start, _MAX_BYTES, self._on_left_out),
             )
         )
         await self._serve_loggers()
@@ -143,7 +143,7 @@ class RosoutNode:
             )
         )
 
-    def _on_message(self, frame: Frame, header: Header) -> Steps[None]:
+    def on_message(self, frame: Frame, header: Header) -> Steps[None]:
         assert self._aggregated
         body = bytes(frame)
         whole = serialize_frame(body)

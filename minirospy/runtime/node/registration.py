@@ -83,23 +83,23 @@ class Registrations:
         self._name = name
         self._environment = environment
         self._tables = tables
-        self._rpc = rpc
+        self.rpc = rpc
         # If no thread can be started, the functions stay queued, and the watch continues.
         self._again = InOrder(workers)
-        self._watch_seconds = watch_seconds
+        self.watch_seconds = watch_seconds
 
         self._known: dict[_Key, _Part | None] = {}
         """The object registered with the master; None if the call failed or has no response yet."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
-        self._watching: asyncio.Task[None] | None = None
+        self.watching: asyncio.Task[None] | None = None
         self._is_master_silent = False
         self._answered = 0.0  # time of the master's last response, by the loop's clock
         self._closed = False
 
     def watch(self) -> None:
         """Start checking whether the node is registered with the master."""
-        self._watching = asyncio.ensure_future(self._watch_master())
+        self.watching = asyncio.ensure_future(self._watch_master())
 
     async def close(self, *, announces: bool) -> None:
         """Unregister everything, and register nothing more; the first call is sent before anything else is done.
@@ -108,13 +108,13 @@ class Registrations:
         response for ``SILENT_SECONDS``. ``announces``: whether to log a line when this takes long.
         """
         self._closed = True
-        if self._watching:
-            self._watching.cancel()
+        if self.watching:
+            self.watching.cancel()
         await self._unregister_all(announces=announces)
 
     async def cancel(self) -> None:
         """Cancel the calls that have no response yet."""
-        tasks = [*self._registering, *([self._watching] if self._watching else [])]
+        tasks = [*self._registering, *([self.watching] if self.watching else [])]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -124,15 +124,15 @@ class Registrations:
 
         Raise MasterUnreachableError if it does not respond, RpcRefused with the master's message if it refuses the call.
         """
-        return unwrap(method, await self._call_master(method, self._name, *args))
+        return unwrap(method, await self.call_master(method, self._name, *args))
 
-    async def _call_master(self, method: str, *args: object) -> object:
+    async def call_master(self, method: str, *args: object) -> object:
         """Call any method of the master. Raise MasterUnreachableError if it does not respond, RpcError if the call fails."""
         uri = self._environment.master_uri
         # While the node closes, _wait_for_answers() decides when to give up.
         seconds = _CLOSING_CALL_SECONDS if self._closed else _CALL_SECONDS
         try:
-            answer = await self._rpc.call(uri, method, *args, timeout=seconds)
+            answer = await self.rpc.call(uri, method, *args, timeout=seconds)
         except RpcUnreachable as error:
             self._is_master_silent = True
             raise master_unreachable(error) from error
@@ -242,7 +242,7 @@ class Registrations:
         """
         failures = 0
         while not self._closed:
-            await asyncio.sleep(self._watch_seconds)
+            await asyncio.sleep(self.watch_seconds)
             if not (self._known or any(self._tables.values())):
                 continue
 
@@ -341,7 +341,7 @@ class Registrations:
 
     async def _probe_master(self) -> None:
         with contextlib.suppress(MasterUnreachableError, RpcError):
-            await self._call_master("getPid", self._name)
+            await self.call_master("getPid", self._name)
 
     async def _call_all(self, calls: Sequence[_Call]) -> None:
         """Make all calls, ignoring their results; batch them if the master has system.multicall (not all masters do).
@@ -354,7 +354,7 @@ class Registrations:
             answers: object = None
             if len(part) > 1:
                 with contextlib.suppress(RpcFault, RpcProtocolError):
-                    answers = await self._call_master("system.multicall", batch)
+                    answers = await self.call_master("system.multicall", batch)
             if not isinstance(answers, list) or len(answers) != len(part):
                 answers = [None] * len(part)
             for (method, args), answer in zip(part, answers, strict=True):

@@ -71,7 +71,7 @@ class Account:
         self.shed = 0
         """How often a client had to give up memory."""
         self._shares: set[Share] = set()
-        self._holders: Counter[int] = Counter()
+        self.holders: Counter[int] = Counter()
         """How often a large piece waits, by the id of the object, which exists as long as it waits."""
         self._is_enforcing = False
 
@@ -94,8 +94,8 @@ class Account:
             size = len(piece)
             if size >= LARGE_PIECE:
                 found += size
-                self._holders[id(piece)] += 1
-                if self._holders[id(piece)] == 1:
+                self.holders[id(piece)] += 1
+                if self.holders[id(piece)] == 1:
                     self.total += size
         return found
 
@@ -106,9 +106,9 @@ class Account:
             size = len(piece)
             if size >= LARGE_PIECE:
                 found += size
-                self._holders[id(piece)] -= 1
-                if not self._holders[id(piece)]:
-                    del self._holders[id(piece)]
+                self.holders[id(piece)] -= 1
+                if not self.holders[id(piece)]:
+                    del self.holders[id(piece)]
                     self.total -= size
         return found
 

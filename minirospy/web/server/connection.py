@@ -110,9 +110,9 @@ class Connection:
         self._websocket = WebSocket(self._select, limits.message, limits.messages_a_second)
         self._output = Output(pipe, SendQueue(limits.queue, share=self.share), self.share, loop, self._count)
         self._jobs = Jobs(limits.queue, self.share)  # work for the client that is not about what it sent
-        self._liveness = Liveness(limits.silent_seconds, now)
-        self._turn = site.turns.join(self._work)  # the client's share of the loop
-        self._turn.weight = _NEW_WEIGHT
+        self.liveness = Liveness(limits.silent_seconds, now)
+        self.turn = site.turns.join(self._work)  # the client's share of the loop
+        self.turn.weight = _NEW_WEIGHT
         self._endpoint: Endpoint | None = None  # set in the handshake, when the sub-protocol is chosen
         self._phase = _Phase.OPEN
         self._is_held_back = False  # while the client has sent as many frames as it may in this second
@@ -150,7 +150,7 @@ class Connection:
         """Take over bytes from the client."""
         if not self.is_open:
             return
-        self._liveness.heard(self._loop.time())
+        self.liveness.heard(self._loop.time())
         self.traffic.received_bytes += len(data)
         if self.exchange:
             return  # a connection has one request
@@ -158,7 +158,7 @@ class Connection:
         # A large message is read in large pieces, unless other clients wait for their turns.
         is_alone = len(data) >= SMALL_READ and not self._site.turns.is_busy
         self._pipe.read_bytes = LARGE_READ if is_alone else SMALL_READ
-        if self._is_held_back or self._is_paused or self._site.turns.start(self._turn):
+        if self._is_held_back or self._is_paused or self._site.turns.start(self.turn):
             self._pipe.pause()
         self._count_unfinished()
 
@@ -172,7 +172,7 @@ class Connection:
             return
         self._phase = _Phase.ENDED
         self._timer.cancel()
-        self._site.turns.leave(self._turn)
+        self._site.turns.leave(self.turn)
         self._discard_unfinished()
         try:
             if self.session:
@@ -256,7 +256,7 @@ class Connection:
         self._worked_on = 0
         self._count_unfinished()
         if self._phase is not _Phase.ENDED and not self._is_held_back:
-            self._site.turns.start(self._turn)
+            self._site.turns.start(self.turn)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
         """Do some work for the client in its turn, immediately if that is now; it keeps ``message`` until then.
@@ -269,7 +269,7 @@ class Connection:
         if not self.is_open:
             return
         self.queue.dropped += self._jobs.add(work, message)
-        self._site.turns.start(self._turn)
+        self._site.turns.start(self.turn)
         if self._jobs:
             self._count()
 
@@ -277,7 +277,7 @@ class Connection:
         """Stop or continue the work for the client, while the last of it goes on in a thread."""
         self._are_jobs_held = are_held
         if not are_held and self._jobs:
-            self._site.turns.start(self._turn)
+            self._site.turns.start(self.turn)
 
     def session_holds(self, count: int) -> None:
         """Count the bytes that the session holds for the client."""
@@ -328,7 +328,7 @@ class Connection:
             frame = websocket.next_frame()
             if frame is None:
                 break
-            self._framed(frame)
+            self.framed(frame)
             if time_of() >= end and websocket.has_unread and self.is_open:
                 return True
         if self.client and self._phase is not _Phase.ENDED:
@@ -340,7 +340,7 @@ class Connection:
             self._pipe.resume()
         return False
 
-    def _framed(self, frame: Frame) -> None:
+    def framed(self, frame: Frame) -> None:
         event = self._websocket.event_of(frame)
         if isinstance(event, Ping):
             # Only the newest ping needs an answer (RFC 6455, 5.5.3): at most one waits for a client that reads nothing.
@@ -373,12 +373,12 @@ class Connection:
         self._is_held_back = True
         self.traffic.held_back += 1
         self._pipe.pause()
-        self._loop.call_later(seconds, self._go_on)
+        self._loop.call_later(seconds, self.go_on)
 
-    def _go_on(self) -> None:
+    def go_on(self) -> None:
         self._is_held_back = False
         if not self._is_paused:
-            self._site.turns.start(self._turn)
+            self._site.turns.start(self.turn)
 
     def _answer_protocol(self) -> None:
         data = self._websocket.data_to_send()
@@ -425,10 +425,10 @@ class Connection:
         self._answer_protocol()
         self.client = WebClient(self, seen, grant, self._websocket.subprotocol)
         self.share.is_owner = self.client.is_owner
-        self._turn.weight = _WEIGHTS[grant]
+        self.turn.weight = _WEIGHTS[grant]
         if not self.client.may_write:
             self._websocket.restrict(min(self._limits.message, self._limits.read_only_message))
-        self._watch(self._ping)
+        self._watch(self.ping)
         self.session = self._endpoint.open(self.client)
 
     def _select(self, offered: Sequence[str]) -> str | None:
@@ -507,10 +507,10 @@ class Connection:
         self._timer.cancel()
         self._timer = self._loop.call_later(self._limits.ping_seconds, check)
 
-    def _ping(self) -> None:
+    def ping(self) -> None:
         """Ping the client, or disconnect it if it is gone."""
         output = self._output
-        verdict = self._liveness.check(self._loop.time(), output.progressed, is_full=output.is_full)
+        verdict = self.liveness.check(self._loop.time(), output.progressed, is_full=output.is_full)
         if verdict in (Verdict.STUCK, Verdict.SILENT):
             why = "reads nothing" if verdict is Verdict.STUCK else "does not answer"
             _log.info("%s %s: disconnected", self.peer, why)
@@ -519,12 +519,12 @@ class Connection:
         if verdict is Verdict.PING:
             self._websocket.ping(b"minirospy")
             self._answer_protocol()
-        self._watch(self._ping)
+        self._watch(self.ping)
 
     def _watch_progress(self) -> None:
         """Disconnect the client of a page if it reads nothing."""
         output = self._output
-        if self._liveness.is_stuck(self._loop.time(), output.progressed, is_full=output.is_full):
+        if self.liveness.is_stuck(self._loop.time(), output.progressed, is_full=output.is_full):
             self._abort()
             return
         self._watch(self._watch_progress)

@@ -83,8 +83,8 @@ class TestBuffer:
             with pytest.raises(InvalidArgumentException):
                 await anext(buffer.changes("map", ""))
             assert "cannot be empty" in (buffer.why_not("map", "") or "")
-            buffer._tree.insert("map", "base", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-            buffer._tree.insert("other", "tree", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+            buffer.tree.insert("map", "base", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+            buffer.tree.insert("other", "tree", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
             with pytest.raises(ExtrapolationException):
                 await buffer.lookup("map", "base", Time(9))
             with pytest.raises(ConnectivityException):
@@ -138,13 +138,13 @@ class TestBuffer:
         async def main(node: Node, buffer: Buffer) -> None:
             times = [Time(10)]
             node.now = lambda: times[-1]  # type: ignore[method-assign]
-            buffer._tree.insert("map", "base", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+            buffer.tree.insert("map", "base", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
             for later in (Time(10), Time(11)):
                 times.append(later)
-                buffer._check_for_jump()
+                buffer.check_for_jump()
                 assert buffer.why_not("map", "base") is None
             times.append(Time(5))
-            buffer._check_for_jump()
+            buffer.check_for_jump()
             assert buffer.why_not("map", "base")
 
         run(main)

@@ -299,7 +299,7 @@ def test_the_kept_answer_to_get_system_state_is_never_an_old_one() -> None:
 
     async def scene() -> None:
         master = Master()
-        master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+        master.notifier.send = lambda notice: None  # type: ignore[method-assign]
 
         for number in range(2000):
             node, uri, topic = rng.choice(nodes), rng.choice(uris), rng.choice(topics)

@@ -395,15 +395,15 @@ PIECES = st.sampled_from(
 def test_any_bytes_are_answered_or_refused(pieces: list[bytes]) -> None:
     async def test() -> None:
         master = Master()
-        master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+        master.notifier.send = lambda notice: None  # type: ignore[method-assign]
         await master.start()
         ours, theirs = socket.socketpair()
         ours.setblocking(False)
 
         with theirs:
             theirs.setblocking(False)
-            connection = connections.Connection(master._server, ours, asyncio.get_running_loop())
-            master._server.connections[connection] = None
+            connection = connections.Connection(master.server, ours, asyncio.get_running_loop())
+            master.server.connections[connection] = None
 
             for piece in pieces:
                 if connection._state is connections.State.OPEN:
@@ -413,7 +413,7 @@ def test_any_bytes_are_answered_or_refused(pieces: list[bytes]) -> None:
 
             connection.end()
 
-        assert master._server.held == 0
+        assert master.server.held == 0
         assert master.dispatch("getSystemState", ["/x"])[0] == 1
         parse_response(serialize_response(master.dispatch("getParam", ["/x", "/"])))
         await master.close()
@@ -448,7 +448,7 @@ METHODS = [
 def test_any_call_is_answered(calls: list[tuple[str, list[Any]]]) -> None:
     async def test() -> None:
         master = Master()
-        master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+        master.notifier.send = lambda notice: None  # type: ignore[method-assign]
         for method, args in calls:
             try:
                 answer = result_of(master.dispatch(method, args))

@@ -273,8 +273,8 @@ def test_recovered_node_is_forgotten_after_three_tries_of_three_seconds(
         await first.close(keep_journal=True)
         nodes = Answers(monkeypatch, *answers)
         second = await start(path)
-        assert second._checking
-        await second._checking
+        assert second.checking
+        await second.checking
         assert nodes.calls == [(uri, "getName", 3.0)] * tries
         assert set(second.registry.nodes()) == ({"/a"} if is_kept else set())
         await second.close()
@@ -317,13 +317,13 @@ def test_master_gives_a_sign_of_life_every_thirty_seconds(path: Path) -> None:
         before = loop.time()
         master = await start(path)
         os.utime(path, (1, 1))
-        assert master._touching
-        assert before + 30 <= master._touching.when() <= loop.time() + 30
+        assert master.touching
+        assert before + 30 <= master.touching.when() <= loop.time() + 30
         # As the timer does.
-        first = master._touching
-        master._touch()
+        first = master.touching
+        master.touch()
         assert path.stat().st_mtime > 1
-        assert master._touching is not first
+        assert master.touching is not first
         first.cancel()
         await master.close()
 
@@ -386,7 +386,7 @@ def test_journal_of_another_master_is_written_once_that_one_has_ended(
         call(first, "setParam", "/a", "/q", 1)
         second = await start(path)
         os.utime(path, (0, 0))
-        second._touch()
+        second.touch()
         assert path.stat().st_mtime == 0
         call(second, "setParam", "/a", "/p", 1)
         assert "held by another master" in call(second, "minirospy.status", "/x")["journal"]
@@ -568,7 +568,7 @@ def test_failed_journal_is_retried_without_a_call(path: Path, monkeypatch: pytes
             master = await start(path)
             master.parameters.set("/p", 1, "")
         monkeypatch.setattr(journal_module, "RETRY_SECONDS", 0.0)
-        master._touch()
+        master.touch()
         assert not call(master, "minirospy.status", "/x")["journal"].startswith("failing")
         assert ["set", "/", {"p": 1}] in parse_journal(path.read_bytes()).records
         await master.close()
@@ -653,7 +653,7 @@ def test_journal_replays_to_the_same_state_after_any_calls(
     async def test() -> None:
         rng = random.Random(seed)
         master = await start(path)
-        master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+        master.notifier.send = lambda notice: None  # type: ignore[method-assign]
         for number in range(400):
             method, *args = random_call(rng)
             master.dispatch(method, args)

@@ -32,7 +32,7 @@ class Scene:
         self.publishers: list[str] = []
         self.values: dict[str, object] = {}
         self.notifier = Notifier(self, Turns(), timeout=3.0)  # type: ignore[arg-type]
-        monkeypatch.setattr(self.notifier._rpc, "start", self.start)
+        monkeypatch.setattr(self.notifier.rpc, "start", self.start)
 
     def publisher_uris(self, topic: str) -> list[str]:
         return list(self.publishers)
@@ -227,7 +227,7 @@ def test_updates_of_many_publishers_are_rate_limited(monkeypatch: pytest.MonkeyP
         assert [args[1] for _, args in scene.calls] == ["/many", "/few", "/many"]
         # A node whose pause is over uses neither memory nor time.
         await clock.advance(0.06)
-        assert not scene.notifier._nodes
+        assert not scene.notifier.nodes
         await scene.notifier.close()
 
     run_manually(scene)
@@ -273,9 +273,9 @@ def test_a_node_on_the_loop_is_notified_without_a_call(monkeypatch: pytest.Monke
         await clock.advance(0.02)
         assert received[2:] == [("/many", 1000)]
         await clock.advance(0.06)
-        assert not scene.notifier._nodes
+        assert not scene.notifier.nodes
         assert not scene.under_way
-        assert not scene.notifier._line.under_way
+        assert not scene.notifier.line.under_way
         await scene.notifier.close()
 
     run_manually(scene)

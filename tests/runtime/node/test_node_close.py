@@ -32,18 +32,18 @@ class FakeMaster:
         self.release = asyncio.Event()
         self.release.set()
         self._has_multicall = multicall
-        self._server = RpcServer(self._dispatch)
+        self.server = RpcServer(self._dispatch)
 
     async def __aenter__(self) -> FakeMaster:
-        await self._server.start()
+        await self.server.start()
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        await self._server.close()
+        await self.server.close()
 
     @property
     def uri(self) -> str:
-        return f"http://127.0.0.1:{self._server.port}"
+        return f"http://127.0.0.1:{self.server.port}"
 
     @property
     def unregistered(self) -> list[str]:
@@ -122,7 +122,7 @@ def test_close_repeats_what_a_multicall_did_not_do() -> None:
                     answer[1:] = [{"faultCode": 1, "faultString": "too long"}] * (TOPICS - 1)
                 return answer
 
-            master._server.dispatch = refuse_most
+            master.server.dispatch = refuse_most
             await node.close()
             assert master.unregistered == ALL
 
@@ -154,7 +154,7 @@ def test_registration_waits_for_a_master_that_is_busy_for_20_seconds() -> None:
                 await master.release.wait()
                 return await dispatch(method, args)
 
-            master._server.dispatch = answer_late
+            master.server.dispatch = answer_late
             master.release.clear()
             registering = asyncio.ensure_future(node.advertise(Publication("/late", STRING)))
             await arrived.wait()
@@ -213,7 +213,7 @@ def test_close_waits_for_a_master_that_is_busy_for_minutes() -> None:
                     await busy.wait()
                 return await dispatch(method, args)
 
-            master._server.dispatch = answer_short_calls
+            master.server.dispatch = answer_short_calls
             closing = asyncio.ensure_future(node.close())
             for number in range(40):
                 await clock.advance(3.0)
@@ -236,8 +236,8 @@ def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.Monke
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:
             node = await publishing_node(master.uri)
-            registrations = node._registrations
-            registrations._watch_seconds = 0.0
+            registrations = node.registrations
+            registrations.watch_seconds = 0.0
             looking = asyncio.Event()
 
             async def lose(awaitable: Coroutine[Any, Any, Any], _: float) -> None:
@@ -250,8 +250,8 @@ def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.Monke
 
             with monkeypatch.context() as patch:
                 patch.setattr(registration.asyncio, "wait_for", lose)
-                assert registrations._watching
-                registrations._watching.cancel()
+                assert registrations.watching
+                registrations.watching.cancel()
                 registrations.watch()
                 await looking.wait()
                 await node.close()

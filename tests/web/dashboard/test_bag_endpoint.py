@@ -331,7 +331,7 @@ def test_recording_is_kept_if_its_page_closes_during_its_start(
 ) -> None:
     served = serve()
     assert served.dashboard
-    endpoint = served.dashboard._bags
+    endpoint = served.dashboard.bags
     page = client(served)
     page.send("record", topics=["/a"], name="run", suffix=".bag", compression="none")
     assert starting.reached.wait(60)
@@ -417,7 +417,7 @@ def test_bag_is_closed_if_its_page_closes_during_opening(
     make_bag(folder / "a.bag", 1)
     served = serve()
     assert served.dashboard
-    endpoint = served.dashboard._bags
+    endpoint = served.dashboard.bags
     page = client(served)
     page.send("open", name="a.bag")
     assert gate.reached.wait(60)
