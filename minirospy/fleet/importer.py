@@ -141,7 +141,7 @@ class Importer:
         await self._node.parameters.add(MACHINES)
         await self._read_machines()
         self._declared = [
-            self._network.watch_tokens(f"{ROOT}/{kind}/**", self._changed)
+            self._network.watch_tokens(f"{ROOT}/{kind}/**", self.changed)
             for kind in ("robot", "topic", "service")
         ]
         self._watching = [
@@ -167,7 +167,7 @@ class Importer:
         robots, self.robots = self.robots, {}
         await asyncio.gather(*(self._remove(robot) for robot in robots.values()))
 
-    def _changed(self, key: str, is_there: bool) -> None:
+    def changed(self, key: str, is_there: bool) -> None:
         refused = self.contents.refused
         changed = self.contents.add(key) if is_there else self.contents.remove(key)
         if self.contents.refused != refused:

@@ -133,7 +133,7 @@ class Ros2Bridge:
         self.node = node
         self.side = side
         self.options = options
-        self.topics: LinkTable[Link, _ToRos1 | _ToRos2] = LinkTable(node.log, self._make)
+        self.topics: LinkTable[Link, _ToRos1 | PassingToRos2] = LinkTable(node.log, self._make)
         self.header = marker("")
         self.services = ServiceBridge(
             node, side, options.services, options.rules, catalogue, options.call_seconds
@@ -263,15 +263,15 @@ class Ros2Bridge:
             spec, lookup = self._types.installed(link.ros1_type)
         return self._types.transcoder(spec, lookup, link.ros2_type), spec, lookup
 
-    def _make(self, link: Link) -> _ToRos1 | _ToRos2:
+    def _make(self, link: Link) -> _ToRos1 | PassingToRos2:
         made, spec, lookup = self._converter(link)
         depth = _DEPTH_OF_LARGE if keeps_buffer(spec, lookup) else _DEPTH
         if link.direction is Direction.TO_ROS2:
-            return _ToRos2(self, link, made, depth)
+            return PassingToRos2(self, link, made, depth)
         return _ToRos1(self, link, made, depth, self._types.interface(spec, lookup))
 
 
-class _Passing:
+class TopicPassing:
     """An open link; ``passed`` is the number of messages passed."""
 
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder) -> None:
@@ -303,7 +303,7 @@ class _Passing:
         self._misfits.error("a message on %s (%s): %s", self.link.topic, self.link.direction.value, error)
 
 
-class _ToRos2(_Passing):
+class PassingToRos2(TopicPassing):
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder, depth: int) -> None:
         super().__init__(bridge, link, made)
         self._publisher: Ros2Publisher = bridge.side.publisher(
@@ -340,7 +340,7 @@ class _ToRos2(_Passing):
             self.passed += 1
 
 
-class _ToRos1(_Passing):
+class _ToRos1(TopicPassing):
     def __init__(
         self, bridge: Ros2Bridge, link: Link, made: Transcoder, depth: int, interface: InterfaceType
     ) -> None:

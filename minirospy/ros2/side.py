@@ -173,7 +173,7 @@ class RclpySide:
         """
         profile = self._profile(depth, is_reliable=True, is_latched=is_latched)
         publisher = self._node.create_publisher(self.message_class(type_), topic, profile)
-        return _Publisher(self._calls, self._node, publisher)
+        return TopicPublisher(self._calls, self._node, publisher)
 
     def subscribe(
         self,
@@ -190,7 +190,7 @@ class RclpySide:
         Raise TypesDiffer if the type is not installed.
         """
         profile = self._profile(depth, is_reliable=is_reliable, is_latched=is_latched)
-        return _Subscription(self._calls, self._node, self.message_class(type_), topic, deliver, profile)
+        return TopicSubscription(self._calls, self._node, self.message_class(type_), topic, deliver, profile)
 
     def nodes(self) -> list[tuple[str, str]]:
         """Return the names and namespaces of all nodes except for bridges."""
@@ -338,7 +338,7 @@ class _Served:
         self._calls.end(self._on_close)
 
 
-class _Publisher:
+class TopicPublisher:
     def __init__(self, calls: Calls, node: _Node, publisher: _RclpyPublisher) -> None:
         self._calls = calls
         self._node = node
@@ -355,7 +355,7 @@ class _Publisher:
         self._calls.end(lambda: self._node.destroy_publisher(self._publisher))
 
 
-class _Subscription:
+class TopicSubscription:
     def __init__(
         self,
         calls: Calls,

@@ -348,7 +348,7 @@ def test_names_that_are_left_out_are_reported_in_one_line(
         stub(), stub(), stub(), stub(), stub(), "0" * 16, "", GatewayRules(), lambda _: None, lambda: 0
     )
     for number in range(100):
-        made._changed(topic_key(TOKEN._replace(topic=f"/t{number}")), True)
+        made.changed(topic_key(TOKEN._replace(topic=f"/t{number}")), True)
     assert [record.getMessage() for record in caplog.records] == [
         "what a gateway announces is not shown: the fleet announces more than 0 topics and services"
     ]

@@ -121,7 +121,7 @@ def test_a_gateway_that_ends_takes_its_robot_away_until_it_is_back(fleet: Fleet)
     fleet.until(lambda: fleet.gateways[0].importer.robots == {})  # type: ignore[union-attr]
 
     async def is_gone() -> bool:
-        return "/robot1/chat" not in {topic for topic, _ in (await control._state())[0]}
+        return "/robot1/chat" not in {topic for topic, _ in (await control.fetch_state())[0]}
 
     fleet.until(is_gone)
 
@@ -500,7 +500,7 @@ def test_the_commands_from_start_to_kill(fleet: Fleet, start: Callable[..., subp
     gateway.kill()
 
     async def is_gone() -> bool:
-        return "/robot1/chat" not in {topic for topic, _ in (await control._state())[0]}
+        return "/robot1/chat" not in {topic for topic, _ in (await control.fetch_state())[0]}
 
     fleet.until(is_gone)
     for process in (room, router):

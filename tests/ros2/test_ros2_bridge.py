@@ -25,7 +25,7 @@ from minirospy.core.idl.load import message_class
 from minirospy.core.tf2.statics import StaticTransforms
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.snapshot import Snapshot, fetch
-from minirospy.ros2.bridge import Ros2Bridge, Ros2Options, _Passing
+from minirospy.ros2.bridge import Ros2Bridge, Ros2Options, TopicPassing
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.link_table import Pair
 from minirospy.ros2.links import BRIDGE_PREFIX, Direction, Link, Ros2End, Ros2Topic, links, marker
@@ -654,7 +654,7 @@ def test_static_transforms_over_the_limit_are_reported(
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         link = Link("/tf_static", Direction.TO_ROS2, "tf2_msgs/TFMessage", "tf2_msgs/TFMessage", True)
-        passing = _Passing(bridge, link, cast("Any", None))
+        passing = TopicPassing(bridge, link, cast("Any", None))
         for _ in range(3):
             assert passing._with_statics(transforms("a", "b")) == transforms("a")
 

@@ -544,7 +544,7 @@ def test_status_level_selects_what_is_sent(bridge: Running) -> None:
     client.send(op="jump")
     client.send(op="set_level", level="error")
     client.synchronize()
-    assert not [each for each in client._kept if each["op"] == "status"]
+    assert not [each for each in client.kept if each["op"] == "status"]
 
 
 def test_globs_hide_topics_and_services(run_bridge: Callable[..., Running]) -> None:

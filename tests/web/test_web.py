@@ -475,7 +475,7 @@ def test_message_rate_is_held_back_and_nothing_is_lost(run_bridge: Callable[...,
     bridge = run_bridge(limits=Limits(messages_a_second=50))
     start_time, all_sent = time.monotonic(), threading.Event()
     client, other = bridge.client(), bridge.client()
-    bridge._loop.post(all_sent.wait)
+    bridge.loop.post(all_sent.wait)
     for number in range(120):
         client.send(op="getParameters", parameterNames=["/none"], id=str(number))
     all_sent.set()
@@ -619,7 +619,7 @@ def test_clients_with_more_rights_have_more_of_the_loop_and_longer_messages(
 ) -> None:
     _, connection, _ = connected(Limits(), 0.0, grant)
     assert connection.turn.weight == weight
-    new = Connection(connection._site, Mock(is_full=False), "127.0.0.1", connection._loop)
+    new = Connection(connection.site, Mock(is_full=False), "127.0.0.1", connection.loop)
     assert new.turn.weight < 1.0
     connection.received(b"\x81\xff" + (65_537).to_bytes(8, "big") + bytes(4))
     connection.received(bytes(100))
@@ -839,7 +839,7 @@ def test_encrypted_connections_are_served(run_bridge: Callable[..., Running], tm
     bridge = run_bridge(certificate=str(certificate), key=str(key))
     context = ssl.create_default_context(cafile=str(certificate))
     bridge.publisher(bridge.node("talker"), "/t", UInt8MultiArray, latch=True)
-    publisher = bridge.publisher(bridge._nodes[-1], "/big", UInt8MultiArray, latch=True)
+    publisher = bridge.publisher(bridge.nodes[-1], "/big", UInt8MultiArray, latch=True)
     data = bytes(range(256)) * 20_000
     bridge.run(publisher.publish(data=data))
     client = bridge.client(scheme="wss", ssl=context)

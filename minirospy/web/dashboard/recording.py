@@ -69,7 +69,7 @@ class Recording:
         self._paths = (path.with_name(f"{path.name}.active"), path)
         self._master_uri = master_uri
         self._topics = tuple(topics)
-        self._lines: deque[str] = deque(maxlen=_MAX_LINES)
+        self.lines: deque[str] = deque(maxlen=_MAX_LINES)
         self._started = time.monotonic()
         self._seconds: float | None = None
         self._guardian = Guardian(_TIMEOUTS, master_uri)
@@ -114,7 +114,7 @@ class Recording:
         assert stream
         with stream:
             for line in stream:
-                self._lines.append(line.decode("utf-8", "replace").rstrip())
+                self.lines.append(line.decode("utf-8", "replace").rstrip())
         self._process.popen.wait()
         self._seconds = time.monotonic() - self._started
 
@@ -135,7 +135,7 @@ class Recording:
             error = "it was stopped before it had started: nothing was recorded"
         elif status:
             error = next(
-                (line for line in reversed(tuple(self._lines)) if "ERROR" in line or "rror" in line),
+                (line for line in reversed(tuple(self.lines)) if "ERROR" in line or "rror" in line),
                 f"rosbag record ended with status {status}",
             )
         return RecordingState(self._path.name, self._topics, seconds, size, status is not None, error)

@@ -103,10 +103,10 @@ class Connection:
         self.rank = Rank.SILENT  # the rights; set by the listener when it admits the request
         self.active = now  # when the connection was opened, or last received a message or sent one
         self.unfinished = 0  # bytes of a message that is not complete, or that the session works on
-        self._site = site  # the listener
+        self.site = site  # the listener
         self._limits = limits  # the listener's
         self._pipe = pipe  # the transport
-        self._loop = loop
+        self.loop = loop
         self._websocket = WebSocket(self._select, limits.message, limits.messages_a_second)
         self._output = Output(pipe, SendQueue(limits.queue, share=self.share), self.share, loop, self._count)
         self._jobs = Jobs(limits.queue, self.share)  # work for the client that is not about what it sent
@@ -150,15 +150,15 @@ class Connection:
         """Take over bytes from the client."""
         if not self.is_open:
             return
-        self.liveness.heard(self._loop.time())
+        self.liveness.heard(self.loop.time())
         self.traffic.received_bytes += len(data)
         if self.exchange:
             return  # a connection has one request
         self._websocket.feed(data)
         # A large message is read in large pieces, unless other clients wait for their turns.
-        is_alone = len(data) >= SMALL_READ and not self._site.turns.is_busy
+        is_alone = len(data) >= SMALL_READ and not self.site.turns.is_busy
         self._pipe.read_bytes = LARGE_READ if is_alone else SMALL_READ
-        if self._is_held_back or self._is_paused or self._site.turns.start(self.turn):
+        if self._is_held_back or self._is_paused or self.site.turns.start(self.turn):
             self._pipe.pause()
         self._count_unfinished()
 
@@ -172,7 +172,7 @@ class Connection:
             return
         self._phase = _Phase.ENDED
         self._timer.cancel()
-        self._site.turns.leave(self.turn)
+        self.site.turns.leave(self.turn)
         self._discard_unfinished()
         try:
             if self.session:
@@ -185,8 +185,8 @@ class Connection:
         # The connection is part of reference cycles: release its memory now, not when they are collected.
         self._jobs.clear()
         self._output.end()
-        self._site.account.close(self.share)
-        self._site.left(self)
+        self.site.account.close(self.share)
+        self.site.left(self)
 
     # --- to the pipe
 
@@ -217,7 +217,7 @@ class Connection:
             if self._output.is_full:
                 self._count()
             else:
-                self.active = self._loop.time()
+                self.active = self.loop.time()
             self._output.schedule()
 
     def close_when_sent(self) -> None:
@@ -225,7 +225,7 @@ class Connection:
         self._close()
         self._output.close_when_sent()
         self._timer.cancel()
-        self._timer = self._loop.call_later(self._limits.handshake_seconds, self._abort)
+        self._timer = self.loop.call_later(self._limits.handshake_seconds, self._abort)
 
     def close_websocket(self, code: int, reason: str) -> None:
         """Send a close frame, and end the connection when everything that is queued has been sent."""
@@ -256,7 +256,7 @@ class Connection:
         self._worked_on = 0
         self._count_unfinished()
         if self._phase is not _Phase.ENDED and not self._is_held_back:
-            self._site.turns.start(self.turn)
+            self.site.turns.start(self.turn)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
         """Do some work for the client in its turn, immediately if that is now; it keeps ``message`` until then.
@@ -269,7 +269,7 @@ class Connection:
         if not self.is_open:
             return
         self.queue.dropped += self._jobs.add(work, message)
-        self._site.turns.start(self.turn)
+        self.site.turns.start(self.turn)
         if self._jobs:
             self._count()
 
@@ -277,7 +277,7 @@ class Connection:
         """Stop or continue the work for the client, while the last of it goes on in a thread."""
         self._are_jobs_held = are_held
         if not are_held and self._jobs:
-            self._site.turns.start(self.turn)
+            self.site.turns.start(self.turn)
 
     def session_holds(self, count: int) -> None:
         """Count the bytes that the session holds for the client."""
@@ -310,7 +310,7 @@ class Connection:
             except Exception:  # noqa: BLE001 whatever a session raises ends this client alone
                 _log.exception("a message for %s could not be sent", self.peer)
                 self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on a message")
-            if self._loop.time() >= end and self.is_open:
+            if self.loop.time() >= end and self.is_open:
                 return bool((self._jobs and not self._are_jobs_held) or self._websocket.has_unread)
         return False
 
@@ -318,7 +318,7 @@ class Connection:
         """Handle frames up to a time; return whether more are left, of what the client may send in this second."""
         if self.client is None:
             self._parse_head()
-        websocket, rate, time_of = self._websocket, self._websocket.rate, self._loop.time
+        websocket, rate, time_of = self._websocket, self._websocket.rate, self.loop.time
         now = time_of()
         rate.update(now)
         while self.client and self.is_open and not (self._is_paused or self._is_held_back):
@@ -352,7 +352,7 @@ class Connection:
         assert self.session
         data = message.data
         self.traffic.received += 1
-        self.active = self._loop.time()
+        self.active = self.loop.time()
         try:
             if not message.is_text:
                 self.session.received_binary(data)
@@ -373,12 +373,12 @@ class Connection:
         self._is_held_back = True
         self.traffic.held_back += 1
         self._pipe.pause()
-        self._loop.call_later(seconds, self.go_on)
+        self.loop.call_later(seconds, self.go_on)
 
     def go_on(self) -> None:
         self._is_held_back = False
         if not self._is_paused:
-            self._site.turns.start(self.turn)
+            self.site.turns.start(self.turn)
 
     def _answer_protocol(self) -> None:
         data = self._websocket.data_to_send()
@@ -408,8 +408,8 @@ class Connection:
 
     def _admitted(self, head: RequestHead) -> tuple[HttpRequest, Grant, bool] | Refusal:
         """Return a request, its rights and whether it is for a page, or why it is refused. Raise ValueError."""
-        grant = self._site.check(head.credentials, is_page=head.is_page)
-        refusal = grant if isinstance(grant, Refusal) else self._site.admit(self, grant)
+        grant = self.site.check(head.credentials, is_page=head.is_page)
+        refusal = grant if isinstance(grant, Refusal) else self.site.admit(self, grant)
         if refusal:
             return refusal
         assert isinstance(grant, Grant)
@@ -434,7 +434,7 @@ class Connection:
     def _select(self, offered: Sequence[str]) -> str | None:
         """Choose the endpoint; return its sub-protocol. Raise NegotiationError."""
         why = "nothing is served here"
-        for endpoint in self._site.endpoints:
+        for endpoint in self.site.endpoints:
             try:
                 chosen = endpoint.select(offered)
             except LookupError as error:
@@ -445,12 +445,12 @@ class Connection:
         raise NegotiationError(why)
 
     def _serve_page(self, request: HttpRequest, grant: Grant) -> None:
-        handler = self._site.page(request.path)
+        handler = self.site.page(request.path)
         if handler is None:
             self._refuse(Refusal(404, "there is no such page; WebSocket clients are served here"))
             return
         self.exchange = Exchange(self, request, grant)
-        self._output.progressed = self._loop.time()
+        self._output.progressed = self.loop.time()
         self._watch(self._watch_progress)
         try:
             handler(self.exchange)
@@ -505,12 +505,12 @@ class Connection:
     def _watch(self, check: Callable[[], None]) -> None:
         """Call ``check`` after the time between two pings, in place of what watched the connection until now."""
         self._timer.cancel()
-        self._timer = self._loop.call_later(self._limits.ping_seconds, check)
+        self._timer = self.loop.call_later(self._limits.ping_seconds, check)
 
     def ping(self) -> None:
         """Ping the client, or disconnect it if it is gone."""
         output = self._output
-        verdict = self.liveness.check(self._loop.time(), output.progressed, is_full=output.is_full)
+        verdict = self.liveness.check(self.loop.time(), output.progressed, is_full=output.is_full)
         if verdict in (Verdict.STUCK, Verdict.SILENT):
             why = "reads nothing" if verdict is Verdict.STUCK else "does not answer"
             _log.info("%s %s: disconnected", self.peer, why)
@@ -524,7 +524,7 @@ class Connection:
     def _watch_progress(self) -> None:
         """Disconnect the client of a page if it reads nothing."""
         output = self._output
-        if self.liveness.is_stuck(self._loop.time(), output.progressed, is_full=output.is_full):
+        if self.liveness.is_stuck(self.loop.time(), output.progressed, is_full=output.is_full):
             self._abort()
             return
         self._watch(self._watch_progress)

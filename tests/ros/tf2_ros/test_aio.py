@@ -55,8 +55,8 @@ class TestBuffer:
             await broadcaster.send_static(stamped("map", "odom", 0, 1.0))
             await broadcaster.send_static(stamped("base", "laser", 0, 0.5))
             await broadcaster.send()
-            assert broadcaster._moving is not None
-            await broadcaster._moving.wait_for_subscribers()
+            assert broadcaster.moving is not None
+            await broadcaster.moving.wait_for_subscribers()
             await broadcaster.send(stamped("odom", "base", 1, 1.0))
             await broadcaster.send(stamped("odom", "base", 3, 3.0), stamped("base", "wheel", 3))
             found = await waiting
@@ -108,8 +108,8 @@ class TestBuffer:
 
             following = asyncio.create_task(follow())
             await broadcaster.send()
-            assert broadcaster._moving is not None
-            await broadcaster._moving.wait_for_subscribers()
+            assert broadcaster.moving is not None
+            await broadcaster.moving.wait_for_subscribers()
             await broadcaster.send(stamped("map", "base", 1, 0.0))
             await following
             assert places == [0.5, 1.5, 2.5]

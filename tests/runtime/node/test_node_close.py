@@ -32,7 +32,7 @@ class FakeMaster:
         self.release = asyncio.Event()
         self.release.set()
         self._has_multicall = multicall
-        self.server = RpcServer(self._dispatch)
+        self.server = RpcServer(self.dispatch)
 
     async def __aenter__(self) -> FakeMaster:
         await self.server.start()
@@ -49,7 +49,7 @@ class FakeMaster:
     def unregistered(self) -> list[str]:
         return sorted(args[1] for method, args in self.calls if method.startswith("unregister"))
 
-    async def _dispatch(self, method: str, args: Sequence[Any]) -> Any:
+    async def dispatch(self, method: str, args: Sequence[Any]) -> Any:
         self.calls.append((method, args))
         if not method.startswith("register"):
             await self.release.wait()
@@ -113,7 +113,7 @@ def test_close_repeats_what_a_multicall_did_not_do() -> None:
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:
             node = await publishing_node(master.uri)
-            dispatch = master._dispatch
+            dispatch = master.dispatch
 
             async def refuse_most(method: str, args: Sequence[Any]) -> Any:
                 answer = await dispatch(method, args)
@@ -147,7 +147,7 @@ def test_registration_waits_for_a_master_that_is_busy_for_20_seconds() -> None:
             arrived, passed = asyncio.Event(), 0.0
             clock = loop.time
             loop.time = lambda: clock() + passed  # type: ignore[method-assign]
-            dispatch = master._dispatch
+            dispatch = master.dispatch
 
             async def answer_late(method: str, args: Sequence[Any]) -> Any:
                 arrived.set()
@@ -206,7 +206,7 @@ def test_close_waits_for_a_master_that_is_busy_for_minutes() -> None:
     async def scene(clock: ManualLoop) -> None:
         async with FakeMaster(multicall=True) as master:
             node = await publishing_node(master.uri)
-            busy, dispatch = asyncio.Event(), master._dispatch
+            busy, dispatch = asyncio.Event(), master.dispatch
 
             async def answer_short_calls(method: str, args: Sequence[Any]) -> Any:
                 if method == "system.multicall":

@@ -354,7 +354,7 @@ def test_recorder_that_loses_the_signal_before_it_has_a_file_is_ended(
     monkeypatch.setattr(recording, "start_process", ignoring)
     monkeypatch.setattr(recording, "TIMEOUTS_BEFORE_FILE", Timeouts(interrupt=0.1))
     started = Recording(tmp_path / "run.bag", ["/a"], "none", master)
-    wait_until(lambda: "up" in started._lines)
+    wait_until(lambda: "up" in started.lines)
     asyncio.run(started.stop())
     assert started.state().error == "it was stopped before it had started: nothing was recorded"
 
@@ -372,7 +372,7 @@ def test_recorder_that_ends_without_a_file_has_saved_nothing(
 
     monkeypatch.setattr(recording, "start_process", early)
     started = Recording(tmp_path / "run.bag", ["/a"], "none", master)
-    wait_until(lambda: "up" in started._lines)
+    wait_until(lambda: "up" in started.lines)
     asyncio.run(started.stop())
     assert started.state().error == "it was stopped before it had started: nothing was recorded"
 

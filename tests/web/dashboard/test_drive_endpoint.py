@@ -279,7 +279,7 @@ def test_robot_stops_while_the_loop_of_the_server_is_blocked(robot: Any, is_lost
         blocked.set()
         released.wait()
 
-    served._loop.loop.call_soon_threadsafe(block)
+    served.loop.loop.call_soon_threadsafe(block)
     try:
         assert blocked.wait(60)
         if is_lost:

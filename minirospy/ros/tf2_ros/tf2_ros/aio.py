@@ -206,15 +206,15 @@ class Broadcaster:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._moving: Publisher[TFMessage] | None = None
+        self.moving: Publisher[TFMessage] | None = None
         self._static: Publisher[TFMessage] | None = None
         self._kept: dict[str, TransformStamped] = {}
 
     async def send(self, *transforms: TransformStamped) -> None:
         """Publish transforms in one message on /tf."""
-        if self._moving is None:
-            self._moving = self._node.advertise("/tf", TFMessage, queue_size=100)
-        await self._moving.publish(TFMessage(list(transforms)))
+        if self.moving is None:
+            self.moving = self._node.advertise("/tf", TFMessage, queue_size=100)
+        await self.moving.publish(TFMessage(list(transforms)))
 
     async def send_static(self, *transforms: TransformStamped) -> None:
         """Publish transforms on /tf_static, latched, together with all earlier ones; the last one for a child frame wins."""
@@ -225,7 +225,7 @@ class Broadcaster:
 
     async def close(self) -> None:
         """Stop publishing. Idempotent."""
-        publishers, self._moving, self._static = (self._moving, self._static), None, None
+        publishers, self.moving, self._static = (self.moving, self._static), None, None
         for publisher in publishers:
             if publisher is not None:
                 await publisher.close()
