@@ -72,10 +72,10 @@ class SignalWatchdog:
         for name in [name for name in _NAMES if hasattr(signal, name)]:
             number = getattr(signal, name)
             handler = signal.getsignal(number)
-            # If nohup has set SIGHUP to be ignored, leave it ignored.
-            if handler != self._on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
+            # Leave SIGHUP ignored if nohup has ignored it.
+            if handler != self.on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
                 self._previous[number] = handler
-                signal.signal(number, self._on_signal)
+                signal.signal(number, self.on_signal)
 
         if self._sending is None:
             receiving, self._sending = socket.socketpair()
@@ -120,7 +120,7 @@ class SignalWatchdog:
 
     # --- the main thread
 
-    def _on_signal(self, number: int, _: FrameType | None) -> None:
+    def on_signal(self, number: int, _: FrameType | None) -> None:
         self._number = number
         self._deferral.pending = True
         self._handled += 1
@@ -180,7 +180,7 @@ class SignalWatchdog:
                     self._nudge()
 
     def _is_handled(self, number: int) -> bool:
-        return number in self._previous and signal.getsignal(number) == self._on_signal
+        return number in self._previous and signal.getsignal(number) == self.on_signal
 
     def _new_signals(self) -> int:
         """Return the number of signals from the user that the machine has not counted yet.

@@ -24,11 +24,9 @@ if TYPE_CHECKING:
 __all__ = ["Definitions", "checked_specs"]
 
 _MOST = 5_000
-_SECONDS = 10.0
-# maximum number of characters in all cached definitions; ROS's own packages define 3 million
-MAX_CHARACTERS = 64 << 20
-# maximum number of concurrent queries; an unanswered one times out after _SECONDS
-MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4
+ANSWER_SECONDS = 10.0
+MAX_CHARACTERS = 64 << 20  # in all cached definitions; ROS's own packages define 3 million characters
+MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4  # concurrent; an unanswered query times out after ANSWER_SECONDS
 _NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
 
 
@@ -126,7 +124,9 @@ class Definitions:
             async with share, self._querying:
                 if (name, md5sum) in self._known:
                     return self._known[name, md5sum]
-                answer = await self._network.query(definition_key(gateway, name, md5sum), seconds=_SECONDS)
+                answer = await self._network.query(
+                    definition_key(gateway, name, md5sum), seconds=ANSWER_SECONDS
+                )
                 text = answer.decode()
                 loop = asyncio.get_running_loop()
                 await loop.run_in_executor(None, checked_specs, name, text, md5sum)

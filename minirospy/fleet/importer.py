@@ -37,17 +37,16 @@ MACHINES = "/fleet/machines"
 
 _log = logging.getLogger(__name__)
 _SETTLE_SECONDS = 0.1
-_LOOK_SECONDS = 1.0
-_AGAIN_SECONDS = 5.0  # seconds to wait before adding a robot again after a failure
+LOOK_SECONDS = 1.0
+AGAIN_SECONDS = 5.0  # before adding a robot again after a failure
 _CLOCK_SECONDS = 30.0
 _PINGS = 5
-_PING_SECONDS = 5.0
-_MAX_PING = 64  # maximum size in bytes of a reply to a ping, which normally has 8
+PING_SECONDS = 5.0
+_MAX_PING = 64  # bytes in a reply to a ping, which normally has 8
 _CALL_SECONDS = 3600.0
-# seconds for a name's holder to reply after another gateway on the same machine has claimed the name
-_CHALLENGE_SECONDS = 2.0
-# number of removed names (some 4 MB) after which memory is returned, and the seconds to wait before that, as links
-# linger
+# for a gateway to reply after another gateway on the same machine has claimed its name
+CHALLENGE_SECONDS = 2.0
+# names removed (some 4 MB) before memory is returned, and the delay before that, as links linger
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
 MAX_ROBOT_NAMES = 2_000  # maximum number of names, of _MAX_IMPORTED, that one robot may use
 # maximum number of a robot's names to close concurrently, because each needs a task and a call to the master
@@ -147,7 +146,7 @@ class Importer:
         await self._node.parameters.add(MACHINES)
         await self._read_machines()
         self._declared = [
-            self._network.watch_tokens(f"{ROOT}/{kind}/**", self._changed)
+            self._network.watch_tokens(f"{ROOT}/{kind}/**", self.changed)
             for kind in ("robot", "topic", "service")
         ]
         self._watching = [
@@ -173,7 +172,7 @@ class Importer:
         robots, self.robots = self.robots, {}
         await asyncio.gather(*(self._remove(robot) for robot in robots.values()))
 
-    def _changed(self, key: str, is_there: bool) -> None:
+    def changed(self, key: str, is_there: bool) -> None:
         refused = self.contents.refused
         changed = self.contents.add(key) if is_there else self.contents.remove(key)
         if self.contents.refused != refused:
@@ -268,7 +267,7 @@ class Importer:
                 await self._update(known)
             except Exception as error:  # noqa: BLE001 - of one robot: the others are shown
                 self._reporter.report(error)
-                self._soon(_AGAIN_SECONDS)
+                self._soon(AGAIN_SECONDS)
 
     def _report_names(self, names: list[str], what: str) -> None:
         """Log the robots that have joined or left, in one line."""
@@ -340,7 +339,7 @@ class Importer:
         claim, holder = refused
         assert holder
         try:
-            await self._network.query(f"{ROOT}/ping/{holder.gateway}", seconds=_CHALLENGE_SECONDS)
+            await self._network.query(f"{ROOT}/ping/{holder.gateway}", seconds=CHALLENGE_SECONDS)
         except QueryFailed:
             self.contents.holders.give_up(holder)
             self._soon(0.0)
@@ -442,7 +441,7 @@ class Importer:
         return RawService(self._node, name, InterfaceType(token.type, token.md5sum), call)
 
     async def _watch(self) -> None:
-        pause = _LOOK_SECONDS
+        pause = LOOK_SECONDS
         while True:
             await asyncio.sleep(pause)
             started = time.monotonic()
@@ -450,7 +449,7 @@ class Importer:
                 self._look(await self._snapshot())
             except (MasterUnreachableError, RpcError) as error:
                 _log.debug("the graph cannot be read: %s", error)
-            pause = max(_LOOK_SECONDS, 20 * (time.monotonic() - started))
+            pause = max(LOOK_SECONDS, 20 * (time.monotonic() - started))
             for shown in list(self.robots.values()):
                 is_used = any(topic.is_open for topic in shown.topics.values())
                 if not shown.measured or (is_used and started - shown.measured > _CLOCK_SECONDS):
@@ -472,7 +471,7 @@ class Importer:
         """Query all gateways in the fleet; return those that respond, or None if the query cannot be sent."""
         start = f"{ROOT}/ping/"
         try:
-            answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS, size=_MAX_PING)
+            answers = await self._network.queries(f"{start}*", seconds=PING_SECONDS, size=_MAX_PING)
         except QueryFailed as error:
             _log.debug("the fleet cannot be queried: %s", error)
             return None
@@ -484,7 +483,7 @@ class Importer:
         try:
             for _ in range(_PINGS):
                 sent = self._clock()
-                answer = await self._network.query(key, seconds=_PING_SECONDS)
+                answer = await self._network.query(key, seconds=PING_SECONDS)
                 if len(answer) == 8:
                     pings.append(Ping(sent, int.from_bytes(answer, "little", signed=True), self._clock()))
         except QueryFailed as error:

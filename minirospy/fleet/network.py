@@ -60,19 +60,15 @@ __all__ = [
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
-# maximum number of bytes in a query or a reply, such as a service's response or a definition
-MAX_TEXT = 16 << 20
-# maximum number of replies to a query, because peers choose the number; a fleet has at most 5,000 gateways
-MAX_REPLIES = 10_000
-EARLY_SHARE = 0.9  # share of the timeout; a query that ends earlier without replies has lost its link
-_RETRY_SECONDS = 1.0
-_LINGER_SECONDS = 2.0
-_QUERIES = 200
-"""Maximum number of service calls and parameter queries handled concurrently; further ones are rejected."""
-_CONTROL_QUERIES = 50
-"""Maximum number of pings, status and definition queries handled concurrently; with a separate limit, blocked calls do not
-delay them.
-"""
+MAX_TEXT = 16 << 20  # bytes read from a query or a reply: a service's response or a definition
+MAX_REPLIES = 10_000  # accepted for one query: peers choose the number; a fleet has at most 5,000 gateways
+EARLY_SHARE = 0.9  # of the timeout: a query that ends before this without replies has lost its link
+RETRY_SECONDS = 1.0
+LINGER_SECONDS = 2.0
+MAX_QUERIES = 200
+"""Service calls and parameter queries handled concurrently; further ones are refused."""
+MAX_CONTROL_QUERIES = 50
+"""Concurrently handled pings and queries for status or definitions; their separate limit prevents delays by blocked calls."""
 
 
 # --- the network
@@ -83,7 +79,7 @@ async def _remove_linger() -> None:
     remover = LingerRemover()
     while True:
         remover.look()
-        await asyncio.sleep(_LINGER_SECONDS)
+        await asyncio.sleep(LINGER_SECONDS)
 
 
 class QueryFailed(MinirospyError):
@@ -102,8 +98,8 @@ class FleetNetwork:
         # A single thread preserves the order, so that peers see declarations in the order in which they were made.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
-        self._calls = _Share(_QUERIES)
-        self._control = _Share(_CONTROL_QUERIES)
+        self._calls = _Share(MAX_QUERIES)
+        self._control = _Share(MAX_CONTROL_QUERIES)
         self._is_closed = False
         self._reporter = ErrorReporter(_log, "taking a message or query of the fleet")
         reporter = ErrorReporter(_log, "the search for links of Zenoh")
@@ -141,7 +137,7 @@ class FleetNetwork:
             if not is_reported:
                 _log.warning("nothing of the fleet answers at %s yet%s. Will keep trying.", endpoints, why)
                 is_reported = True
-            await asyncio.sleep(_RETRY_SECONDS)
+            await asyncio.sleep(RETRY_SECONDS)
 
     @property
     def peers(self) -> int:

@@ -12,11 +12,11 @@ from collections.abc import Awaitable, Callable, Collection
 
 __all__ = ["Presence"]
 
-_REGULAR_SECONDS, _LOST_SECONDS = 60.0, 10.0
-"""Seconds between checks, normally and while a gateway is lost, because that gateway may have returned."""
+REGULAR_SECONDS, LOST_SECONDS = 60.0, 10.0
+"""Interval between checks, and the shorter interval while a gateway is lost, because it may have returned."""
 _SETTLE_SECONDS = 2.0
-"""Seconds to wait after a robot has left, because robots that are lost together disappear one by one."""
-_ROUNDS, _ROUND_SECONDS = 2, 5.0
+"""Delay after a robot has left, because robots that are lost together disappear one by one."""
+_ROUNDS, ROUND_SECONDS = 2, 5.0
 
 
 class Presence:
@@ -53,7 +53,7 @@ class Presence:
     async def watch(self) -> None:
         """Check at regular intervals, and soon after :meth:`check_soon`."""
         while True:
-            pause = _LOST_SECONDS if self.lost else _REGULAR_SECONDS
+            pause = LOST_SECONDS if self.lost else REGULAR_SECONDS
             waiting = asyncio.ensure_future(self._soon.wait())
             try:
                 await asyncio.wait([waiting], timeout=pause)
@@ -70,7 +70,7 @@ class Presence:
         missing = set(self._answered)
         for number in range(_ROUNDS if present else 0):
             if number:
-                await asyncio.sleep(_ROUND_SECONDS)
+                await asyncio.sleep(ROUND_SECONDS)
             answers = await self._query()
             if answers is None:
                 return

@@ -103,7 +103,7 @@ class Ros1Side:
         # Guards the beacons, which arrive in Zenoh's threads.
         self._lock = threading.Lock()
         self._beacons = Beacons(random.random)
-        self._sightings = Sightings()
+        self.sightings = Sightings()
         self._has_news = False
         self._conflicts: dict[str, str] = {}
         self._others: set[str] = set()
@@ -172,7 +172,7 @@ class Ros1Side:
     def status(self) -> dict[str, object]:
         """Return counters and resources as values that JSON can represent."""
         with self._lock:
-            seen, announced = len(list(self._sightings)), len(self._beacons)
+            seen, announced = len(list(self.sightings)), len(self._beacons)
         return {
             "namespace": self.namespace,
             "announced": announced,
@@ -241,9 +241,9 @@ class Ros1Side:
             with self._lock:
                 due = self._beacons.due(now)
                 if late > PERIOD:
-                    # The process was paused, and the beacons sent in that time have not been delivered yet.
-                    self._sightings.extend(late, now)
-                has_news = self._sightings.forget_lost(now) or self._has_news
+                    # The process was paused, and the beacons from that time have not been delivered yet.
+                    self.sightings.extend(late, now)
+                has_news = self.sightings.forget_lost(now) or self._has_news
             for key in due:
                 self._outlets[key].put()
             if has_news:
@@ -259,7 +259,7 @@ class Ros1Side:
             with self._lock:
                 self._beacons.received(key)
                 if resource and self._allows(resource):
-                    self._has_news |= self._sightings.received(resource, time.monotonic())
+                    self._has_news |= self.sightings.received(resource, time.monotonic())
         except BridgeError as error:
             self.refused += 1
             self._left_out.warning("a beacon of zenoh-bridge-ros1 is left out: %s", str(error)[:_MAX_REASON])
@@ -274,7 +274,7 @@ class Ros1Side:
         """Open and close topics and services to match the graph and the beacons."""
         async with self._adjusting:
             with self._lock:
-                remote, self._has_news = list(self._sightings), False
+                remote, self._has_news = list(self.sightings), False
             found, conflicts = shared_topics(self.graph.topics, remote)
             for name in conflicts.keys() - self._conflicts.keys():
                 self._misfits.warning("%s of others is not passed: it is of type %s", name, conflicts[name])
@@ -319,7 +319,7 @@ class Ros1Side:
             except QueryFailed as error:
                 raise ServiceException(f"service [{resource.name}] of zenoh-bridge-ros1: {error}") from error
             loop = asyncio.get_running_loop()
-            fault = await loop.run_in_executor(None, _error_in, resource, answer)
+            fault = await loop.run_in_executor(None, error_in, resource, answer)
             if fault:
                 raise ServiceException(f"service [{resource.name}] of zenoh-bridge-ros1: {fault}")
             return answer
@@ -327,8 +327,8 @@ class Ros1Side:
         return RawService(self._node, resource.name, InterfaceType(resource.type, resource.md5sum), call)
 
 
-def _error_in(resource: Resource, answer: bytes) -> str:
-    """Return the error message in a reply to a call, or "" if it is a response. The bridge sends both without a distinction.
+def error_in(resource: Resource, answer: bytes) -> str:
+    """Return the error message in a reply to a call, or "" for a response. The bridge sends either, without marking which.
 
     If the type is installed here, a reply is an error if it is text and is not exactly one serialized response.
     """

@@ -21,8 +21,8 @@ _CLOSE_SECONDS = 2.0
 _MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
 _MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
-_MAX_OUTLETS = 64
-"""Maximum number of Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
+MAX_OUTLETS = 64
+"""Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
 
 The least recently used one is dropped.
 """
@@ -69,8 +69,8 @@ class Outflow:
         self._worker = worker
         self._throttle = Throttle(hertz)
         self._flow: Flow[tuple[str, bytes]] = Flow(_MAX_WAITING[priority], _MAX_BYTES[priority])
-        self._outlets: dict[str, Outlet] = {}
-        self._numbers: dict[str, int] = {}
+        self.outlets: dict[str, Outlet] = {}
+        self.numbers: dict[str, int] = {}
 
     @property
     def sent(self) -> int:
@@ -135,27 +135,27 @@ class _PriorityWorker(_Worker):
                 outflow = self._owners.get(taken[0]) if taken else None
             try:
                 for each in ended:
-                    for outlet in each._outlets.values():
+                    for outlet in each.outlets.values():
                         outlet.undeclare()
                 if taken and outflow:
-                    self._put(outflow, *taken[1])
+                    self.put(outflow, *taken[1])
             except Exception as error:  # noqa: BLE001 - Zenoh's own, of a session that is closed or a link that broke
                 _log.debug("a message was not sent: %s", error)
 
-    def _put(self, outflow: Outflow, key: str, message: bytes) -> None:
-        outlet = outflow._outlets.pop(key, None)
+    def put(self, outflow: Outflow, key: str, message: bytes) -> None:
+        outlet = outflow.outlets.pop(key, None)
         if outlet is None:
-            while len(outflow._outlets) >= _MAX_OUTLETS:
-                oldest = next(iter(outflow._outlets))
-                outflow._numbers.pop(oldest, None)
-                outflow._outlets.pop(oldest).undeclare()
+            while len(outflow.outlets) >= MAX_OUTLETS:
+                oldest = next(iter(outflow.outlets))
+                outflow.numbers.pop(oldest, None)
+                outflow.outlets.pop(oldest).undeclare()
             make = self._network.outlet_to_others if outflow.is_bare else self._network.outlet
             outlet = make(key, self._priority)
-        outflow._outlets[key] = outlet
+        outflow.outlets[key] = outlet
         if outflow.is_bare:
             outlet.put(message)
             return
-        number = outflow._numbers[key] = outflow._numbers.get(key, 0) + 1
+        number = outflow.numbers[key] = outflow.numbers.get(key, 0) + 1
         outlet.put(message, attachment=serialize_stamp(Stamp(number, self._clock())))
 
 
@@ -163,19 +163,19 @@ class Sender:
     """Sends messages, using one thread per priority, so that a large message that takes a second does not delay a command."""
 
     def __init__(self, network: FleetNetwork, clock: Callable[[], int] = time.time_ns) -> None:
-        """Create the queues. ``clock`` returns the time in ns that is attached to each message."""
-        self._priorities = {priority: _PriorityWorker(priority, network, clock) for priority in Priority}
+        """``clock`` returns the time in ns that is attached to each message."""
+        self.priorities = {priority: _PriorityWorker(priority, network, clock) for priority in Priority}
 
     def flow(self, priority: Priority, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
         """Return a flow for a topic, limited to ``hertz`` (0: unlimited).
 
         With ``is_bare``, send messages without stamps, for other programs.
         """
-        return Outflow(self._priorities[priority], priority, hertz, is_bare)
+        return Outflow(self.priorities[priority], priority, hertz, is_bare)
 
     def close(self) -> None:
         """Stop the threads. Idempotent."""
-        for worker in self._priorities.values():
+        for worker in self.priorities.values():
             worker.close()
 
 

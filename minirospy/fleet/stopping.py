@@ -99,7 +99,7 @@ class CommandStream:
         self._publish = publish
         self._seconds = seconds
         self._clock = clock
-        self._guard = StopGuard(clock)
+        self.guard = StopGuard(clock)
         self._logger = RateLimitedLogger(_log)
         self._lock = threading.Lock()
         self._rest: bytes | None = None
@@ -121,14 +121,14 @@ class CommandStream:
             self._deadline = now + self._seconds if rest is not None and is_stream else math.inf
             if self._deadline < math.inf:
                 # Arm the guard before publishing, so that no command is sent that could not be stopped.
-                self._guard.arm(self._silent, self._deadline)
+                self.guard.arm(self._silent, self._deadline)
             else:
-                self._guard.disarm(self._silent)
+                self.guard.disarm(self._silent)
             self._publish(body)
 
     def close(self) -> None:
         """Publish a zero velocity if a stream is active. Idempotent."""
-        self._guard.disarm(self._silent)
+        self.guard.disarm(self._silent)
         with self._lock:
             self._stop()
 

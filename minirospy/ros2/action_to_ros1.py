@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_GOALS", "GoalsToRos1"]
 
-_SERVER_SECONDS = 5.0
-"""Timeout in seconds for a ROS 1 server to connect, and to include a new goal in its statuses."""
+SERVER_SECONDS = 5.0
+"""Timeout for a ROS 1 server to connect, and to include a new goal in its statuses."""
 MAX_GOALS = 1_000
 """Maximum number of goals passed on concurrently; further goals are rejected."""
 _PENDING_SECONDS = 0.5
@@ -153,7 +153,7 @@ class GoalsToRos1:
         try:
             accepted.set_result(await self._sent(data, feedback))
         except asyncio.TimeoutError:
-            accepted.set_exception(BridgeError(f"its server has not answered within {_SERVER_SECONDS:g} s"))
+            accepted.set_exception(BridgeError(f"its server has not answered within {SERVER_SECONDS:g} s"))
         except (DeserializationError, ROSException) as error:
             accepted.set_exception(BridgeError(str(error)))
         except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
@@ -162,14 +162,14 @@ class GoalsToRos1:
 
     async def _sent(self, data: bytes, feedback: Callable[[bytes], None]) -> GoalOfRos1 | None:
         body = self._codec.goal.to_ros1(data)
-        await asyncio.wait_for(self._connected(), _SERVER_SECONDS)
+        await asyncio.wait_for(self._connected(), SERVER_SECONDS)
         now = self._node.now()
         self._number += 1
         id = GoalId(f"{self._node.name}-{self._number}-{now.secs}.{now.nsecs}", now.secs, now.nsecs)
         goal = self._goals[id.id] = _Goal(id, feedback, self._cancel_goal)
         self._goal.publish_raw(goal_message(id, body))
         try:
-            is_accepted = await asyncio.wait_for(asyncio.shield(goal.accepted), _SERVER_SECONDS)
+            is_accepted = await asyncio.wait_for(asyncio.shield(goal.accepted), SERVER_SECONDS)
         except asyncio.TimeoutError:
             self._goals.pop(id.id, None)
             self._cancel.publish_raw(cancel_message(id))

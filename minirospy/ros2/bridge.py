@@ -51,9 +51,9 @@ __all__ = ["Ros2Bridge", "Ros2Options"]
 _ORIGIN = "ros2_domain"
 """Connection header field that marks publishers of ROS 2 data, so that no bridge to the same domain sends the data back."""
 _MIN_REFRESH_INTERVAL = 0.25
-_QUERY_SECONDS = 3.0
-"""Timeout in seconds, after which topics are bridged even if publishers have not responded."""
-_JOIN_SECONDS = 2.0
+QUERY_SECONDS = 3.0
+"""Timeout, after which topics are bridged even if publishers have not responded."""
+JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
 _DEPTH = 1000
 _DEPTH_OF_LARGE = 20
@@ -134,7 +134,7 @@ class Ros2Bridge:
         self.node = node
         self.side = side
         self.options = options
-        self.topics: LinkTable[Link, _ToRos1 | _ToRos2] = LinkTable(node.log, self._make)
+        self.topics: LinkTable[Link, _ToRos1 | PassingToRos2] = LinkTable(node.log, self._make)
         self.header = marker("")
         self.services = ServiceBridge(
             node, side, options.services, options.rules, catalogue, options.call_seconds
@@ -243,7 +243,7 @@ class Ros2Bridge:
             for node in snapshot.publishers.get(topic, ())
             if not is_bridge(node)
         ]
-        await self._headers.look(present, _QUERY_SECONDS)
+        await self._headers.look(present, QUERY_SECONDS)
 
     async def _header(self, key: tuple[str, str]) -> Header:
         return await self._texts.header_of(*key)
@@ -265,16 +265,16 @@ class Ros2Bridge:
             spec, lookup = self._types.installed(link.ros1_type)
         return self._types.transcoder(spec, lookup, link.ros2_type), spec, lookup
 
-    def _make(self, link: Link) -> _ToRos1 | _ToRos2:
+    def _make(self, link: Link) -> _ToRos1 | PassingToRos2:
         made, spec, lookup = self._converter(link)
         depth = _DEPTH_OF_LARGE if keeps_buffer(spec, lookup) else _DEPTH
         if link.direction is Direction.TO_ROS2:
-            return _ToRos2(self, link, made, depth)
+            return PassingToRos2(self, link, made, depth)
         return _ToRos1(self, link, made, depth, self._types.interface(spec, lookup))
 
 
-class _Passing:
-    """An open link; ``passed`` counts the messages that were passed on."""
+class TopicPassing:
+    """An open link; ``passed`` is the number of messages passed."""
 
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder) -> None:
         self.link = link
@@ -305,7 +305,7 @@ class _Passing:
         self._misfits.error("a message on %s (%s): %s", self.link.topic, self.link.direction.value, error)
 
 
-class _ToRos2(_Passing):
+class PassingToRos2(TopicPassing):
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder, depth: int) -> None:
         super().__init__(bridge, link, made)
         self._publisher: Ros2Publisher = bridge.side.publisher(
@@ -325,7 +325,7 @@ class _ToRos2(_Passing):
     async def _wait_for_subscribers(self) -> None:
         """Wait until the existing subscribers are connected, because they would miss messages published earlier."""
         loop = asyncio.get_running_loop()
-        end = loop.time() + _JOIN_SECONDS
+        end = loop.time() + JOIN_SECONDS
         while not self._publisher.subscribers and loop.time() < end:
             await asyncio.sleep(_JOIN_LOOK)
 
@@ -342,7 +342,7 @@ class _ToRos2(_Passing):
             self.passed += 1
 
 
-class _ToRos1(_Passing):
+class _ToRos1(TopicPassing):
     def __init__(
         self, bridge: Ros2Bridge, link: Link, made: Transcoder, depth: int, interface: InterfaceType
     ) -> None:

@@ -31,7 +31,7 @@ SUCCEEDED = 4
 ABORTED = 6
 
 _FEEDBACK_DEPTH = 100
-_CLOSE_SECONDS = 1.0
+CLOSE_SECONDS = 1.0
 _HEADER = 4
 _ID = 16
 
@@ -333,7 +333,7 @@ class ActionServer:
         """Close the action after sending known results and rejections. Call it from any thread but the executor's."""
         sent = threading.Event()
         self._calls.end(functools.partial(self._wait_until_sent, sent))
-        sent.wait(_CLOSE_SECONDS)
+        sent.wait(CLOSE_SECONDS)
         self._is_closed = True
         self._calls.end(self._server.destroy)
 

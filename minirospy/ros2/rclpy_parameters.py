@@ -18,7 +18,7 @@ from minirospy.ros2.rclpy_calls import Calls, Client, Message, NotAnsweredError,
 __all__ = ["NodeParameters", "ParameterServer", "ParameterStore"]
 
 _SECONDS = 5.0
-_AGAIN_SECONDS = 0.5
+AGAIN_SECONDS = 0.5
 _T = TypeVar("_T")
 _Handler = Callable[[Message, Message], Coroutine[object, None, None]]
 
@@ -185,7 +185,7 @@ class NodeParameters:
 
 def _first(call: Callable[[], Future[bytes]], end: float) -> bytes:
     """Repeat a call until it gets a response, and return the response. Raise TimeoutError at ``end``."""
-    pause = _AGAIN_SECONDS
+    pause = AGAIN_SECONDS
     while True:
         try:
             return _result(call(), min(end, time.monotonic() + pause))

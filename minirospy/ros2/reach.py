@@ -22,10 +22,25 @@ if TYPE_CHECKING:
 __all__ = ["Reach"]
 
 _LOOK_SECONDS = 0.02
-_AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
+AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
 _NO_PROBE_SECONDS = 1.0  # seconds to wait for servers that cannot be probed
-_MAX_SECONDS = 10.0
-"""Maximum number of seconds to wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
+MAX_SECONDS = 10.0
+"""Maximum wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
+
+
+class Reachable(Protocol):
+    """A client of a service or an action. Methods may be called from any thread."""
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether a server is connected."""
+
+    @property
+    def servers(self) -> frozenset[bytes] | None:
+        """Return the ids of the existing servers, or None if no response can be lost."""
+
+    def probe(self) -> Ros2Probe | None:
+        """Return a probe of the servers, or None if they have no request without effect."""
 
 
 class Reach:
@@ -57,10 +72,10 @@ class Reach:
         # Do not block queued calls while their link is being closed.
         if self._is_closed or self._reaching is None:
             return
-        seconds = min(seconds, _MAX_SECONDS)
+        seconds = min(seconds, MAX_SECONDS)
         if self._ready_at is not None and self._wanted <= servers:
             spent = asyncio.get_running_loop().time() - self._ready_at
-            seconds = min(seconds, _MAX_SECONDS - spent)
+            seconds = min(seconds, MAX_SECONDS - spent)
         await asyncio.wait([self._reaching], timeout=max(0.0, seconds))
 
     async def close(self) -> None:
@@ -106,8 +121,8 @@ class Reach:
 
 
 async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
-    pause = _AGAIN_SECONDS
-    # Stop if a server's node has exited, because the node's services will never become ready again.
+    pause = AGAIN_SECONDS
+    # Stop if a server's node has exited, because the node's services will never be ready again.
     while is_current():
         if not probe.is_ready:
             await asyncio.sleep(_LOOK_SECONDS)

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ServiceBridge", "ServiceCodec"]
 
-_QUERY_SECONDS = 1.0
-"""Timeout in seconds, after which only services with known types are bridged."""
+QUERY_SECONDS = 1.0
+"""Timeout, after which only services with known types are bridged."""
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _MAX_CALLS = 1_000
@@ -161,7 +161,7 @@ class ServiceBridge:
         foreign = {name: [node for node in nodes if not is_bridge(node)] for name, nodes in ros1.items()}
         ros2 = {name: type_ for name, type_ in self._side.services().items() if self._services(name)}
         await self._headers.look(
-            [(name, nodes[0]) for name, nodes in foreign.items() if nodes], _QUERY_SECONDS
+            [(name, nodes[0]) for name, nodes in foreign.items() if nodes], QUERY_SECONDS
         )
         types = {service: header["type"] for (service, _), header in self._headers.found.items()}
         return service_links(ros1, types, ros2, self._types.partner)

@@ -171,7 +171,7 @@ class RclpySide:
 
     def fields(self, type_: str) -> dict[str, str]:
         """Return the fields of a message type. Raise TypesDiffer if it is not installed."""
-        return dict(self._class(type_).get_fields_and_field_types())
+        return dict(self.message_class(type_).get_fields_and_field_types())
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
         """Return a reliable publisher, which is compatible with every subscriber.
@@ -179,8 +179,8 @@ class RclpySide:
         Raise TypesDiffer if the type is not installed.
         """
         profile = self._profile(depth, is_reliable=True, is_latched=is_latched)
-        publisher = self._node.create_publisher(self._class(type_), topic, profile)
-        return _Publisher(self._calls, self._node, publisher)
+        publisher = self._node.create_publisher(self.message_class(type_), topic, profile)
+        return TopicPublisher(self._calls, self._node, publisher)
 
     def subscribe(
         self,
@@ -197,7 +197,7 @@ class RclpySide:
         Raise TypesDiffer if the type is not installed.
         """
         profile = self._profile(depth, is_reliable=is_reliable, is_latched=is_latched)
-        return _Subscription(self._calls, self._node, self._class(type_), topic, deliver, profile)
+        return TopicSubscription(self._calls, self._node, self.message_class(type_), topic, deliver, profile)
 
     def nodes(self) -> list[tuple[str, str]]:
         """Return the names and namespaces of all nodes except for bridges."""
@@ -226,7 +226,7 @@ class RclpySide:
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
         """Return the fields of a service's request and response. Raise TypesDiffer if it is not installed."""
-        class_ = self._service_class(type_)
+        class_ = self.service_class(type_)
         return (
             dict(class_.Request.get_fields_and_field_types()),
             dict(class_.Response.get_fields_and_field_types()),
@@ -234,17 +234,17 @@ class RclpySide:
 
     def client(self, service: str, type_: str) -> Ros2Client:
         """Return a client. Raise TypesDiffer if the type is not installed."""
-        return self._calls.client(service, self._service_class(type_))
+        return self._calls.client(service, self.service_class(type_))
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
         """Offer a service. Raise TypesDiffer if the type is not installed."""
-        server = self._calls.server(service, self._service_class(type_), answer)
+        server = self._calls.server(service, self.service_class(type_), answer)
         self._served.append(service)
         return _Served(self._calls, server, lambda: self._served.remove(service))
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
         """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if it is not installed."""
-        class_ = self._action_class(type_)
+        class_ = self.action_class(type_)
         goal, result, feedback = (
             dict(each.get_fields_and_field_types()) for each in (class_.Goal, class_.Result, class_.Feedback)
         )
@@ -252,12 +252,12 @@ class RclpySide:
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient:
         """Return a client of an action. Raise TypesDiffer if the type is not installed."""
-        return ActionClient(self._calls, action, self._action_class(type_))
+        return ActionClient(self._calls, action, self.action_class(type_))
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
         """Offer an action. Raise TypesDiffer if the type is not installed."""
         service = send_goal_service(action)
-        server = ActionServer(self._calls, action, self._action_class(type_), accept)
+        server = ActionServer(self._calls, action, self.action_class(type_), accept)
         self._served.append(service)
         return _Served(self._calls, server, lambda: self._served.remove(service))
 
@@ -310,7 +310,7 @@ class RclpySide:
         return profile
 
     @staticmethod
-    def _class(type_: str) -> MessageClass:
+    def message_class(type_: str) -> MessageClass:
         found = _imported(type_, "msg")
         # minirospy's own ROS 1 packages also have classes with that name.
         if not hasattr(found, "get_fields_and_field_types"):
@@ -318,14 +318,14 @@ class RclpySide:
         return cast("MessageClass", found)
 
     @staticmethod
-    def _service_class(type_: str) -> ServiceClass:
+    def service_class(type_: str) -> ServiceClass:
         found = _imported(type_, "srv")
         if not hasattr(getattr(found, "Request", None), "get_fields_and_field_types"):
             raise TypesDiffer(f"the service type [{type_}] is not installed in ROS 2")
         return cast("ServiceClass", found)
 
     @staticmethod
-    def _action_class(type_: str) -> ActionClass:
+    def action_class(type_: str) -> ActionClass:
         found = _imported(type_, "action")
         if not hasattr(getattr(found, "Goal", None), "get_fields_and_field_types"):
             raise TypesDiffer(f"the action type [{type_}] is not installed in ROS 2")
@@ -345,7 +345,7 @@ class _Served:
         self._calls.end(self._on_close)
 
 
-class _Publisher:
+class TopicPublisher:
     def __init__(self, calls: Calls, node: _Node, publisher: _RclpyPublisher) -> None:
         self._calls = calls
         self._node = node
@@ -362,7 +362,7 @@ class _Publisher:
         self._calls.end(lambda: self._node.destroy_publisher(self._publisher))
 
 
-class _Subscription:
+class TopicSubscription:
     def __init__(
         self,
         calls: Calls,
@@ -374,7 +374,7 @@ class _Subscription:
     ) -> None:
         self._calls = calls
         self._node = node
-        self._class = class_
+        self.message_class = class_
         self._deliver = deliver
         self._is_closed = False
         handles = importlib.import_module("rclpy.impl.implementation_singleton")
@@ -394,7 +394,7 @@ class _Subscription:
             self._deliver(data)
             try:
                 with handle:
-                    taken = handle.take_message(self._class, True)
+                    taken = handle.take_message(self.message_class, True)
             except self._invalid_handle:
                 return  # the loop's thread closed the subscription in the meantime
             if taken is None:

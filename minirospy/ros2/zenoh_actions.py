@@ -44,7 +44,7 @@ _UNKNOWN_GOAL, _ENDED_GOAL = 2, 3
 """Error codes from action_msgs/srv/CancelGoal."""
 _KEPT_SECONDS = 60.0  # seconds to store a goal's result after the goal has ended
 _MAX_GOALS = 2_000
-_CLOSE_SECONDS = 1.0
+CLOSE_SECONDS = 1.0
 
 
 class ActionEnds(NamedTuple):
@@ -286,8 +286,8 @@ class ZenohActionServer:
         with contextlib.suppress(RuntimeError, concurrent.futures.TimeoutError):
             # The first call may submit responses for goals that have just ended; the second call waits for these
             # responses.
-            self._thread.submit(lambda: None).result(_CLOSE_SECONDS)
-            self._thread.submit(lambda: None).result(_CLOSE_SECONDS)
+            self._thread.submit(lambda: None).result(CLOSE_SECONDS)
+            self._thread.submit(lambda: None).result(CLOSE_SECONDS)
         for server in self._servers:
             server.close()
         for publisher in (self._feedback, self._status):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["ZenohNodeParameters", "ZenohParameterServer"]
 
 _PACKAGE = "rcl_interfaces"
-_SECONDS = 5.0
+ANSWER_SECONDS = 5.0
 _BYTES = 5
 _Values = Mapping[str, object]
 
@@ -138,14 +138,14 @@ class ZenohNodeParameters:
         whole = f"{_PACKAGE}/srv/{service.type}"
         client = self._side.client(f"{node}/{service.service}", f"{_PACKAGE}/{service.type}")
         try:
-            end = time.monotonic() + _SECONDS
+            end = time.monotonic() + ANSWER_SECONDS
             while not client.is_ready:
                 if time.monotonic() >= end:
                     raise BridgeError(f"the node [{node}] of ROS 2 has no parameters, or is not there")
                 time.sleep(0.02)
             try:
                 called = client.call(encode(f"{whole}_Request", self._fields, values))
-                return decode(f"{whole}_Response", self._fields, called.result(_SECONDS))
+                return decode(f"{whole}_Response", self._fields, called.result(ANSWER_SECONDS))
             except FutureTimeoutError:
                 raise BridgeError(f"the node [{node}] of ROS 2 does not answer") from None
             except DeserializationError as error:

@@ -389,7 +389,7 @@ def test_publishers_of_a_topic_share_its_registration(graph: MasterProxy) -> Non
 
 
 def test_node_publish_reaches_subscribers(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.aio.topics._JOIN_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.aio.topics.JOIN_SECONDS", 60.0)
 
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
@@ -467,7 +467,7 @@ def test_topic_is_unsubscribed_and_subscribed_again_immediately(graph: MasterPro
 def test_cancelled_close_still_unregisters(graph: MasterProxy, monkeypatch: pytest.MonkeyPatch) -> None:
     async def main() -> None:
         async with Node("n") as node:
-            ask = node._node._registrations.call
+            ask = node._node.registrations.call
             slowly = asyncio.Event()
 
             async def answer_late(method: str, *args: Any) -> Any:
@@ -475,7 +475,7 @@ def test_cancelled_close_still_unregisters(graph: MasterProxy, monkeypatch: pyte
                 await slowly.wait()
                 return answer
 
-            monkeypatch.setattr(node._node._registrations, "call", answer_late)
+            monkeypatch.setattr(node._node.registrations, "call", answer_late)
             for handle in (node.subscribe("t", String), node.advertise("u", String)):
                 await until(lambda: bool(graph.get_system_state().subscribers.get("/t")))
                 with pytest.raises(asyncio.TimeoutError):
@@ -508,7 +508,7 @@ def test_node_shutdown_ends_waiting_for_peers(master: str) -> None:
 
 
 def test_first_messages_all_arrive(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.aio.topics._JOIN_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.aio.topics.JOIN_SECONDS", 60.0)
 
     async def main() -> None:
         async with Node("a") as talker, Node("b") as listener:
@@ -961,7 +961,7 @@ def test_unreachable_master_is_an_error(master: str) -> None:
     async def main() -> None:
         async with Node("n", master_uri=master) as node:
             node._environment = node._environment._replace(master_uri="http://localhost:1")
-            node._node._registrations._environment = node._environment
+            node._node.registrations._environment = node._environment
             with pytest.raises(MasterUnreachableError):
                 await node.get_param("/x")
 

@@ -44,7 +44,7 @@ def refused(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], threading.Event]
         monkeypatch.setattr(os, "replace", replace_later)
         return failed
 
-    monkeypatch.setattr(private_files, "_REFUSES_OPEN_FILES", True)
+    monkeypatch.setattr(private_files, "REFUSES_OPEN_FILES", True)
     return refuse
 
 
@@ -74,7 +74,7 @@ def test_replace_file_does_not_retry_without_permission(
     paths: tuple[Path, Path], refused: Callable[[int], threading.Event], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     refused(1)
-    monkeypatch.setattr(private_files, "_REFUSES_OPEN_FILES", False)
+    monkeypatch.setattr(private_files, "REFUSES_OPEN_FILES", False)
     new, old = paths
     with pytest.raises(PermissionError):
         private_files.replace_file(new, old)

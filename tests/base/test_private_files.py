@@ -62,7 +62,7 @@ def test_open_file_refuses_a_symbolic_link_to_nothing(
         # As if it had been created between the check and the opening.
         monkeypatch.setattr(os.path, "islink", lambda path: False)
     else:
-        monkeypatch.setattr(private_files, "_FLAGS", 0)
+        monkeypatch.setattr(private_files, "OPEN_FLAGS", 0)
     (tmp_path / "name").symlink_to(tmp_path / "created")
     with pytest.raises(OSError, match=r"(?i)symbolic link"):
         private_files.open_file(tmp_path / "name", os.O_WRONLY | os.O_CREAT)

@@ -144,7 +144,7 @@ def test_kill(robot: Any, command: Any, monkeypatch: pytest.MonkeyPatch) -> None
 def test_a_node_that_hangs_is_not_killed(
     robot: Any, master: str, command: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("minirospy.introspect.nodes._SHUTDOWN_SECONDS", 0.1)
+    monkeypatch.setattr("minirospy.introspect.nodes.SHUTDOWN_SECONDS", 0.1)
     with socket.create_server(("127.0.0.1", 0)) as silent, closing(MasterProxy(master, "/hung")) as proxy:
         uri = f"http://localhost:{silent.getsockname()[1]}/"
         proxy.register_publisher("/t", "std_msgs/Bool", uri)

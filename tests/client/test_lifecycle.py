@@ -507,7 +507,7 @@ import rospy
 from minirospy.runtime.node import registration
 from std_msgs.msg import Bool
 # The limit for a master that is silent, else ten seconds: a signal, not this limit, is to end the wait.
-registration._SILENT_SECONDS = registration._STILL_SILENT_SECONDS = 1000.0
+registration.SILENT_SECONDS = registration.STILL_SILENT_SECONDS = 1000.0
 rospy.init_node("leaves")
 rospy.Publisher("t", Bool, queue_size=1)
 print("ready", flush=True)

@@ -58,19 +58,19 @@ class Place:
 
     def names(self) -> set[str]:
         """Return the topics that the master lists."""
-        return self.fleet.run(self._names())
+        return self.fleet.run(self.fetch_names())
 
     def services(self) -> set[str]:
-        return self.fleet.run(self._services())
+        return self.fleet.run(self.fetch_services())
 
-    async def _names(self) -> set[str]:
-        published, subscribed, _ = await self._state()
+    async def fetch_names(self) -> set[str]:
+        published, subscribed, _ = await self.fetch_state()
         return {name for name, _ in [*published, *subscribed]}
 
-    async def _services(self) -> set[str]:
-        return {name for name, _ in (await self._state())[2]}
+    async def fetch_services(self) -> set[str]:
+        return {name for name, _ in (await self.fetch_state())[2]}
 
-    async def _state(self) -> Any:
+    async def fetch_state(self) -> Any:
         from minirospy.runtime.rpc.async_client import AsyncRpcClient
 
         client = AsyncRpcClient()
@@ -127,13 +127,13 @@ class Fleet:
         """Return when a place's master lists these topics."""
 
         async def are_shown() -> bool:
-            return set(topics) <= await place._names()
+            return set(topics) <= await place.fetch_names()
 
         self.until(are_shown)
 
     def until_gone(self, place: Place, *topics: str) -> None:
         async def are_gone() -> bool:
-            return not set(topics) & await place._names()
+            return not set(topics) & await place.fetch_names()
 
         self.until(are_gone)
 

@@ -121,7 +121,7 @@ def test_a_gateway_that_ends_takes_its_robot_away_until_it_is_back(fleet: Fleet)
     fleet.until(lambda: fleet.gateways[0].importer.robots == {})  # type: ignore[union-attr]
 
     async def is_gone() -> bool:
-        return "/robot1/chat" not in {topic for topic, _ in (await control._state())[0]}
+        return "/robot1/chat" not in {topic for topic, _ in (await control.fetch_state())[0]}
 
     fleet.until(is_gone)
 
@@ -223,9 +223,9 @@ async def call_never(client: Any, called: asyncio.Event) -> asyncio.Future[Any]:
 def test_a_robot_that_is_silent_leaves_though_zenoh_keeps_its_tokens(
     fleet: Fleet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("presence._REGULAR_SECONDS", "presence._LOST_SECONDS", "presence._ROUND_SECONDS"):
+    for name in ("presence.REGULAR_SECONDS", "presence.LOST_SECONDS", "presence.ROUND_SECONDS"):
         monkeypatch.setattr(f"minirospy.fleet.{name}", 0.2)
-    monkeypatch.setattr("minirospy.fleet.importer._PING_SECONDS", 1.0)
+    monkeypatch.setattr("minirospy.fleet.importer.PING_SECONDS", 1.0)
     slow = tmp_path / "slow.json5"
     slow.write_text("{ transport: { link: { tx: { lease: 600000 } } } }")
     robot, control = fleet.place(), fleet.place()
@@ -500,7 +500,7 @@ def test_the_commands_from_start_to_kill(fleet: Fleet, start: Callable[..., subp
     gateway.kill()
 
     async def is_gone() -> bool:
-        return "/robot1/chat" not in {topic for topic, _ in (await control._state())[0]}
+        return "/robot1/chat" not in {topic for topic, _ in (await control.fetch_state())[0]}
 
     fleet.until(is_gone)
     for process in (room, router):
@@ -553,8 +553,8 @@ def test_usage_errors_are_one_line(
 def test_a_name_that_does_not_resolve_yet_is_named_once(
     fleet: Fleet, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("minirospy.fleet.network._RETRY_SECONDS", 0.05)
-    monkeypatch.setattr("minirospy.zenoh.library._CONNECT_MS", 50)
+    monkeypatch.setattr("minirospy.fleet.network.RETRY_SECONDS", 0.05)
+    monkeypatch.setattr("minirospy.zenoh.library.CONNECT_MS", 50)
     looks: list[object] = []
 
     def unresolved(_: object) -> list[str]:
@@ -657,7 +657,7 @@ def test_robot_stops_if_commands_stop_arriving(fleet: Fleet) -> None:
 
         task = fleet.call(lambda: asyncio.ensure_future(drive()))
         fleet.until(lambda: "/cmd_vel" in inbound and inbound["/cmd_vel"].passed > 2)
-        base.connect(gateway.node._node.uri)
+        base.connect(gateway.node.uri)
         base.until(lambda twist: twist.linear.x == 0.5)
         base.until(lambda twist: twist.linear.x == 0.5)
         released, blocked = threading.Event(), threading.Event()

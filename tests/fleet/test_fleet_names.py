@@ -241,7 +241,7 @@ def test_a_copied_token_takes_no_name(fleet: Fleet, caplog: pytest.LogCaptureFix
 def test_a_gateway_that_does_not_answer_gives_way_to_its_own_machine(
     fleet: Fleet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("minirospy.fleet.importer._CHALLENGE_SECONDS", 0.2)
+    monkeypatch.setattr("minirospy.fleet.importer.CHALLENGE_SECONDS", 0.2)
     robot, control = fleet.place(), fleet.place()
     importer = control_room(fleet, control)
     with stranger(fleet) as session:

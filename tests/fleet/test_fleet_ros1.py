@@ -32,7 +32,7 @@ EMPTY = "std_srvs/Empty", "d41d8cd98f00b204e9800998ecf8427e"
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Raise the time limits, so that nothing is lost if the machine stalls and no log line is repeated."""
     monkeypatch.setattr(ros1_keys, "LOST_SECONDS", SECONDS)
-    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger._SECONDS", 1000.0)
+    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger.INTERVAL_SECONDS", 1000.0)
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def serve(fleet: Fleet, place: Place, name: str, node: str = "server") -> list[b
 
 def until_serves(fleet: Fleet, place: Place, *names: str) -> None:
     async def are_there() -> bool:
-        return set(names) <= await place._services()
+        return set(names) <= await place.fetch_services()
 
     fleet.until(are_there)
 
@@ -268,7 +268,7 @@ def test_topics_removed_there_leave_this_master_and_return(
     fleet.until_gone(place, "/chat")
 
     async def is_gone() -> bool:
-        return "/door" not in await place._services()
+        return "/door" not in await place.fetch_services()
 
     fleet.until(is_gone)
     again = peer()

@@ -128,7 +128,7 @@ def test_resources_are_kept_after_the_process_did_not_run(monkeypatch: pytest.Mo
     monkeypatch.setattr(ros1_side, "time", clock)
     side = Ros1Side(*(Mock() for _ in range(6)), GatewayRules(), "*", set, Mock())  # type: ignore[arg-type]
     monkeypatch.setattr(side, "_adjust", AsyncMock())
-    side._sightings.received(CHAT, 0.0)
+    side.sightings.received(CHAT, 0.0)
 
     def beat(times: Iterable[float]) -> list[Resource]:
         """Let the beats arrive at these times; return the resources that are known after them."""
@@ -142,7 +142,7 @@ def test_resources_are_kept_after_the_process_did_not_run(monkeypatch: pytest.Mo
         monkeypatch.setattr(ros1_side, "asyncio", Mock(sleep=sleep))
         with pytest.raises(EOFError):
             asyncio.run(side._beat())
-        return list(side._sightings)
+        return list(side.sightings)
 
     assert beat([0.2, 100.0]) == [CHAT]
     # Its beacons do not arrive any more.
@@ -254,11 +254,11 @@ def test_a_topic_of_another_type_elsewhere_is_left_out() -> None:
 
 def test_an_error_in_place_of_a_response_is_found() -> None:
     set_bool = Resource("srv", "/lamp", "std_srvs/SetBool", "09fb03525b03e7ea1fd3992bafd87e16")
-    assert ros1_side._error_in(set_bool, b"\1\2\0\0\0on") == ""
-    assert ros1_side._error_in(set_bool, b"the lamp is stuck") == "the lamp is stuck"
-    assert ros1_side._error_in(set_bool, b"no") == "no"
-    assert ros1_side._error_in(set_bool._replace(type="no_such_msgs/Type"), b"the lamp is stuck") == ""
-    assert ros1_side._error_in(set_bool._replace(md5sum=OTHER), b"the lamp is stuck") == ""
+    assert ros1_side.error_in(set_bool, b"\1\2\0\0\0on") == ""
+    assert ros1_side.error_in(set_bool, b"the lamp is stuck") == "the lamp is stuck"
+    assert ros1_side.error_in(set_bool, b"no") == "no"
+    assert ros1_side.error_in(set_bool._replace(type="no_such_msgs/Type"), b"the lamp is stuck") == ""
+    assert ros1_side.error_in(set_bool._replace(md5sum=OTHER), b"the lamp is stuck") == ""
 
 
 @pytest.mark.parametrize(

@@ -86,8 +86,8 @@ class Robot:
 
     def wake(self) -> None:
         """Let the guard read the clock."""
-        self.stream._guard.arm(_nothing, float("-inf"))
-        wait_until(lambda: _nothing not in self.stream._guard._deadlines)
+        self.stream.guard.arm(_nothing, float("-inf"))
+        wait_until(lambda: _nothing not in self.stream.guard.deadlines)
 
 
 def _nothing() -> None:
@@ -121,7 +121,7 @@ def test_single_velocities_and_streams_that_end_with_zero_are_left_alone() -> No
     robot.wake()
     robot.stream.close()
     assert robot.published == [1, 2, 3, 4, 0]
-    assert not robot.stream._guard._deadlines
+    assert not robot.stream.guard.deadlines
 
 
 def test_stream_is_stopped_when_its_topic_is_closed() -> None:
@@ -130,7 +130,7 @@ def test_stream_is_stopped_when_its_topic_is_closed() -> None:
     robot.stream.close()
     robot.stream.close()
     assert robot.published == [1, 2, 0]
-    assert not robot.stream._guard._deadlines
+    assert not robot.stream.guard.deadlines
 
 
 def test_command_at_the_last_moment_goes_on() -> None:

@@ -290,9 +290,9 @@ def test_looks_pause_after_a_long_one_whatever_comes() -> None:
             stub(), stub(), stub(), stub(), stub(), "0" * 16, "", GatewayRules(), spawned.append, lambda: 0
         )
         made._not_before = loop.time() + 4.0
-        made._changed(claim_key(LIAR), True)
+        made.changed(claim_key(LIAR), True)
         await loop.advance(3.9)
-        made._changed(claim_key(LIAR._replace(name="other")), True)
+        made.changed(claim_key(LIAR._replace(name="other")), True)
         assert not spawned
         await loop.advance(0.2)
         assert len(spawned) == 1

@@ -135,7 +135,7 @@ def _patient_publishers(monkeypatch: pytest.MonkeyPatch) -> None:
     """Raise a bridge's limit of one second for subscribers to connect before a client's single publish."""
     from minirospy.aio import topics
 
-    monkeypatch.setattr(topics, "_JOIN_SECONDS", 30.0)
+    monkeypatch.setattr(topics, "JOIN_SECONDS", 30.0)
 
 
 @pytest.fixture(params=["ours", "rospy"], ids=["our master", "real master"])

@@ -52,8 +52,7 @@ _MAX_SUBSCRIBERS = 200
 _LARGE, _MAX_LARGE = 16 * 1024, 100
 """Size in bytes, and number of messages. If a subscriber has this many queued messages, larger messages are not sent to it."""
 
-# maximum number of characters to write per step; escaping a character may take a microsecond
-_STEP_LETTERS = 1024
+STEP_LETTERS = 1024  # characters of text written per step; escaping one may take a microsecond
 
 
 class RosoutNode:
@@ -96,7 +95,7 @@ class RosoutNode:
             self.node.make_subscription(
                 "/rosout",
                 type_,
-                InTurns(self._on_message, self._turns.start, _MAX_BYTES, self._on_left_out),
+                InTurns(self.on_message, self._turns.start, _MAX_BYTES, self._on_left_out),
             )
         )
         await self._serve_loggers()
@@ -147,7 +146,7 @@ class RosoutNode:
             )
         )
 
-    def _on_message(self, frame: Frame, header: Header) -> Steps[None]:
+    def on_message(self, frame: Frame, header: Header) -> Steps[None]:
         assert self._aggregated
         body = bytes(frame)
         whole = serialize_frame(body)
@@ -183,8 +182,8 @@ class RosoutNode:
         parts: list[str] = []
         # Keep line breaks in the message, as the real log file does, but not in the other fields.
         for text, keep in ((head, ""), (message.msg, "\n\t")):
-            for at in range(0, len(text), _STEP_LETTERS):
-                parts.append(escaped(text[at : at + _STEP_LETTERS], keep))
+            for at in range(0, len(text), STEP_LETTERS):
+                parts.append(escaped(text[at : at + STEP_LETTERS], keep))
                 if at:
                     yield None
         file.text("".join(parts))

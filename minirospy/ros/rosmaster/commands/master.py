@@ -40,8 +40,8 @@ __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 
 _LOG_BYTES = 10 * 1024 * 1024
 
-_ANSWER_SECONDS = 4.0
-"""Seconds to wait for a response from a master on a busy machine. A master that is still recovering holds its journal's lock."""
+ANSWER_SECONDS = 4.0
+"""Seconds for a master to respond on a busy machine. A master that needs longer to recover holds its journal's lock."""
 
 
 class _Options(NamedTuple):
@@ -432,11 +432,11 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
     uri = f"http://{host}:{port}"
     silence = ""
     try:
-        RpcClient(f"http://127.0.0.1:{port}", timeout=_ANSWER_SECONDS).call("getPid", "/roscore")
+        RpcClient(f"http://127.0.0.1:{port}", timeout=ANSWER_SECONDS).call("getPid", "/roscore")
     except RpcError as failure:
         pid = _holder(journal) if journal and isinstance(failure, RpcUnreachable) else None
         if pid is None:
-            late = f" or by a suspended master (no answer within {_ANSWER_SECONDS:g} s)"
+            late = f" or by a suspended master (no answer within {ANSWER_SECONDS:g} s)"
             return MinirospyError(
                 f"port {port} is taken by another program{late if isinstance(failure, RpcTimeout) else ''}: "
                 f"choose one with `{name} -p PORT`"

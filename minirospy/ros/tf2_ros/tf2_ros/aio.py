@@ -54,7 +54,7 @@ class Buffer:
     def __init__(self, node: Node, cache_time: float = 10.0) -> None:
         self._node = node
         refusals = RefusalLog(self._log, clocks.monotonic)
-        self._tree = TransformBuffer(int(cache_time * 1e9), refusals)
+        self.tree = TransformBuffer(int(cache_time * 1e9), refusals)
         self._changed = asyncio.Event()
         self._last = 0
         self._listening: list[asyncio.Task[None]] = []
@@ -94,7 +94,7 @@ class Buffer:
         ROSInterruptException if the node shuts down in the meantime.
         """
         stamp = nanoseconds(time)
-        found = await self._wait_for(lambda: self._tree.lookup(target, source, stamp), timeout)
+        found = await self._wait_for(lambda: self.tree.lookup(target, source, stamp), timeout)
         return transform_stamped(target, source, found)
 
     async def lookup_full(
@@ -113,14 +113,14 @@ class Buffer:
         """
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         found = await self._wait_for(
-            lambda: self._tree.lookup_full(target, stamps[0], source, stamps[1], fixed), timeout
+            lambda: self.tree.lookup_full(target, stamps[0], source, stamps[1], fixed), timeout
         )
         return transform_stamped(target, source, found)
 
     def why_not(self, target: str, source: str, time: Moment = _LATEST) -> str | None:
         """Return None if :meth:`lookup` would succeed now, or else the reason why it would fail."""
         try:
-            return self._tree.why_not(target, source, nanoseconds(time))
+            return self.tree.why_not(target, source, nanoseconds(time))
         except InvalidArgumentException as error:
             return str(error)
 
@@ -129,15 +129,15 @@ class Buffer:
 
         Stop when the node shuts down. Raise InvalidArgumentException if a frame name is invalid.
         """
-        # This call raises InvalidArgumentException for invalid frame names.
-        self._tree.why_not(target, source, 0)
+        # Raises InvalidArgumentException for invalid frame names.
+        self.tree.why_not(target, source, 0)
         end = asyncio.ensure_future(self._node.spin())
         last: StampedTransform | None = None
         try:
             while not self._node.is_shutdown:
                 changed = self._changed
                 with contextlib.suppress(TransformException):
-                    found = self._tree.lookup(target, source, 0)
+                    found = self.tree.lookup(target, source, 0)
                     if found != last:
                         last = found
                         yield transform_stamped(target, source, found)
@@ -148,7 +148,7 @@ class Buffer:
 
     def frames_as_yaml(self) -> str:
         """Return each frame's parent, broadcaster, rate and times, in the format that view_frames reads."""
-        return frames_as_yaml(self._tree)
+        return frames_as_yaml(self.tree)
 
     # --- within
 
@@ -180,22 +180,22 @@ class Buffer:
     async def _take(self, subscription: Subscription[LazyTFMessage], is_static: bool) -> None:
         async with subscription:
             async for message in subscription:
-                self._check_for_jump()
+                self.check_for_jump()
                 who = message._connection_header.get("callerid", "default_authority")
                 try:
-                    self._tree.insert_message(message.raw or b"", who, is_static=is_static)
+                    self.tree.insert_message(message.raw or b"", who, is_static=is_static)
                 except DeserializationError as error:
                     self._node.log.error("a message of %s is not a tf2_msgs/TFMessage: %s", who, error)
                     continue
                 self._changed.set()
                 self._changed = asyncio.Event()
 
-    def _check_for_jump(self) -> None:
+    def check_for_jump(self) -> None:
         now = self._node.now().to_nsec()
         if now < self._last:
             jump = (self._last - now) / 1e9
             self._node.log.warning("Detected jump back in time of %fs. Clearing TF buffer.", jump)
-            self._tree.clear()
+            self.tree.clear()
         self._last = now
 
     def _log(self, text: str, is_error: bool) -> None:
@@ -207,15 +207,15 @@ class Broadcaster:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._moving: Publisher[TFMessage] | None = None
+        self.moving: Publisher[TFMessage] | None = None
         self._static: Publisher[TFMessage] | None = None
         self._kept: dict[str, TransformStamped] = {}
 
     async def send(self, *transforms: TransformStamped) -> None:
         """Publish transforms in one message on /tf."""
-        if self._moving is None:
-            self._moving = self._node.advertise("/tf", TFMessage, queue_size=100)
-        await self._moving.publish(TFMessage(list(transforms)))
+        if self.moving is None:
+            self.moving = self._node.advertise("/tf", TFMessage, queue_size=100)
+        await self.moving.publish(TFMessage(list(transforms)))
 
     async def send_static(self, *transforms: TransformStamped) -> None:
         """Publish transforms on /tf_static, latched, together with all earlier ones.
@@ -229,7 +229,7 @@ class Broadcaster:
 
     async def close(self) -> None:
         """Stop publishing. Idempotent."""
-        publishers, self._moving, self._static = (self._moving, self._static), None, None
+        publishers, self.moving, self._static = (self.moving, self._static), None, None
         for publisher in publishers:
             if publisher is not None:
                 await publisher.close()
