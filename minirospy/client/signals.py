@@ -217,7 +217,7 @@ class SignalWatchdog:
             return
 
         report_interrupt(str(self._lifecycle.reason))
-        if handler == self._on_signal:
+        if handler == self.on_signal:
             self._interrupt = Action.INTERRUPT
             self._nudge()
         else:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from minirospy.core.idl.own_packages import own_definitions
+from minirospy.ros.passed_on import PASSED_ON
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES
 
 __all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "write_overlay"]
@@ -173,7 +174,9 @@ def _text(name: str, source: Path) -> str:
     names_here = exported(source)
     public = _read(source).public
     passed_on = _passed_on(name, listed(source))
-    hook = names_here.pop("__getattr__", None) if passed_on else None
+    is_package = source.name == "__init__.py" and name not in _ALSO
+    later = {**(_submodules(name) if is_package else {}), **passed_on}
+    hook = names_here.pop("__getattr__", None) if later else None
     if hook:
         names_here["_find_more"] = hook
     for bound, (module, imported) in names_here.items():
@@ -184,19 +187,44 @@ def _text(name: str, source: Path) -> str:
     for module, names in by_module.items():
         lines += [f"from {module} import (", *_wrapped(names), ")"]
     if public is not None:
-        listed = [f'"{each}"' for each in sorted(public) if not each.startswith("_")]
-        lines += ["", "__all__ = [", *_wrapped(listed), "]"]
-    if source.name == "__init__.py" and name not in _ALSO:
-        lazy = _lazy(name, has_hook="__getattr__" in exported(source))
-        lines += ["", *lazy] if lazy and lines[-1] else lazy
+        lines += ["", "__all__ = [", *_wrapped(f'"{each}"' for each in listed(source)), "]"]
+    if is_package and "." not in name:
+        lines += [
+            "",
+            "from minirospy.ros.submodules import offer_standard_library as _offer_standard_library",
+            "",
+            "_offer_standard_library()",
+        ]
+    if passed_on:
+        lines += [
+            "",
+            f"__all__ {'=' if public is None else '+='} [",
+            *_wrapped(f'"{each}"' for each in passed_on),
+            "]",
+        ]
+    later = {each: place for each, place in later.items() if each not in names_here}
+    if later:
+        lines += _text_of_later(name, later, has_hook=hook is not None)
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
-def _lazy(package: str, *, has_hook: bool) -> list[str]:
-    """Return the code that imports a package's submodules, and the standard library's, when they are first used.
+def listed(source: Path) -> list[str]:
+    """Return the public names in the ``__all__`` of the module in a file."""
+    return sorted(name for name in _read(source).public or () if not name.startswith("_"))
 
-    Type checkers do not see it, so that they report names that do not exist.
-    """
+
+def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
+    """Return the names that a module's star brings from elsewhere, without its own: name -> `MODULE` or `MODULE:NAME`."""
+    found = {}
+    for place, names in PASSED_ON.get(module, {}).items():
+        for each in names.split():
+            name, _, there = each.partition("=")
+            found[name] = ":".join(filter(None, (place, there or name)))
+    return {name: found[name] for name in sorted(found.keys() - set(own))}
+
+
+def _submodules(package: str) -> dict[str, str]:
+    """Return a package's submodules: name -> module."""
     depth = package.count(".") + 1
     names = [
         each.rpartition(".")[2]
@@ -205,15 +233,28 @@ def _lazy(package: str, *, has_hook: bool) -> list[str]:
     ]
     definitions = own_definitions() / package
     names += [kind for kind, of in _DEFINED.items() if any((definitions / each).is_dir() for each in of)]
-    needs_hook = bool(names) and not has_hook
-    used = ["offer_standard_library"] * ("." not in package) + ["on_first_use"] * needs_hook
-    lines = [f"from minirospy.ros.submodules import {', '.join(used)}", ""] if used else []
-    if "." not in package:
-        lines += ["offer_standard_library()"]
-    if needs_hook:
-        listed = [f'"{name}"' for name in [package, *sorted(names)]]
-        lines += ['globals()["__getattr__"] = on_first_use(', *_wrapped(listed), ")"]
-    return lines
+    return {name: f"{package}.{name}" for name in sorted(names)}
+
+
+def _text_of_later(module: str, names: dict[str, str], *, has_hook: bool) -> list[str]:
+    """Return the lines that find these names at first use; type checkers and editors do not see them."""
+    missing = f"raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")"
+    return [
+        "",
+        "import typing as _typing",
+        "",
+        "if not _typing.TYPE_CHECKING:",
+        "    from minirospy.ros.submodules import import_passed_on as _import_passed_on",
+        "",
+        "    _LATER = {",
+        *(f"    {line}" for line in _wrapped(f'"{name}": "{place}"' for name, place in names.items())),
+        "    }",
+        "",
+        "    def __getattr__(name):",
+        "        if name in _LATER:",
+        "            return _import_passed_on(globals(), name, _LATER[name])",
+        f"        {'return _find_more(name)' if has_hook else missing}",
+    ]
 
 
 def _wrapped(words: Iterable[str]) -> list[str]:

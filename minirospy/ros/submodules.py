@@ -7,7 +7,7 @@ from collections.abc import Callable
 from importlib import import_module
 from types import ModuleType
 
-__all__ = ["offer_standard_library", "on_first_use"]
+__all__ = ["import_passed_on", "offer_standard_library", "on_first_use"]
 
 _STANDARD_LIBRARY = {
     "email": (
@@ -46,6 +46,15 @@ def on_first_use(package: str, *names: str) -> Callable[[str], ModuleType]:
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
 
     return find
+
+
+def import_passed_on(namespace: dict[str, object], name: str, place: str) -> object:
+    """Return what ``place``, `MODULE` or `MODULE:NAME`, means, and keep it in a module's ``namespace`` as ``name``."""
+    module, _, inner = place.partition(":")
+    found: object = import_module(module)
+    if inner:
+        found = getattr(found, inner)
+    return namespace.setdefault(name, found)
 
 
 def offer_standard_library() -> None:

@@ -28,21 +28,6 @@ MAX_SECONDS = 10.0
 """Maximum wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
 
 
-class Reachable(Protocol):
-    """A client of a service or an action. Methods may be called from any thread."""
-
-    @property
-    def is_ready(self) -> bool:
-        """Return whether a server is connected."""
-
-    @property
-    def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the existing servers, or None if no response can be lost."""
-
-    def probe(self) -> Ros2Probe | None:
-        """Return a probe of the servers, or None if they have no request without effect."""
-
-
 class Reach:
     """Tracks which servers have discovered a client."""
 

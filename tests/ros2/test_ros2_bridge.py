@@ -26,6 +26,7 @@ from minirospy.core.tf2.statics import StaticTransforms
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.snapshot import Snapshot, fetch
 from minirospy.ros2.bridge import Ros2Bridge, Ros2Options, TopicPassing
+from minirospy.ros2.interface import Accept, Ros2Goal
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.link_table import Pair
 from minirospy.ros2.links import BRIDGE_PREFIX, Direction, Link, Ros2End, Ros2Topic, links, marker

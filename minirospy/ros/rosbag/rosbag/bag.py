@@ -44,7 +44,6 @@ from minirospy.ros.rosbag.rosbag.private import (
     nanoseconds_of,
 )
 from minirospy.ros.rosbag.rosbag.readers import _BagReader, _BagReader200
-from minirospy.ros.submodules import modules_on_first_use
 
 if TYPE_CHECKING:
     from minirospy.base.times import Time
@@ -72,11 +71,6 @@ __all__ = [
     "_message_types",
     "found_lz4",
 ]
-
-__getattr__ = modules_on_first_use(
-    "rosbag.bag",
-    "bisect bz2 collections genmsg genpy heapq os re roslib rospy struct sys threading time yaml",
-)
 
 found_lz4 = True  # whether LZ4 is available; programs check this name
 

@@ -4,8 +4,6 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from minirospy.ros.submodules import on_first_use
-
 if TYPE_CHECKING:
     from minirospy.ros.rosgraph.rosgraph import masterapi as masterapi
     from minirospy.ros.rosgraph.rosgraph import names as names
@@ -36,8 +34,6 @@ __all__ = [
     "is_master_online",
     "myargv",
 ]
-
-__getattr__ = modules_on_first_use("rosgraph", "roslogging=rosgraph.roslogging sys xmlrpc=rosgraph.xmlrpc")
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:

@@ -9,14 +9,11 @@ from typing import TYPE_CHECKING
 from minirospy.base.errors import DeserializationError
 from minirospy.client.topics import AnyMsg
 from minirospy.core.idl.message import args_kwds_to_message, number_header
-from minirospy.ros.submodules import modules_on_first_use
 
 if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Message
 
 __all__ = ["AnyMsg", "args_kwds_to_message", "deserialize_messages", "serialize_message"]
-
-__getattr__ = modules_on_first_use("rospy.msg", "genpy logging rospy struct time traceback types")
 
 _LENGTH = struct.Struct("<I")
 
