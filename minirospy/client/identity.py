@@ -113,7 +113,7 @@ class Identity:
         return names.resolve(name, self.name, self.resolved_mappings(self.name))
 
     def remap(self, name: str, caller_id: str | None = None) -> str:
-        """Return the command line's remapping of ``name`` exactly as spelled, or ``name`` itself if there is none."""
+        """Return the command line's remapping of ``name`` as written there, or ``name`` itself if there is none."""
         mapped = self.mappings.get(name)
         return name if mapped is None else names.resolve(mapped, caller_id or self.name)
 

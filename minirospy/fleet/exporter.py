@@ -42,7 +42,7 @@ __all__ = ["Exporter"]
 _log = logging.getLogger(__name__)
 _MAX_IN_FLOWS = 1_000
 MAX_WANTED, MAX_READERS = 10_000, 1_000
-"""Topics that readers may request, and readers per topic: limited because peers choose both."""
+"""Maximum number of topics that readers may request, and of readers per topic, because peers choose both."""
 
 
 class Exporter:

@@ -42,11 +42,12 @@ AGAIN_SECONDS = 5.0  # before adding a robot again after a failure
 _CLOCK_SECONDS = 30.0
 _PINGS = 5
 PING_SECONDS = 5.0
-_MAX_PING = 64  # bytes in a reply to a ping, which normally has 8
+_MAX_PING = 64  # maximum size in bytes of a reply to a ping, which normally has 8
 _CALL_SECONDS = 3600.0
-# for a gateway to reply after another gateway on the same machine has claimed its name
+# seconds for a name's holder to reply after another gateway on the same machine has claimed the name
 CHALLENGE_SECONDS = 2.0
-# names removed (some 4 MB) before memory is returned, and the delay before that, as links linger
+# number of removed names (some 4 MB) after which memory is returned, and the seconds to wait before that, as links
+# linger
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
 MAX_ROBOT_NAMES = 2_000  # maximum number of names, of _MAX_IMPORTED, that one robot may use
 # maximum number of a robot's names to close concurrently, because each needs a task and a call to the master

@@ -60,15 +60,19 @@ __all__ = [
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
-MAX_TEXT = 16 << 20  # bytes read from a query or a reply: a service's response or a definition
-MAX_REPLIES = 10_000  # accepted for one query: peers choose the number; a fleet has at most 5,000 gateways
-EARLY_SHARE = 0.9  # of the timeout: a query that ends before this without replies has lost its link
+# maximum number of bytes in a query or a reply, such as a service's response or a definition
+MAX_TEXT = 16 << 20
+# maximum number of replies to a query, because peers choose the number; a fleet has at most 5,000 gateways
+MAX_REPLIES = 10_000
+EARLY_SHARE = 0.9  # share of the timeout; a query that ends earlier without replies has lost its link
 RETRY_SECONDS = 1.0
 LINGER_SECONDS = 2.0
 MAX_QUERIES = 200
-"""Service calls and parameter queries handled concurrently; further ones are refused."""
+"""Maximum number of service calls and parameter queries handled concurrently; further ones are rejected."""
 MAX_CONTROL_QUERIES = 50
-"""Concurrently handled pings and queries for status or definitions; their separate limit prevents delays by blocked calls."""
+"""Maximum number of pings, status and definition queries handled concurrently; with a separate limit, blocked calls do not
+delay them.
+"""
 
 
 # --- the network

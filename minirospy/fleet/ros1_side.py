@@ -241,7 +241,7 @@ class Ros1Side:
             with self._lock:
                 due = self._beacons.due(now)
                 if late > PERIOD:
-                    # The process was paused, and the beacons from that time have not been delivered yet.
+                    # The process was paused, and the beacons sent in that time have not been delivered yet.
                     self.sightings.extend(late, now)
                 has_news = self.sightings.forget_lost(now) or self._has_news
             for key in due:
@@ -328,7 +328,7 @@ class Ros1Side:
 
 
 def error_in(resource: Resource, answer: bytes) -> str:
-    """Return the error message in a reply to a call, or "" for a response. The bridge sends either, without marking which.
+    """Return the error message in a reply to a call, or "" if it is a response. The bridge sends both without a distinction.
 
     If the type is installed here, a reply is an error if it is text and is not exactly one serialized response.
     """

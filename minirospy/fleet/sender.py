@@ -22,7 +22,7 @@ _MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
 _MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
 MAX_OUTLETS = 64
-"""Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
+"""Maximum number of Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
 
 The least recently used one is dropped.
 """
@@ -163,7 +163,7 @@ class Sender:
     """Sends messages, using one thread per priority, so that a large message that takes a second does not delay a command."""
 
     def __init__(self, network: FleetNetwork, clock: Callable[[], int] = time.time_ns) -> None:
-        """``clock`` returns the time in ns that is attached to each message."""
+        """Create the queues. ``clock`` returns the time in ns that is attached to each message."""
         self.priorities = {priority: _PriorityWorker(priority, network, clock) for priority in Priority}
 
     def flow(self, priority: Priority, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:

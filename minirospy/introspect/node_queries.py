@@ -16,11 +16,11 @@ MAX_CONCURRENT = 64
 """Maximum number of concurrent first queries; a node that hangs occupies only one of them."""
 
 _MAX_CONCURRENT_RETRIES = 32
-"""Concurrent retries; limited separately, so that retries do not delay first queries."""
+"""Maximum number of concurrent retries; limited separately, so that retries do not delay first queries."""
 QUERY_SECONDS = 5.0
 AGAIN_SECONDS = 10.0  # before a node that did not respond is queried again
 REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
-"""Pause after a refused query, base and increment per failed query.
+"""Seconds to pause after a refused query: base, and increment per failed query.
 
 A refused query is cheap, and a killed server may be restarted soon, so refused queries are retried sooner than others. With
 500 dead nodes, each is queried every 10 s.
@@ -89,7 +89,7 @@ class NodeQueries(Generic[_Key, _Found]):
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # Done callbacks of tasks that have just finished run only after this.
+        # Clear the tasks here, because done callbacks of tasks that have just finished run only after this.
         self.tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:

@@ -26,7 +26,7 @@ class ProcessLoads:
         self.known: dict[int, psutil.Process] = {}
 
     def look(self, pids: Iterable[int]) -> dict[int, ProcessLoad]:
-        """Return the loads by process id, without processes that have exited or that this user may not inspect."""
+        """Return the loads by process id, omitting processes that have exited or that this user may not inspect."""
         before, self.known = self.known, {}
         found = {}
         for pid in set(pids):

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 __all__ = ["ServiceInfo", "TypeTexts", "described", "installed_type", "type_of_text"]
 
 MAX_NAMES = 2_000
-"""Cached types, including names of types that are not installed: limited, because a peer may send any number of names."""
-_MAX_CONCURRENT = 32  # publishers queried concurrently
+"""Maximum number of cached types, including types that are not installed: a peer may send any number of names."""
+_MAX_CONCURRENT = 32  # maximum number of publishers queried concurrently
 
 
 def installed_type(name: str) -> InterfaceType | None:

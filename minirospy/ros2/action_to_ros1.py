@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["MAX_GOALS", "GoalsToRos1"]
 
 SERVER_SECONDS = 5.0
-"""Timeout for a ROS 1 server to connect, and to include a new goal in its statuses."""
+"""Timeout in seconds for a ROS 1 server to connect, and to include a new goal in its statuses."""
 MAX_GOALS = 1_000
 """Maximum number of goals passed on concurrently; further goals are rejected."""
 _PENDING_SECONDS = 0.5

@@ -41,7 +41,7 @@ _KEPT_SECONDS = 5.0
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 REACH_SECONDS = 2.0
-"""Maximum time that opening this link delays other links while it waits for the server."""
+"""Maximum number of seconds by which opening this link delays other links while it waits for the server."""
 ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
 """Seconds to delay a response, because Python's actionlib drops responses that arrive before its send_goal has returned."""

@@ -52,7 +52,7 @@ _ORIGIN = "ros2_domain"
 """Connection header field that marks publishers of ROS 2 data, so that no bridge to the same domain sends the data back."""
 _MIN_REFRESH_INTERVAL = 0.25
 QUERY_SECONDS = 3.0
-"""Timeout, after which topics are bridged even if publishers have not responded."""
+"""Timeout in seconds, after which topics are bridged even if publishers have not responded."""
 JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
 _DEPTH = 1000
@@ -274,7 +274,7 @@ class Ros2Bridge:
 
 
 class TopicPassing:
-    """An open link; ``passed`` is the number of messages passed."""
+    """An open link; ``passed`` counts the messages that were passed on."""
 
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder) -> None:
         self.link = link

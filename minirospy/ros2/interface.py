@@ -74,7 +74,7 @@ class Reachable(Protocol):
         """Return the ids of the existing servers, or None if no response can be lost."""
 
     def probe(self) -> Ros2Probe | None:
-        """Return a probe of the servers, or None if they have no request without effect."""
+        """Return a probe of the servers, or None if no no-op request exists for them."""
 
 
 class Ros2Client(Reachable, Protocol):
@@ -92,7 +92,7 @@ class Ros2Goal(Protocol):
     def cancel(self) -> None: ...
 
     def result(self) -> Future[tuple[int, bytes]]:
-        """Return the future of the status (see action_msgs/GoalStatus) and the result."""
+        """Return a future for the status (see action_msgs/GoalStatus) and the result."""
 
 
 class Ros2ActionClient(Reachable, Protocol):
@@ -115,11 +115,13 @@ class GoalOfRos1(Protocol):
         """Return the future of the final status (see action_msgs/GoalStatus) and the result, which is None if it is empty."""
 
     def cancel(self) -> None:
-        """Request the server to cancel the goal. May be called from any thread."""
+        """Send the server a cancel request. May be called from any thread."""
 
 
 Accept = Callable[[bytes, Callable[[bytes], None]], Future[GoalOfRos1 | None]]
-"""Accepts a goal, given the function for its feedback; returns the accepted goal, or None if the goal is refused."""
+"""Accepts a goal, given the goal and a function for its feedback; returns a future for the accepted goal, or for None if the
+goal is rejected.
+"""
 
 
 class Ros2Parameters(Protocol):

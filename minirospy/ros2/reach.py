@@ -25,7 +25,7 @@ _LOOK_SECONDS = 0.02
 AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
 _NO_PROBE_SECONDS = 1.0  # seconds to wait for servers that cannot be probed
 MAX_SECONDS = 10.0
-"""Maximum wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
+"""Maximum number of seconds to wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
 
 
 class Reach:
@@ -107,7 +107,7 @@ class Reach:
 
 async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
     pause = AGAIN_SECONDS
-    # Stop if a server's node has exited, because the node's services will never be ready again.
+    # Stop if a server's node has exited, because the node's services will never become ready again.
     while is_current():
         if not probe.is_ready:
             await asyncio.sleep(_LOOK_SECONDS)

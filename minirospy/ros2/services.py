@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 __all__ = ["ServiceBridge", "ServiceCodec"]
 
 QUERY_SECONDS = 1.0
-"""Timeout, after which only services with known types are bridged."""
+"""Timeout in seconds, after which only services with known types are bridged."""
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _MAX_CALLS = 1_000

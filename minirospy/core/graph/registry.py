@@ -201,7 +201,7 @@ class Registry:
 
     @property
     def is_large(self) -> bool:
-        """Return whether a list of all registrations uses so much memory that only one should be built at a time."""
+        """Return whether a list of all registrations would use so much memory that only one should be built at a time."""
         return self.shares.total > _MANY_BYTES
 
     @property

@@ -23,8 +23,8 @@ _MIB = 1024 * 1024
 MAX_MEMORY = 64 * _MIB  # memory limit for all long strings in one document
 
 MAX_WIDE = 16 * _MIB
-"""Maximum bytes of one string with a character beyond U+00FF: each of its characters then uses 2 or 4 bytes, and the string
-is copied.
+"""Maximum size in bytes of a string with a character beyond U+00FF: each of its characters then uses 2 or 4 bytes, and the
+string is copied.
 """
 
 MAX_TOKEN = 65536  # bytes in a tag, a comment or similar

@@ -20,7 +20,7 @@ from minirospy.base.escape import escaped
 __all__ = ["LogFile", "LogFileHandler"]
 
 FLUSH_SECONDS = 0.5
-# maximum characters to collect: writing megabytes in one call would block the master
+# Maximum number of characters to collect, because writing megabytes in one call would block the master
 _MAX_PENDING = 64 * 1024
 
 

@@ -49,7 +49,8 @@ _MAX_CONCURRENT_CHECKS = 100
 QUICK_CHECK_SECONDS = 1.0
 _TOUCH_SECONDS = 30.0
 LOCK_SECONDS = 3.0
-# Seconds between attempts: the system may release a killed master's port before its journal's lock
+# Seconds between attempts to lock the journal: the system may release a killed master's port before the journal's
+# lock
 _LOCK_PAUSE = 0.02
 
 _RESTART_SECONDS = 600.0  # maximum age of a killed master's journal for its session to be continued

@@ -37,7 +37,7 @@ _HOLD_TICK = 0.01
 
 _SECONDS_PER_TURN = 0.003  # time limit in seconds per loop iteration for starting calls
 
-# Pending parameter notifications per node; if there are more, one notification per subscribed key replaces them
+# Maximum pending parameter notifications per node; beyond that, one notification per subscribed key replaces them
 MAX_PARAMETERS = 32
 
 # maximum total size in bytes of large calls in progress; further ones are queued
@@ -95,9 +95,11 @@ class Notifier:
         self.rpc = AsyncRpcClient(same_host=same_host, max_answer=_MAX_ANSWER)
 
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
-        """URI of a node on this loop -> function to call with a topic and its publishers, instead of an XML-RPC call."""
+        """Dict from the URI of a node on this loop to the function to call with a topic and its publishers, instead of an
+        XML-RPC call.
+        """
         self.nodes: dict[str, _Backlog] = {}
-        # (URI, topic) -> earliest time at which its next notification may be sent, earliest first.
+        # Dict from (URI, topic) to the earliest time at which its next notification may be sent, earliest first.
         self._held: dict[tuple[str, str], float] = {}
 
         self.line = _Line(MAX_CONCURRENT_CALLS)

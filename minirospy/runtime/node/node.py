@@ -89,7 +89,10 @@ class Node:
         self.parameters = self.registrations.parameters
         """The parameters that this node has subscribed to at the master; the subscribing code adds them."""
         self.when_registered_again = self.registrations.when_registered_again
-        """Functions that register further state; called in workers after the master has lost this node's registrations."""
+        """Functions that register further state.
+
+        They are called in workers when the node registers again with a master that had lost it.
+        """
 
         self.server: RpcServer | None = None
         self._access = Access.parse(environment.allow) if environment.allow else None

@@ -117,7 +117,7 @@ class Registrations:
         await self._unregister_all(announces=announces)
 
     async def cancel(self) -> None:
-        """Cancel the calls that have no response yet."""
+        """Cancel the calls that have not received a response yet."""
         tasks = [*self._registering, *([self.watching] if self.watching else [])]
         for task in tasks:
             task.cancel()

@@ -331,7 +331,7 @@ class Subscription:
         # Limit the rate, because /rosout has as many publishers as there are nodes.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.connecting: dict[str, asyncio.Task[None]] = {}
-        # Links to publishers that have left the master's list, with the timer that closes each link.
+        # Links to publishers that have left the master's list, each with the timer that closes it.
         self._leaving: dict[str, tuple[InLink, asyncio.TimerHandle]] = {}
         self.on_connected: list[Callable[[], object]] = []  # called on the loop when a publisher is connected
         self._closed = False
@@ -380,7 +380,10 @@ class Subscription:
         await asyncio.gather(*self.connecting.values(), return_exceptions=True)
 
     def _settle(self) -> None:
-        """Forget publishers that the master does not list, except those with an open link: rospy nodes never register again."""
+        """Forget publishers that the master does not list.
+
+        Keep those with an open link, because rospy nodes never register again.
+        """
         self.settling = None
         for action in self.plan.publishers_changed(self._named):
             if isinstance(action, Connect):
@@ -444,8 +447,8 @@ class Subscription:
             if self.lists == lists:
                 self.plan.refused(uri)
             else:
-                # A newer list arrived after this refusal, and perhaps no other list will follow: retry, because the
-                # publisher may accept by now.
+                # A newer list arrived after this refusal, and there may be no further list: retry, because the
+                # publisher may accept now.
                 self.retry(uri, error)
         except _NoPublisher as error:
             self._limited_log.warning("no connection for %s: %s", self.topic, error)

@@ -32,7 +32,7 @@ __all__ = ["Dispatch", "RpcServer", "is_address_in_use"]
 
 _log = logging.getLogger(__name__)
 
-# Maximum bytes of all clients' requests that are incomplete or being read; beyond that the largest are refused
+# Maximum total bytes of all clients' incomplete requests and those being read; beyond that the largest are refused
 MAX_HELD = 72 * 1024 * 1024
 LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are not refused because of that limit
 

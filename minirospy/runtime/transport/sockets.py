@@ -34,7 +34,7 @@ HANDSHAKE_SECONDS = 10.0  # time limit for each handshake, because a peer may ne
 BUSY_POLL_SECONDS = 0.0002  # seconds within which most responses from a process on the same host arrive
 
 KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
-"""Seconds of silence, seconds between probes, number of probes. On macOS the first one is called TCP_KEEPALIVE."""
+"""Seconds of silence, seconds between probes, number of probes. On macOS the first option is called TCP_KEEPALIVE."""
 
 # Requested buffer size for a Unix socket in bytes, as much as TCP buffers; Linux limits it to net.core.wmem_max (208
 # kB by default)

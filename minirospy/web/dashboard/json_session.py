@@ -37,7 +37,7 @@ _VALUE_FACTOR = 4
 _INTERNAL_ERROR = 1011  # WebSocket close code for an internal error, RFC 6455, section 7.4.1
 
 CLOCK_SECONDS = time.get_clock_info("monotonic").resolution
-"""Resolution of the loop's clock: 16 ms on Windows before Python 3.13."""
+"""Resolution of the loop's clock in seconds, 16 ms on Windows before Python 3.13."""
 
 _T = TypeVar("_T")
 Fields = Mapping[str, object]

@@ -14,7 +14,7 @@ from minirospy.web.graph import SharedGraph
 __all__ = ["Channels", "Services"]
 
 TYPE_SECONDS = 3.0
-"""Timeout for querying topic types that are not installed. It is short because all clients wait for the list of channels."""
+"""Timeout in seconds for querying topic types that are not installed. It is short because all clients wait for the channels."""
 
 
 class Channels:

@@ -76,7 +76,7 @@ class Account:
         """Number of times that a client had to release memory."""
         self._shares: set[Share] = set()
         self.holders: Counter[int] = Counter()
-        """How often a large piece waits, by the id of the object, which exists as long as it waits."""
+        """Number of times that a large piece is queued, by the id of the object, which exists while it is queued."""
         self._is_enforcing = False
 
     def open(self, address: str, shed: Callable[[], object]) -> Share:

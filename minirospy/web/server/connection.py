@@ -108,14 +108,16 @@ class Connection:
         # the client's access rights; set by the listener when it admits the request
         self.rank = Rank.SILENT
         self.active = now  # when the connection was opened, or last received a message or sent one
-        self.unfinished = 0  # bytes of a message that is not complete, or that the session works on
+        # bytes of incomplete messages, and of the message that the session is processing
+        self.unfinished = 0
         self.site = site  # the listener
-        self._limits = limits  # the listener's
+        self._limits = limits  # the listener's limits
         self._pipe = pipe  # the transport
         self.loop = loop
         self._websocket = WebSocket(self._select, limits.message, limits.messages_a_second)
         self._output = Output(pipe, SendQueue(limits.queue, share=self.share), self.share, loop, self._count)
-        self._jobs = Jobs(limits.queue, self.share)  # work for the client that is not about what it sent
+        # work for the client that is not a response to its messages
+        self._jobs = Jobs(limits.queue, self.share)
         self.liveness = Liveness(limits.silent_seconds, now)
         self.turn = site.turns.join(self._work)  # the client's share of the loop
         self.turn.weight = _NEW_WEIGHT
@@ -161,7 +163,7 @@ class Connection:
         if self.exchange:
             return  # a connection has only one request
         self._websocket.feed(data)
-        # A large message is read in large pieces, unless other clients wait for their turns.
+        # Read a large message in large pieces, unless other clients are waiting for their turns.
         is_alone = len(data) >= SMALL_READ and not self.site.turns.is_busy
         self._pipe.read_bytes = LARGE_READ if is_alone else SMALL_READ
         if self._is_held_back or self._is_paused or self.site.turns.start(self.turn):
@@ -416,7 +418,10 @@ class Connection:
             self._open_websocket(request, seen, grant)
 
     def _admitted(self, head: RequestHead) -> tuple[HttpRequest, Grant, bool] | Refusal:
-        """Return a request, its rights and whether it is for a page, or why it is refused. Raise ValueError."""
+        """Return a request, its rights and whether it is for a page, or the reason for refusing it.
+
+        Raise ValueError if the request is invalid.
+        """
         grant = self.site.check(head.credentials, is_page=head.is_page)
         refusal = grant if isinstance(grant, Refusal) else self.site.admit(self, grant)
         if refusal:
@@ -517,7 +522,7 @@ class Connection:
         self._timer = self.loop.call_later(self._limits.ping_seconds, check)
 
     def ping(self) -> None:
-        """Ping the client, or disconnect it if it is gone."""
+        """Ping the client, or disconnect it if it no longer responds."""
         output = self._output
         verdict = self.liveness.check(self.loop.time(), output.progressed, is_full=output.is_full)
         if verdict in (Verdict.STUCK, Verdict.SILENT):

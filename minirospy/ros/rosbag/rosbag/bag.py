@@ -72,7 +72,7 @@ __all__ = [
     "found_lz4",
 ]
 
-found_lz4 = True  # whether LZ4 is available; programs check this name
+found_lz4 = True  # set if LZ4 is available; programs check this name
 
 
 class Compression:

@@ -107,7 +107,7 @@ def use_ipv6() -> bool:
 
 
 def get_bind_address(address: str | None = None) -> str:
-    """Return the address to which servers bind."""
+    """Return the address that servers should bind to."""
     return (Environment.read(host=address) if address else _environment()).bind_host
 
 

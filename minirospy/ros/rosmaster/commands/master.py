@@ -41,7 +41,7 @@ __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 _LOG_BYTES = 10 * 1024 * 1024
 
 ANSWER_SECONDS = 4.0
-"""Seconds for a master to respond on a busy machine. A master that needs longer to recover holds its journal's lock."""
+"""Seconds to wait for a response from a master on a busy machine. A master that is still recovering holds its journal's lock."""
 
 
 class _Options(NamedTuple):

@@ -129,7 +129,7 @@ class Buffer:
 
         Stop when the node shuts down. Raise InvalidArgumentException if a frame name is invalid.
         """
-        # Raises InvalidArgumentException for invalid frame names.
+        # This call raises InvalidArgumentException for invalid frame names.
         self.tree.why_not(target, source, 0)
         end = asyncio.ensure_future(self._node.spin())
         last: StampedTransform | None = None

@@ -39,7 +39,10 @@ class Output:
         on_subscriber: Callable[[], object] = lambda: None,
         on_advertised: Callable[[], object] = lambda: None,
     ) -> None:
-        """Create the output. ``latch``: None means the same as the input; ``on_advertised`` is called after the first message."""
+        """Create the output.
+
+        ``latch`` None means the same as the input; ``on_advertised`` is called after the first message.
+        """
         self.topic = checked_topic(topic)
         self._latch = latch
         self._on_subscriber = on_subscriber
@@ -126,7 +129,7 @@ class Input:
 
 
 def base_name(topic: str) -> str:
-    """Return the last part of a topic's name, which is used in the node's name. Raise ValueError if it is empty."""
+    """Return the last part of a topic's name, which becomes part of the node's name. Raise ValueError if it is empty."""
     name = checked_topic(topic).rstrip("/").rpartition("/")[2].lstrip("~")
     if not name:
         raise ValueError(f"[{topic}] is not the name of a topic")
@@ -163,7 +166,7 @@ def run_node(
             raise ValueError("")
         start = prepare(words)
         rospy.init_node(name(words), anonymous=True)
-        # Keep a reference to the subscription or services.
+        # Keep a reference, so that the subscription or the services are not deleted.
         running = start()
         rospy.spin()
         del running
