@@ -223,7 +223,7 @@ class Target:
 
         def left() -> list[object]:
             connections = [each for listener in bridge.listeners.values() for each in listener.connections]
-            rosbridge = [*bridge.rosbridge.sessions, *bridge.rosbridge.services]
+            rosbridge = [*bridge.rosbridge.sessions, *bridge.rosbridge.shared.services]
             graph = [*bridge.graph.publishers, *bridge.graph.topics]
             return [*connections, *rosbridge, *bridge.video.feeds, *graph]
 
@@ -242,7 +242,7 @@ class Target:
         from minirospy import Node
         from minirospy.runtime.master.master import Master
         from minirospy.web.bridge import Bridge, BridgeOptions
-        from minirospy.web.rosbridge.endpoint import RosbridgeOptions
+        from minirospy.web.rosbridge.shared import RosbridgeOptions
 
         master = Master()
         await master.start()

@@ -28,7 +28,8 @@ from minirospy.web.access import Access, Grant
 from minirospy.web.server import owners
 from minirospy.web.server.account import Account
 from minirospy.web.server.admission import Rank
-from minirospy.web.server.connection import Connection, Limits
+from minirospy.web.server.client import Limits
+from minirospy.web.server.connection import Connection
 from minirospy.web.server.pipe import Endpoints
 from minirospy.web.server.rate import ConnectionRate
 from minirospy.web.server.turns import FairTurns
