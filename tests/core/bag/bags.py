@@ -1,4 +1,4 @@
-"""Bags of any shape, record by record: the test chooses the messages of each chunk, and their order."""
+"""Build bags of any shape, record by record: the test chooses the messages in each chunk, and their order."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STRING_MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 
 
 class Given(NamedTuple):
-    """A message of a bag to be made."""
+    """A message to write to a bag."""
 
     connection: int
     time: int
@@ -30,7 +30,7 @@ class Given(NamedTuple):
 
 
 def connection(number: int, topic: str = "", **header: str) -> Connection:
-    """Return a connection of std_msgs/String, unless ``header`` has other fields."""
+    """Return a connection with std_msgs/String, unless ``header`` has other fields."""
     topic = topic or f"/topic{number}"
     fields = {
         "topic": topic,

@@ -77,7 +77,7 @@ def test_flipped_bytes_are_refused_or_have_no_effect(name: str) -> None:
             assert decompress(name, damaged, 6000) == b"hello " * 1000
         except BagFormatError:
             refused += 1
-    assert refused > len(data) * 0.9  # a bz2 stream has meaningless bits, such as its padding
+    assert refused > len(data) * 0.9  # a bz2 stream contains some bits without meaning, such as its padding
 
 
 @pytest.mark.parametrize("name", COMPRESSIONS)
@@ -150,7 +150,7 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024)
 
 
 def test_many_bz2_streams_are_refused() -> None:
-    # The data after a stream was copied for each stream: the time grew as the square of their number.
+    # The data after a stream used to be copied for each stream, so that the time grew as the square of their number.
     with pytest.raises(BagFormatError, match="more than 20000 bz2 streams"):
         decompress(BZ2, bz2.compress(b"") * 700_000, 10)
     assert decompress(BZ2, bz2.compress(b"ab") * 10_000 + bz2.compress(b""), 20_000) == b"ab" * 10_000

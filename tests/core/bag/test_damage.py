@@ -1,4 +1,4 @@
-"""Damaged bags: an error in one line, or messages that were in the bag; never other messages, a hang or a crash."""
+"""Damaged bags result in a one-line error, or in messages that were in the bag; never in other messages, a hang or a crash."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def read(data: bytes) -> list[Found]:
 
 
 def repaired(data: bytes) -> list[Found]:
-    """Return the messages of a bag after `rosbag reindex`."""
+    """Return the messages in a bag after `rosbag reindex`."""
     stream = io.BytesIO(data)
     repair = Repair(stream)
     positions = list(repair.run())
@@ -66,12 +66,12 @@ def repaired(data: bytes) -> list[Found]:
 
 
 def boundaries(data: bytes) -> list[int]:
-    """Return the positions at which the records of a bag end."""
+    """Return the positions at which the records in a bag end."""
     return [13, *(record.end + 13 for record in parse_records(data[13:]))]
 
 
 def attempt(action: Callable[[bytes], _T], data: bytes) -> _T | None:
-    """Return the result of an action on a bag, None if it raises an error of one line."""
+    """Return the result of an action on a bag, or None if it raises an error with a one-line message."""
     try:
         return action(data)
     except BagError as error:
@@ -125,7 +125,7 @@ def test_flipped_byte_never_gives_another_message(
     start = [*range(spaces), *range(spaces, 4096, 64)]
     places = start if part == "start" else range(max(len(data) - 4096, 4096), len(data))
 
-    # Threads that decompress in advance would be started ten thousand times.
+    # Otherwise threads that decompress in advance would be started ten thousand times.
     monkeypatch.setattr(reading, "THREADS", 0)
     for at in places:
         damaged = data[:at] + bytes((data[at] ^ 0xFF,)) + data[at + 1 :]
@@ -195,7 +195,7 @@ def chunk_places(data: bytes) -> list[tuple[int, int, int]]:
 
 
 def spoilt(data: bytes, kind: str) -> bytes:
-    """Return a bag whose fourth chunk is damaged so that its records are no longer consecutive."""
+    """Return a bag whose fourth chunk is damaged, so that its records are no longer consecutive."""
     start, body, end = chunk_places(data)[3]
     lengths = {
         "header length": (start, start + 4, b"\xff" * 4),
@@ -232,7 +232,7 @@ def test_repair_goes_on_at_the_next_chunk(compression: str, kind: str, lost: int
     found = read(stream.getvalue())
 
     if compression == "none" and kind == "data length":
-        lost = 0  # its index records show where its data ends
+        lost = 0  # its index records show where the chunk's data ends
     assert set(found) <= EVERY
     assert len(found) == len(EVERY) - lost
     assert [line.startswith("chunk at byte") for line in repair.problems] == ([True, False] if lost else [])
@@ -247,7 +247,7 @@ def test_repair_goes_on_at_the_next_chunk(compression: str, kind: str, lost: int
 @pytest.mark.parametrize("place", [1, 2, 3, 4])
 @pytest.mark.parametrize("kind", ["missing byte", "wrong byte"])
 def test_repair_writes_a_wrong_offset_of_the_index_again(compression: str, place: int, kind: str) -> None:
-    """The last four bytes of a chunk's index records are an offset: its times and its length are right."""
+    """The last four bytes of a chunk's index records are an offset, so the times and the length are right."""
     bag = make_bag(GIVEN, compression=compression)
     at = chunk_places(bag)[3][2] - place
     damaged = bag[:at] + (bytes((bag[at] ^ 0xFF,)) if kind == "wrong byte" else b"") + bag[at + 1 :]
@@ -302,7 +302,7 @@ def test_damage_of_any_kind_is_survived(data: st.DataObject) -> None:
 
 
 def described(data: bytes) -> str:
-    """Return the info of a bag, and read its complete index."""
+    """Return the info about a bag, after reading its complete index."""
     reader = open_bag(io.BytesIO(data))
     summary = info.summarize(reader, "a.bag", frequencies=True)
     return info.as_text(summary) + info.as_yaml(summary)
@@ -347,7 +347,7 @@ def test_definitions_of_hostile_bags_are_not_executed() -> None:
 
 
 def test_index_that_names_a_chunk_many_times_is_damaged() -> None:
-    # Messages with the same time, connection and position were compared by values that have no order.
+    # Messages with the same time, connection and position used to be compared by values that have no order.
     data = make_bag([[Given(0, 5, b"\1\0\0\0a"), Given(1, 5, b"\1\0\0\0b")]])
     reader = open_bag(io.BytesIO(data))
     (chunk,) = reader.chunks
@@ -368,7 +368,8 @@ def test_index_that_names_a_chunk_many_times_is_damaged() -> None:
 
 @pytest.mark.parametrize("closed", [True, False])
 def test_time_that_no_index_holds_costs_its_chunk_alone(closed: bool) -> None:
-    # 32-bit seconds and nanoseconds exceed 32-bit seconds, once the nanoseconds are below a billion.
+    # A time of 32-bit seconds and nanoseconds may exceed the 32-bit range once nanoseconds are normalized below a
+    # billion.
     last = (2**32 - 1) * 10**9 + 999_999_999
     data = make_bag([[Given(0, last, b"\1\0\0\0a")], [Given(0, 5, b"\1\0\0\0b")]], closed=closed)
     stamp = struct.pack("<II", 2**32 - 1, 999_999_999)

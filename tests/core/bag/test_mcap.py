@@ -48,7 +48,7 @@ HEADER = {
 
 
 def fill(writer: McapWriter | BagWriter) -> None:
-    """Write messages of two publishers, one out of order."""
+    """Write messages from two publishers, one of them out of order."""
     first = writer.add_connection("/chatter", HEADER)
     second = writer.add_connection("/other", {**HEADER, "callerid": "/second", "topic": "/chatter"})
     for i, time in enumerate((5, 3, 4, 6)):
@@ -252,7 +252,7 @@ def test_a_damaged_chunk_costs_its_own_messages_alone(compression: str) -> None:
 
 
 class Full(io.BytesIO):
-    """A disk with room for a number of bytes."""
+    """A disk with space for a number of bytes."""
 
     room = 0
 
@@ -303,7 +303,7 @@ def made_bytes() -> io.BytesIO:
 
 
 def made_by_the_library(seed: int, **options: Any) -> bytes:
-    """Return a file of three channels, one of which is not ROS 1, with times in random order."""
+    """Return a file with three channels, one of which is not ROS 1, and times in random order."""
     from mcap.writer import Writer
 
     source = random.Random(seed)
@@ -357,7 +357,7 @@ def test_messages_are_those_of_the_library_in_its_order(seed: int, index: str, k
 @pytest.mark.parametrize("mask", [0x80, 0xFF, 0x01])
 @pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
 def test_any_flipped_byte_raises_a_minirospy_error(compression: str, mask: int) -> None:
-    # A length of 2^63 bytes was an OverflowError, one of 2^40 a MemoryError.
+    # A length of 2^63 bytes used to raise OverflowError, one of 2^40 MemoryError.
     whole = made(compression).getvalue()
     step = max(1, len(whole) // 1_500)
     for at in [*range(0, len(whole), step), *range(len(whole) - 700, len(whole))]:
@@ -375,7 +375,7 @@ def repaired_stream(stream: io.BytesIO) -> None:
 
 
 def with_chunk(compression: str, stored: bytes, size: int) -> bytes:
-    """Return a file whose only chunk has this data; it announces ``size`` bytes."""
+    """Return a file whose only chunk has this data and claims a size of ``size`` bytes."""
     whole = made().getvalue()
     reader = McapReader(io.BytesIO(whole))
     (first, *_) = reader._summary.chunk_indexes
@@ -387,7 +387,7 @@ def with_chunk(compression: str, stored: bytes, size: int) -> bytes:
     repair = McapRepair(stream := io.BytesIO(head))
     list(repair.run())
     repair.apply()
-    # The repair leaves a bomb out of its index: without an index, chunks are found by reading the file.
+    # The repair omits a decompression bomb from the index: without an index, chunks are found by reading the file.
     return stream.getvalue()
 
 

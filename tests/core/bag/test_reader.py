@@ -35,7 +35,7 @@ def opened(data: bytes) -> BagReader:
 
 
 class Counting(io.BytesIO):
-    """A stream that counts the bytes that are read."""
+    """A stream that counts the bytes read from it."""
 
     count = 0
 

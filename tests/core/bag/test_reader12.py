@@ -22,7 +22,7 @@ def record(data: bytes, **fields: bytes) -> bytes:
 
 
 def make_bag12(messages: Sequence[tuple[str, int, bytes]], *, indexed: bool = True) -> bytes:
-    """Return a bag of (topic, time, body); the definition is stored before the first message of the first topic."""
+    """Return a bag with (topic, time, body); the definition is stored before the first message on the first topic."""
     bag = b"#ROSBAG V1.2\n"
     header = record(b" " * 100, op=b"\x03", index_pos=bytes(8))
     if indexed:
@@ -98,7 +98,7 @@ def test_message_without_a_definition_ends_the_scan() -> None:
 
 
 def fault(data: bytes) -> str:
-    """Read a damaged bag; return the error, "" if it could be read."""
+    """Read a damaged bag; return the error, or "" if it could be read."""
     try:
         reader = open_bag(io.BytesIO(data))
         reader.prepare()

@@ -1,4 +1,4 @@
-"""Bags by time: counts, the message at a time, the times around it."""
+"""The contents of bags by time: message counts, the message at a time, and the times around it."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class Disk(io.BytesIO):
 
 
 class Parsed:
-    """A complete bag: its header, connections, chunk infos, and its messages in file order."""
+    """A complete bag, parsed: its header, connections, chunk infos, and its messages in file order."""
 
     def __init__(self, data: bytes) -> None:
         stream = io.BytesIO(data)
@@ -91,7 +91,7 @@ class Parsed:
 
 
 def test_bytes_are_those_of_rosbag() -> None:
-    # Written by Debian's rosbag 1.15.15: Bag(f, "w", chunk_threshold=100), four messages.
+    # The checksum of a bag that Debian's rosbag 1.15.15 wrote: Bag(f, "w", chunk_threshold=100), four messages.
     wanted = "b86940be2fcbbadc8243e6fbc0cd1ddbb7a52f4375b5aa835d33eb4c278826a5"
     stream = io.BytesIO()
     writer = BagWriter(stream, chunk_threshold=100)
@@ -271,7 +271,7 @@ def test_a_full_disk_leaves_a_readable_bag(late: bool) -> None:
 
     for room in range(4117, len(whole.getvalue()), 61):
         stream = Disk(room)
-        # A stream with a thread behind it reports the fault later: data accepted meanwhile is not in the file.
+        # A stream that writes in another thread reports the error later: data accepted in between is not in the file.
         writer = BagWriter(Late(stream) if late else stream, chunk_threshold=500)
         with pytest.raises(OSError, match="No space left"):
             fill(writer)

@@ -33,7 +33,7 @@ from minirospy.core.graph.calls import (
 
 
 class Full(Exception):
-    """An error of the tables behind the methods."""
+    """An error from the tables that the methods use."""
 
 
 def add(caller_id: str, topic: str, uri: str = "http://default:1/") -> Answer:

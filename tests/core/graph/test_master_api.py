@@ -1,4 +1,4 @@
-"""core/graph/master_api without a server: the journal records, log lines and notifications of each change, and their steps."""
+"""core/graph/master_api without a server: the journal records, log lines and notifications for each change, and their steps."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Recorded(MasterApi):
         return [1, "", {}]
 
     def call(self, method: str, *args: object) -> Any:
-        """Return the answer; clear the actions and log lines recorded before."""
+        """Return the response; clear the actions and log lines recorded before."""
         self.done.clear()
         self.lines.clear()
         answer = self.dispatch(method, args)
@@ -77,7 +77,7 @@ UPDATE = PublisherUpdate("http://s:1/", "/t")
             [("registerSubscriber", "/s", "/t", "*", "http://s:1/")],
             ("registerPublisher", "/n", "/t", "a/B", URI),
             [1, "Registered [/n] as publisher of [/t]", ["http://s:1/"]],
-            # The caller gets its answer before the subscriber its update: the journal is written first.
+            # The caller gets its response before the subscriber gets its update; the journal is written first.
             [UPDATE, ["+pub", "/n", "/t", "a/B", URI]],
             f"+PUB [/t] /n {URI}",
         ),
@@ -210,7 +210,7 @@ def test_call_that_changes_nothing_writes_nothing(
 
 
 def test_older_node_of_a_name_is_stopped_before_the_change_is_recorded(master: Recorded) -> None:
-    """Its subscriptions are removed with it, so replaying the journal removes them too."""
+    """The older node's subscriptions are removed with it, so replaying the journal must remove them too."""
     master.call("registerSubscriber", "/s", "/t", "*", "http://s:1/")
     master.call("registerPublisher", "/n", "/t", "a/B", "http://old:1/")
     for call, record in (
@@ -240,7 +240,7 @@ def test_more_than_two_hundred_notices_are_sent_in_steps(master: Recorded) -> No
                 assert isinstance(answer, list)
             else:
                 assert isinstance(answer, Generator)
-                # One is sent immediately if the name may have been taken over.
+                # One notification is sent immediately if the name may have been taken over.
                 assert sum(1 for _ in answer) == (steps if call[0].startswith("un") else (count - 1) // 200)
             assert sum(isinstance(each, PublisherUpdate) for each in master.done) == count
 
@@ -435,7 +435,7 @@ def test_long_lists_are_made_one_at_a_time(call: tuple[str, ...]) -> None:
         master.parameters.set(f"/p{number}", number, "", 200)
         master.registry.register_publisher("/n", f"/t{number}", "a/B", URI)
     steps = master.dispatch(call[0], call[1:])
-    # Nothing is collected yet for a client that has to wait.
+    # Nothing is collected yet for a client that must wait.
     assert isinstance(steps, Generator)
     assert next(steps) is ALONE
     assert finish(steps)[0] == 1

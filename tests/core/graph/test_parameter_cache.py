@@ -1,4 +1,4 @@
-"""The cache of parameters: never older than the last change."""
+"""The parameter cache never returns a value older than the last change."""
 
 from __future__ import annotations
 

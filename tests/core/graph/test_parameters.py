@@ -1,4 +1,4 @@
-"""core/graph/parameters: the tree without a server."""
+"""core/graph/parameters: the parameter tree without a server."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def test_updates_go_to_the_subscribers_above_and_below() -> None:
         ParameterUpdate("u2", "/a/b/"),
         ParameterUpdate("u3", "/a/b/c/"),
     ]
-    # The node that set it is not notified of it, but of the change to a parameter inside.
+    # The node that set the namespace is not notified of that, but of the change to a parameter inside.
     assert list(tree.set("/a", {"b": 3}, "/n2")) == [
         ParameterUpdate("u1", "/a/"),
         ParameterUpdate("u2", "/a/b/"),
@@ -207,7 +207,7 @@ def test_too_many_subscriptions_are_refused(monkeypatch: pytest.MonkeyPatch) -> 
     tree.subscribe("/b", "/other", "http://bad:2/")
     with pytest.raises(ParametersFullError, match="no more than 7 subscriptions of all that have many"):
         tree.subscribe("/c", "/other", "http://bad:2/")
-    # There is room for others.
+    # Other clients can still subscribe.
     tree.subscribe("/a", "/good1", "http://good:1/")
     tree.subscribe("/a", "/good2", "http://good:2/")
     with pytest.raises(ParametersFullError, match="no more than 9 subscriptions"):
@@ -363,7 +363,7 @@ def test_names_come_in_the_order_of_the_tree() -> None:
 
 
 def test_names_are_in_no_cycle_of_references() -> None:
-    # The master's garbage collector skips old objects: a list in a cycle would never be freed.
+    # The master's garbage collector skips old objects, so a list in a reference cycle would never be freed.
     names = tree_of(a={"b": 1}).names()
     assert [each for each in gc.get_referrers(names) if isinstance(each, CellType)] == []
 

@@ -124,7 +124,7 @@ def test_all_registrations_have_a_limit_in_memory_and_give_it_back() -> None:
         registry.register_publisher("/n", "/t", "a/B", "u")
     assert str(refused.value) == "the registration is beyond the limit of 0 MiB for all registrations"
     assert 40 < registered < 200
-    # A long name takes more.
+    # A long name uses more memory.
     for number in range(registered):
         registry.unregister_publisher(f"/n{number}", f"/t{number}", "u")
     with pytest.raises(RegistryFullError):
@@ -152,7 +152,7 @@ def test_limits_are_as_documented() -> None:
 
 
 def fill(registry: Registry, uri: str, prefix: str = "") -> int:
-    """Register nodes at ``uri`` until that is refused; return their number."""
+    """Register nodes at ``uri`` until a registration is refused; return their number."""
     for number in range(100_000):
         try:
             registry.register_publisher(f"/{prefix}n{number}", f"/{prefix}t{number}", "a/B", uri)
@@ -162,7 +162,7 @@ def fill(registry: Registry, uri: str, prefix: str = "") -> int:
 
 
 def register_node(registry: Registry, number: int) -> None:
-    """Register a node as an ordinary program does, at its own port."""
+    """Register a node as an ordinary program does, on a separate port."""
     uri = f"http://robot:{1000 + number}/"
     for topic in ("/rosout", f"/good{number}/out", "/status"):
         registry.register_publisher(f"/good{number}", topic, "std_msgs/String", uri)
@@ -173,7 +173,7 @@ def register_node(registry: Registry, number: int) -> None:
 
 def test_ordinary_nodes_register_whatever_one_client_holds() -> None:
     registry = Registry(Shares(3_000_000, 2_000_000, 500_000, 10_000))
-    # Names and paths of its URI may differ: its port is the same.
+    # The names and the path in the URI may differ, because the port is the same.
     for number in range(10):
         fill(registry, f"http://127.0.0.1:9/{number}", f"bad{number}")
     with pytest.raises(RegistryFullError, match="1 MiB for the registrations of one host and port"):
@@ -238,7 +238,7 @@ def test_registrations_count_their_memory(kind: str) -> None:
     for number in range(count):
         KINDS[kind](registry, number)
     taken = size_of(registry, set())
-    # Counted for 64 bits: with 32 bits an object takes about half.
+    # Sizes are counted for 64 bits; with 32 bits an object takes about half.
     most = 2.5 if maxsize > 2**32 else 5.0
     assert 0.8 * taken < registry._shares.total < most * taken
 
@@ -256,7 +256,7 @@ def test_a_registration_is_counted_until_the_last_of_it_is_gone() -> None:
     list(registry.register_parameter("/n", "/t", "u"))
     more = counted()
     assert more > one
-    # Repeat it, and use another service URI and another type of equal length.
+    # Repeat it, and use another service URI and another type with the same lengths.
     registry.register_publisher("/n", "/t", "a/C", "u")
     registry.register_subscriber("/n", "/t", "a/D", "u")
     registry.register_service("/n", "/t", "rosrpc://n:2", "u")
@@ -293,7 +293,7 @@ def test_size_of_a_text_does_not_change_while_it_is_counted() -> None:
         uri = f"rosrpc://{text}:{number}"
         registry.register_service("/n", f"/s{text}", uri, "http://n:1/")
         registry.register_publisher("/n", f"/t{text}", f"a/{text}{number}", "http://n:1/")
-        # For the journal, Python makes and caches a UTF-8 copy of each string.
+        # Writing the journal makes Python create and cache a UTF-8 copy of each string.
         for row in (*registry.offers(), *registry.topic_types().items()):
             serialize_record(list(row))
     registry.unregister_service("/n", f"/s{text}", uri)
@@ -328,7 +328,7 @@ def test_as_many_old_types_are_remembered_as_may_be(monkeypatch: pytest.MonkeyPa
     assert len(registry.topic_types()) == 5
     registry.set_type("/old4", "a/B")
     assert list(registry.topic_types()) == ["/published", "/subscribed", "/old2", "/old3", "/old4"]
-    # A node that registers again does not count as old any more.
+    # A topic whose node registers again is no longer counted as old.
     registry.register_publisher("/n", "/old2", "*", "u")
     registry.set_type("/old5", "a/B")
     assert registry.topic_types()["/old2"] == "a/B"

@@ -5,7 +5,7 @@ Run it with real ROS 1's Python:
 /usr/bin/python3 tests/core/idl/make_golden.py
 
 The types of packages that Debian does not have come from golden_elsewhere.json: real genmsg's md5sums of noetic's definitions
-(control_msgs, tf, the tutorials, theora_image_transport, sick_safetyscanners), those of actions after genaction.py.
+(control_msgs, tf, the tutorials, theora_image_transport, sick_safetyscanners), for actions after genaction.py.
 """
 
 import importlib

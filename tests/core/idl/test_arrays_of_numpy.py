@@ -1,4 +1,4 @@
-"""numpy arrays as field values: any shape, any number type that fits."""
+"""numpy arrays as field values: any shape, and any number type that matches."""
 
 from __future__ import annotations
 

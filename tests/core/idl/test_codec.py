@@ -1,4 +1,4 @@
-"""serialize and deserialize of random types, compared with a slow, readable implementation of the wire format."""
+"""serialize and deserialize for random types, compared with a slow, readable implementation of the wire format."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def messages(draw: st.DrawFn) -> Any:
     parts = text.split(f"\n{SEPARATOR}\n")
 
     def make(base: str) -> Any:
-        # Make the class of an inner type from its own part of the text, followed by all others.
+        # Create an inner type's class from its own part of the text, followed by all other parts.
         own = next(part for part in parts if part.startswith(f"MSG: {base}\n"))
         rest = [part for part in parts if part.startswith("MSG:")]
         return class_from_text(base, f"\n{SEPARATOR}\n".join([own.partition("\n")[2], *rest]))()
@@ -194,7 +194,7 @@ def test_lengths_that_32_bits_do_not_hold_are_refused(text: str, length: int) ->
     ],
 )
 def test_elements_that_only_slices_read_are_not_made_without_bytes(element: str) -> None:
-    """A slice beyond the end is empty: four bytes could request millions of elements, which filled the memory."""
+    """A slice beyond the end is empty, so four bytes could request millions of elements, which used to fill the memory."""
     text = f"\n{SEPARATOR}\n".join(["p/M1[] a\n", f"MSG: p/M1\n{element}", "MSG: p/M2\nint8 d\n"])
     length = 5_000_000
     tracemalloc.start()
@@ -256,7 +256,7 @@ def test_bytes_that_are_no_utf_8_are_replaced() -> None:
 
 
 def test_a_buffer_is_not_held() -> None:
-    """A message keeps no view into the buffer from which it was read, because the buffer is reused for the next one."""
+    """A message must not keep a view into the buffer from which it was read, because the buffer is reused for the next one."""
     data_class = class_from_text("p/M", "uint8[] c\nint32[] a")
     buffer = bytearray(serialized(data_class(c=b"12", a=[5])))
     message = data_class().deserialize(memoryview(buffer))

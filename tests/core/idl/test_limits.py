@@ -1,4 +1,4 @@
-"""Short definitions that expand to much, and short messages that request much: one clear error, without delay."""
+"""Short definitions that expand to huge types, and short messages that claim many elements: one clear error, no delay."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def full_text(own: str, **parts: str) -> str:
 
 
 def chain(length: int, line: str, last: str = "int32 a\n") -> str:
-    """Return types that each have fields of the next one: ``line`` with its name."""
+    """Return types that each have fields of the next one; ``line`` defines a field, with the type's name inserted."""
     parts = {f"T{number}": line.format(f"p/T{number + 1}") for number in range(1, length)}
     return full_text(line.format("p/T1"), **parts, **{f"T{length}": last})
 
@@ -95,7 +95,7 @@ LARGE = {
     "long arrays": "uint8[1000000] a\nfloat64[1000000] b\n",
     "deep": chain(40, "{0} a\n"),
     "arrays in arrays": chain(15, "{0}[] a\n"),
-    # As MoveIt's largest action, whose types have some 17,000 fields, counted at each use.
+    # This is like MoveIt's largest action, whose types have some 17,000 fields if each use is counted.
     "one large type in nine layers": chain(9, "{0} a\n", "".join(f"int8 b{n}\n" for n in range(1900))),
     "many types": full_text(
         "".join(f"p/T{n} a{n}\n" for n in range(100)), **{f"T{n}": "int8 a\nstring b\n" for n in range(100)}
@@ -160,5 +160,5 @@ def test_definitions_without_end_do_not_fill_the_memory() -> None:
         assert classes.for_header(header)().a == 0
     gc.collect()
     sources = [name for name in linecache.cache if name.startswith("<generated p/M")]
-    # Equal to the number of cached classes, for this reader and for others that meet the same definitions.
+    # The number equals that of cached classes, for this reader and for others that use the same definitions.
     assert len(sources) < 600

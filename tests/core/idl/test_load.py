@@ -15,7 +15,7 @@ from minirospy.core.idl.load import write_if_changed
 def test_module_that_is_written_again_is_compiled_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """This also works within one second with an unchanged size."""
+    """Compilation is repeated even within the same second and if the size is unchanged."""
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
     path = tmp_path / "made.py"
     for number in range(5):

@@ -1,4 +1,4 @@
-"""Definition texts: their parsed contents, and each error with its line."""
+"""Parsing definitions: their parsed contents, and each error with its line."""
 
 from __future__ import annotations
 

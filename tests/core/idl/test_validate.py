@@ -1,4 +1,4 @@
-"""No text of a third-party definition is executed: names are refused, all other text stays text."""
+"""No text in a third-party definition is executed: invalid names are refused, all other text remains text."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from minirospy.introspect.messages import MessageClasses
 
 SEPARATOR = "=" * 80
 EXECUTED: list[str] = []
-"""The canary's arguments: the list must stay empty."""
+"""The arguments with which the canary was called; the list must stay empty."""
 
 CODE = "__import__('builtins').canary('x')"
 ATTACKS = [
@@ -77,7 +77,7 @@ NAMES_OF_GENERATED_CODE = {
 
 @pytest.fixture(autouse=True)
 def canary() -> Iterator[None]:
-    """Provide the function that an attack of these tests would call."""
+    """Provide the function that the attacks in these tests would call."""
     builtins.canary = EXECUTED.append  # type: ignore[attr-defined]
     yield
     del builtins.canary  # type: ignore[attr-defined]
@@ -106,7 +106,7 @@ def assert_harmless(source: str, names: set[str]) -> None:
 
 
 def executed_by(type_: str, definition: str) -> None:
-    """Make a class from a publisher's header, as the commands do, and use it."""
+    """Create a class from a publisher's header, as the commands do, and use it."""
     header = {"type": type_, "md5sum": "*", "message_definition": definition}
     try:
         message = MessageClasses().for_header(header)()
@@ -251,7 +251,7 @@ def test_no_definition_of_any_name_and_text_runs_anything(name: str, text: str, 
         specs = specs_of_text(name, definition)
         emitted = [emit_class(specs[each], specs.__getitem__).source for each in specs]
     except (DefinitionError, KeyError):
-        # KeyError: a type that the text lacks.
+        # KeyError means that the text lacks a type.
         pass
     else:
         for source, spec in zip(emitted, specs.values(), strict=True):

@@ -1,4 +1,4 @@
-"""Sizes of compressed images from their headers, as Pillow finds them; too large images are never decoded."""
+"""Sizes of compressed images read from their headers, compared with Pillow's; images that are too large are never decoded."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_large_image_is_refused_before_it_is_decoded(library: str, monkeypatch: 
     with pytest.raises(ValueError, match="20x30 pixels is too large: 599 are allowed"):
         decode(large_png(20, 30), max_pixels=599)
     if library == "OpenCV":
-        # The size of such a file is unknown before it is decoded.
+        # The size of such a file is not known before it is decoded.
         with pytest.raises(ValueError, match="an image format that is not known"):
             decode(b"#?RADIANCE\n", max_pixels=600)
 
@@ -145,7 +145,7 @@ FRAMES = [0xC0, 0xC1, 0xC2, 0xC3, 0xC5, 0xC6, 0xC7, 0xC9, 0xCA, 0xCB, 0xCD, 0xCE
 def test_size_of_a_jpeg_is_behind_each_of_its_frame_markers(marker: int) -> None:
     frame = bytes((0xFF, marker)) + b"\0\x11\x08\0\x09\0\x08" + bytes(10)
     last = b"\xff\xc0\0\x11\x08\0\x07\0\x06" + bytes(10)
-    # The other markers of this range are tables, which are skipped by their length.
+    # The other markers in this range are tables, which are skipped by their length.
     assert size_of(b"\xff\xd8" + frame + last) == ((8, 9) if marker in FRAMES else (6, 7))
 
 

@@ -1,7 +1,7 @@
-"""A conversation with a transform buffer: queries as JSON -> answers as JSON, of the real tf2_py or minirospy's.
+"""Conversations with a transform buffer, the real tf2_py's or minirospy's: queries as JSON in, responses as JSON out.
 
-Run as a program under the interpreter that has the real tf2_py: queries on stdin, answers on stdout. It imports nothing
-else from this folder, so that it runs there.
+Run as a program by the interpreter that has the real tf2_py, it reads queries from stdin and writes responses to stdout. It
+imports nothing else from this folder, so that it runs there.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Answer = list[Any]
 
 
 def questions(seed: int, count: int) -> list[Question]:
-    """Return a random tree, filled over some seconds, and ``count`` lookups in it, valid and invalid ones."""
+    """Return a random tree, filled over some seconds, and ``count`` valid and invalid lookups in it."""
     rng = random.Random(seed)
     names = [f"frame{n}" for n in range(rng.randrange(4, 14))]
     queries: list[Question] = []
@@ -58,7 +58,7 @@ def questions(seed: int, count: int) -> list[Question]:
 
 
 def edge_cases() -> list[list[Question]]:
-    """Return conversations about cases that are rare in random trees: loops, depth, odd names, cleared and static frames."""
+    """Return conversations about cases that are rare in random trees: loops, deep trees, odd names, cleared and static frames."""
     unit = [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0]
     second = 1_000_000_000
 
@@ -166,7 +166,7 @@ def nanoseconds(seconds: float) -> int:
 
 
 def real_answers(queries: list[Question]) -> list[Answer]:
-    """Return the answers of the tf2_py that this interpreter imports."""
+    """Return the responses of the tf2_py that this interpreter imports."""
     import rospy
     import tf2_py
     from geometry_msgs.msg import TransformStamped
@@ -216,7 +216,7 @@ def real_answers(queries: list[Question]) -> list[Answer]:
 
 
 def query_real(conversations: list[list[Question]]) -> list[list[Answer]]:
-    """Return the answers of the system's tf2_py, which /usr/bin/python3 imports."""
+    """Return the responses of the system's tf2_py, which /usr/bin/python3 imports."""
     done = subprocess.run(
         ["/usr/bin/python3", __file__],
         input=json.dumps(conversations),
@@ -230,14 +230,14 @@ def query_real(conversations: list[list[Question]]) -> list[list[Answer]]:
 
 
 def shortened(answer: Answer) -> Answer:
-    """Return the answer with a digest in place of a string that would bloat the recording."""
+    """Return the response, with a digest in place of a string that would bloat the recording."""
     verb, value = answer
     is_long = isinstance(value, (str, list)) and len(json.dumps(value)) > 1000
     return [verb, hashlib.sha256(json.dumps(value).encode()).hexdigest()] if is_long else answer
 
 
 def difference(real: Answer, ours: Answer, tolerance: float = 1e-12) -> str:
-    """Return the difference between two answers; "" if there is none, with numbers within the tolerance of their size."""
+    """Return the difference between two responses, or "" if there is none; numbers may differ by a relative tolerance."""
     if real[0] != ours[0]:
         return f"{real} but ours {ours}"
     if isinstance(real[1], list) and len(real[1]) == 3 and isinstance(real[1][1], list):

@@ -1,4 +1,4 @@
-"""Record the answers of the real tf2_py (Debian's) in recorded.json. Run it with the project's Python."""
+"""Record the responses of the real tf2_py (Debian's) in recorded.json. Run it with the project's Python."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ FOLDER = Path(__file__).parent
 
 
 def main() -> None:
-    """Query the real one, and write the file."""
+    """Query the real tf2_py, and write the file."""
     conversations = [*edge_cases(), *(questions(seed, 40) for seed in range(12))]
     real = query_real(conversations)
     lines = [

@@ -1,4 +1,4 @@
-"""The answers of minirospy's buffer in a conversation: transforms inserted one by one, or as bytes of TFMessages."""
+"""The responses of minirospy's buffer in a conversation: transforms are inserted one by one, or as serialized TFMessages."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def tf_message(*transforms: tuple[str, str, int, list[float]]) -> bytes:
 
 
 def our_answers(queries: list[Question], *, lazily: bool = False) -> list[Answer]:
-    """Return minirospy's answers; ``lazily``: non-static transforms arrive as serialized messages."""
+    """Return minirospy's responses; ``lazily``: non-static transforms arrive as serialized messages."""
     buffer = TransformBuffer()
 
     def insert(

@@ -1,4 +1,4 @@
-"""The frames between two others, with names that do not exist: as Debian's tf2_py. The rest is in recorded.json."""
+"""The frames between two others, for names that do not exist, compared with Debian's tf2_py. recorded.json has the rest."""
 
 from __future__ import annotations
 

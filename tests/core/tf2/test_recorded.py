@@ -1,4 +1,4 @@
-"""Compare the recorded answers of the real tf2_py (`make_recorded.py`) with those of minirospy's buffer."""
+"""Compare the recorded responses of the real tf2_py (`make_recorded.py`) with those of minirospy's buffer."""
 
 from __future__ import annotations
 

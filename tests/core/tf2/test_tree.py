@@ -1,4 +1,4 @@
-"""Inserting transforms: which are refused, with which text, and messages that stay bytes until a frame is looked up."""
+"""Inserting transforms: which are refused, with which message; and messages that stay bytes until a frame is looked up."""
 
 from __future__ import annotations
 
@@ -192,7 +192,7 @@ def test_messages_kept_as_bytes_are_as_good_as_inserted_ones(steps: list[tuple[o
 
 @pytest.mark.parametrize("seed", range(20))
 def test_long_streams_kept_as_bytes_are_as_good_as_inserted_ones(seed: int) -> None:
-    """Includes expiry, dropped blocks, frames that stand still, and samples that are late, repeated or wrong."""
+    """The streams include expiry, dropped blocks, frames that do not move, and samples that are late, repeated or wrong."""
     rng = random.Random(seed)
     span = rng.choice([SECOND, 5 * SECOND])
     lazy, eager = TransformBuffer(span), TransformBuffer(span)

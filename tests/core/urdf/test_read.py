@@ -1,4 +1,4 @@
-"""Robot descriptions read as by Debian's urdfdom: its messages, and which robots it refuses."""
+"""Robot descriptions, read as by Debian's urdfdom: its messages, and the robots that it refuses."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ OURS = {
     "mimicunk": "a mimicked joint that does not exist is accepted there",
     "twoparents": "a link with two parents is accepted there",
 }
-"""Cases in which minirospy prints more."""
+"""Cases in which minirospy prints more than urdfdom."""
 
 
 def lines_of(text: str) -> tuple[list[str], list[str], int]:
@@ -162,6 +162,6 @@ def test_shapes_may_share_a_link() -> None:
 
 
 def test_long_numbers_take_no_time() -> None:
-    # Each digit was tried as the end of the integer part, and each rest as its decimals: 30 s.
+    # Each digit used to be tried as the end of the integer part, and each rest as the decimals, which took 30 s.
     with pytest.raises(NotANumberError):
         as_float("1" * 100_000 + "x")

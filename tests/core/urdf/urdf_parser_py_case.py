@@ -1,4 +1,4 @@
-"""A program on urdf_parser_py; urdf_parser_py.txt is its output with PyPI's urdf_parser_py 0.0.4.
+"""A program that uses urdf_parser_py; urdf_parser_py.txt is its output with PyPI's urdf_parser_py 0.0.4.
 
 Record it: `pip install urdf-parser-py` in an environment without minirospy, then
 `python urdf_parser_py_case.py arm.urdf > urdf_parser_py.txt`.
@@ -8,7 +8,7 @@ import collections
 import collections.abc
 import sys
 
-# The real one needs this since Python 3.10.
+# The real urdf_parser_py needs this since Python 3.10.
 collections.Iterable = collections.abc.Iterable
 
 from urdf_parser_py.urdf import (  # noqa: E402

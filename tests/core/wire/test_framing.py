@@ -1,4 +1,4 @@
-"""core/wire/framing: frames in any chunks, compared with a slow readable reference."""
+"""core/wire/framing: frames in pieces of any size, compared with a slow, readable reference."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_small_message_is_one_frame(sizes: list[int]) -> None:
 
 
 def test_length_of_an_array_is_that_of_its_bytes() -> None:
-    """The len() of an array of numbers is not in bytes, alone or with other buffers."""
+    """The len() of an array of numbers is not in bytes, whether it is alone or joined with other buffers."""
     numbers = memoryview(array("I", [1, 2, 3]))
     for written in ([numbers], [b"ab", numbers]):
         assert pieces(*written).frame() == serialize_frame(b"".join(map(bytes, written)))

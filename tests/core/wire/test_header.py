@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from minirospy.base.errors import WireError
 from minirospy.core.wire.header import MAX_HEADER, parse_header, serialize_header
 
-# "callerid=/a" is 11 bytes, "topic=/t" 8: each has a length prefix, and so has the whole header.
+# "callerid=/a" has 11 bytes, "topic=/t" has 8: each has a length prefix, and so has the whole header.
 GOLDEN = b"\x1b\x00\x00\x00" + b"\x0b\x00\x00\x00callerid=/a" + b"\x08\x00\x00\x00topic=/t"
 
 
@@ -59,7 +59,7 @@ def test_any_bytes_are_read_or_refused(body: bytes) -> None:
 
 
 def test_bytes_that_are_not_utf_8_are_read() -> None:
-    """Third-party clients send names and definitions in any encoding; a comment must not break a connection."""
+    """Third-party clients send names and definitions in any encoding, so a comment must not break a connection."""
     body = b"\x07\x00\x00\x00na\xe9me=\xff"
     assert parse_header(body) == {"na\ufffdme": "\ufffd"}
 

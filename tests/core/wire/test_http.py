@@ -1,4 +1,4 @@
-"""core/wire/http: complete messages from bytes in any pieces; and refused messages."""
+"""core/wire/http: complete messages from bytes in pieces of any size, and refused messages."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_requests_come_out_whole_in_any_pieces(bodies: list[bytes], step: int) -
 
 @given(st.lists(st.binary(max_size=30), min_size=1, max_size=3), st.data())
 def test_heads_and_bodies_may_come_one_by_one(bodies: list[bytes], data: st.DataObject) -> None:
-    """As Python's clients send them; some pieces are split once more, or joined to the next."""
+    """Python's clients send them this way; some pieces are split further, or joined to the next one."""
     pieces = []
     for body in bodies:
         request = serialize_request("localhost:11311", "/RPC2", body)
@@ -64,7 +64,7 @@ def test_pipelined_messages_are_parsed_one_at_a_time() -> None:
     second = reader.next_message()
     assert second
     assert second.body == b"a"
-    # The error is raised when its message's turn comes.
+    # The error is raised only when it is the invalid message's turn.
     with pytest.raises(RpcProtocolError):
         reader.next_message()
 
@@ -152,7 +152,7 @@ def test_request_bytes() -> None:
         b"Content-Length: 4\r\n\r\n<x/>"
     )
     assert serialize_request("robot", "", b"").startswith(b"POST / HTTP/1.1\r\n")
-    # A host name that no header can contain: it is not found, but there is no traceback.
+    # No header can contain this host name: the host is not found, but there must be no traceback.
     assert b"Host: r?bot\r\n" in serialize_request("r\u0151bot", "/", b"")
 
 
@@ -319,7 +319,7 @@ def test_chunks_at_the_limit_are_read_and_one_beyond_it_refused() -> None:
 
 @pytest.mark.parametrize("size", [600, 60_000])
 def test_long_head_is_read(size: int) -> None:
-    """Heads of up to 512 bytes are cached, and those of up to 64 KiB are read."""
+    """Heads of up to 512 bytes are cached, and heads of up to 64 KiB are read."""
     for step in (1000, 1 << 20):
         (message,) = feed(b"POST / HTTP/1.1\r\nContent-Length: 1\r\nX: " + b"y" * size + b"\r\n\r\na", step)
         assert (len(message.head.headers["x"]), message.body) == (size, b"a")
@@ -345,7 +345,7 @@ def test_reader_counts_what_it_holds() -> None:
     assert len(reader.feed(b"defghij")) == 1
     assert (reader.is_idle, reader.held) == (True, 0)
 
-    # A connection with only a head is not idle.
+    # A connection that has sent only a head is not idle.
     reader.feed(b"POST / HTTP/1.1\r\nContent-Length: 10\r\n\r\n")
     assert not reader.is_idle
     chunked = b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n"
@@ -454,14 +454,14 @@ def test_length_over_the_limit_is_refused_before_the_body_comes(step: int) -> No
 
 
 def test_line_feed_alone_in_front_of_a_carriage_return() -> None:
-    # The last byte differs from the one before the first.
+    # The last byte differs from the last byte of the first one.
     reader = HttpReader()
     reader.feed(b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n")
     assert len(reader.feed(b"\n\r")) == 1
 
 
 def test_only_short_heads_are_kept() -> None:
-    # Long heads would fill the memory.
+    # Caching long heads would fill the memory.
     for size, keeps in ((300, True), (30_000, False)):
         before = _short_head.cache_info().misses
         head_of(b"POST / HTTP/1.1\r\nContent-Length: 0\r\nX: %s\r\n\r\n" % (b"x" * size))

@@ -1,4 +1,4 @@
-"""core/wire/journal: written records are read again; from a damaged file, everything up to the damage."""
+"""core/wire/journal: written records are read back; a damaged file is read up to the damage."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_dates_and_bytes() -> None:
 
 
 def test_bytes_of_a_record() -> None:
-    """A file of an earlier version is read too."""
+    """A file written by an earlier version must still be readable."""
     record = ["set", "/d", [datetime.datetime(2020, 1, 2), DateTime("some day")]]
     body = b"\x93\xa3set\xa2/d\x92\xc7\x13\x012020-01-02T00:00:00\xd7\x02some day"
     assert serialize_record(record) == framed(body)
@@ -126,7 +126,7 @@ def test_damage_is_named(data: bytes, damage: str) -> None:
 
 
 def test_dictionary_may_have_any_keys() -> None:
-    """A master that did not start because of another version's record would be worse than one that passes it on."""
+    """A master that does not start because of another version's record would be worse than one that passes the record on."""
     assert parse_journal(HEAD + framed(b"\x91\x81\1\2")).records == [[{1: 2}]]
 
 

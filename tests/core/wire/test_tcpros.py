@@ -1,4 +1,4 @@
-"""core/wire/tcpros: which peer accepts which. The checks of both sides are joined in memory."""
+"""core/wire/tcpros: which peers accept each other. The checks of both sides are connected in memory."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_text_of_a_refusal_is_escaped() -> None:
     assert "\x1b" not in str(raised.value)
 
 
-# The header fields that are sent, as rospy and roscpp send them.
+# Check the header fields that are sent, which are those of rospy and roscpp.
 
 
 def test_subscriber_header_fields() -> None:

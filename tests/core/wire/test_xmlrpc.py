@@ -1,4 +1,4 @@
-"""core/wire/xmlrpc compared with the standard library's, in both directions; and refused messages."""
+"""core/wire/xmlrpc compared with the standard library's module, in both directions; and refused messages."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ def test_long_text_is_not_copied_when_it_is_whole(kind: str) -> None:
 
 
 def test_memory_of_a_text_is_that_of_its_widest_character() -> None:
-    # 6 MiB of ASCII are within the limit; with one character that needs four bytes they are not.
+    # 6 MiB of ASCII are within the limit; if one character needs four bytes, they are not.
     text = b"<methodCall><value>" + b"x" * 6 * 1024 * 1024
     for wide, is_refused in ((b"", False), ("\u20ac".encode(), False), ("\U0001f600".encode(), True)):
         steps = parse_call_in_steps(text + wide + b"</value><methodName>m</methodName></methodCall>")
@@ -472,7 +472,7 @@ def test_steps_of_writing_are_of_one_size() -> None:
     assert len(numbers) == 4
     assert numbers[1:3] == [300 * len("<value><int>1</int></value>")] * 2
     assert len(sizes([[1] * 900] * 3)) == 10
-    # 240 entries of five parts each.
+    # One piece contains 240 entries of five parts each.
     assert len(sizes({str(number): number for number in range(1000)})) == 5
     for text in ("x" * 300_000, {"x" * 300_000: 1}):
         assert len(sizes(text)) == 5

@@ -35,7 +35,7 @@ PIECES = [
 
 
 def check(body: bytes) -> bool:
-    """Return whether ``body`` was read; assert that the parser reads the same."""
+    """Return whether ``body`` was read; assert that the parser reads the same values."""
     found = read_plain(body)
     if found is None:
         return False
@@ -82,7 +82,7 @@ def test_any_pieces(pieces: bytes) -> None:
 
 
 def test_messages_of_ros_are_plain() -> None:
-    """Calls and responses of rosmaster, rospy, roscpp and minirospy."""
+    """Includes calls and responses from rosmaster, rospy, roscpp and minirospy."""
     for args in (
         ("/node", "/topic", "std_msgs/String", "http://here:1/"),
         ("/node", "key", -5),
