@@ -1,4 +1,4 @@
-"""The thread that stops what is driven: deadlines, with a clock that the test controls."""
+"""The thread that stops actuators: deadlines, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_deadlines_that_are_moved_or_removed_stop_nothing(guard: StopGuard, cloc
     guard.arm(moved, clock.now + 3000)
     guard.disarm(removed)
     guard.disarm(removed)
-    # An item with an earlier deadline does not wait behind the others.
+    # An item with an earlier deadline must not wait behind the others.
     guard.arm(stops(names, "early"), clock.now)
     wait_until(lambda: names == ["early"])
     clock.now += 2000

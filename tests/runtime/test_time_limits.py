@@ -31,12 +31,12 @@ LARGE = 60_000_000  # bytes, more than the system buffers for a client that does
 
 @pytest.fixture(autouse=True)
 def _tcp_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Connect by TCP only: the tests count connections."""
+    """Connect by TCP only, because the tests count connections."""
     monkeypatch.setenv("MINIROSPY_TRANSPORT", "tcp")
 
 
 def is_open(sock: socket.socket) -> bool:
-    """Return whether the peer has not closed the connection; read the data that it has sent."""
+    """Return whether the peer has not closed the connection, after reading the data that it has sent."""
     try:
         while sock.recv(1 << 20):
             pass
@@ -143,7 +143,7 @@ def test_answer_of_which_64_kib_are_read_in_30_seconds_goes_on() -> None:
                         got += len(client.recv(65536))
                     await asyncio.sleep(0)
                 assert server.clients == 1
-            # The data that it read last may have made room for more.
+            # The data read last may have made space for more.
             for _ in range(3):
                 await clock.advance(30.1)
             assert server.clients == 0
@@ -155,7 +155,7 @@ def test_answer_of_which_64_kib_are_read_in_30_seconds_goes_on() -> None:
 
 
 class Graph:
-    """A graph with one publisher of every topic, without parameters."""
+    """A graph in which every topic has one publisher, and which has no parameters."""
 
     def publisher_uris(self, topic: str) -> list[str]:
         return ["http://x:1/"]
@@ -174,7 +174,7 @@ def test_update_soon_after_a_registration_is_delayed_20_to_30_ms() -> None:
             notified.clear()
             notifier = Notifier(Graph(), Turns(), 5.0)
             notifier.here["http://n:1/"] = lambda topic, uris: notified.append(clock.time())
-            # The answer arrives anywhere between two ticks of the clock.
+            # The response arrives at any time between two ticks of the clock.
             await clock.advance(0.001 * fraction)
             registered = clock.time()
             notifier.defer("http://n:1/", "/t")
@@ -182,7 +182,7 @@ def test_update_soon_after_a_registration_is_delayed_20_to_30_ms() -> None:
             notifier.send(PublisherUpdate("http://n:1/", "/t"))
             while not notified:
                 await clock.advance(0.0005)
-            # One tick more, since a timer may fire early by the clock's resolution.
+            # This is one tick more, because a timer may fire early by the clock's resolution.
             assert 0.02 <= notified[0] - registered < 0.032
             await notifier.close()
 
@@ -211,7 +211,7 @@ def test_update_after_the_pause_or_of_another_topic_is_sent_immediately() -> Non
 
 
 class SilentNode:
-    """A node's API that accepts calls and never answers."""
+    """A node's API that accepts calls but never responds."""
 
     def __init__(self) -> None:
         self.calls = 0

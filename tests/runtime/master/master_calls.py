@@ -1,4 +1,4 @@
-"""Calls of the Master and Parameter APIs, in a meaningful order: method, then its arguments."""
+"""Calls to the Master and Parameter APIs, in a meaningful order: each with a method and its arguments."""
 
 from __future__ import annotations
 
@@ -467,7 +467,7 @@ CALLS: list[tuple[Any, ...]] = [
 ]
 
 SCENE: list[tuple[Any, ...]] = [
-    # Calls that notify two nodes: "{0}" and "{1}" are their Slave APIs.
+    # Calls that notify two nodes; "{0}" and "{1}" are the URIs of their Slave APIs.
     ("registerSubscriber", "/sub", "/t", "a/B", "{0}"),
     ("registerPublisher", "/pub", "/t", "a/B", "{1}"),
     ("registerPublisher", "/pub", "/t", "a/B", "{1}"),
@@ -508,7 +508,7 @@ SCENE: list[tuple[Any, ...]] = [
     ("setParam", "/sub", "/", {}),
     ("unsubscribeParam", "/sub", "{0}", "/a/b"),
     ("setParam", "/x", "/a/b", 16),
-    # A node of the same name at another address: the older one must shut down.
+    # A node with the same name at another address: the older node must shut down.
     ("registerPublisher", "/same", "/unheard", "a/B", "{1}"),
     ("subscribeParam", "/same", "{1}", "/p"),
     ("registerPublisher", "/same", "/u", "a/B", "http://127.0.0.1:1/"),

@@ -71,7 +71,7 @@ class Disk:
 def _no_file_is_left_open() -> Iterator[None]:
     before = open_files()
     yield
-    # Threads of earlier tests may still close their files.
+    # Threads from earlier tests may still close their files.
     wait_until(lambda: open_files() <= before)
 
 
@@ -86,7 +86,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def state() -> list[list[Any]]:
-    """Return the records of the current state."""
+    """Return the records that describe the current state."""
     return [["set", "/", {"a": 1}]]
 
 
@@ -108,7 +108,7 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
 
 
 def records(path: Path) -> list[list[Any]]:
-    """Return the records of the file, a value in parts as one record."""
+    """Return the records in the file; a value in parts is one record."""
     recovered = parse_journal(path.read_bytes())
     assert not recovered.damage
     found: list[list[Any]] = []
@@ -244,7 +244,7 @@ def test_large_journal_is_rewritten_at_four_times_what_it_holds(
     found = sizes(journal, lambda number: ("set", "/large", text), 7)
     assert found[4] > 3 * MIB
     assert found[5] > small
-    # A value in parts takes some more bytes.
+    # A value stored in parts takes some more bytes.
     assert small <= found[6] < small + 1000
 
 
@@ -308,7 +308,7 @@ def test_rewrite_in_steps_writes_two_hundred_records_at_a_time(
     stepping: Journal, state: list[list[Any]], steps: list[Steps[None]]
 ) -> None:
     state += [["set", f"/{number}", number] for number in range(399)]
-    # The header, two times two hundred records, and nothing else.
+    # The work consists of the header, two times two hundred records, and nothing else.
     assert [each for each in steps[0] if each is None] == [None] * 4
 
 
@@ -333,7 +333,7 @@ def test_close_while_the_new_file_is_synced_gives_it_up(
 def test_nothing_is_written_to_the_new_file_while_it_is_synced(
     stepping: Journal, path: Path, steps: list[Steps[None]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # While a disk syncs a file, writers to it block.
+    # While a disk syncs a file, writes to the file block.
     may_sync = threading.Event()
     monkeypatch.setattr(os, "fsync", lambda file: may_sync.wait(60))
     while next(steps[0]) is not PAUSE:
@@ -435,7 +435,7 @@ def test_rewrite_that_was_given_up_leaves_a_later_one_alone(
     assert path.with_name("journal-1.new").exists()
     finish(steps[1])
     assert records(path)[1:] == state
-    # The rewrite does not even start.
+    # The rewrite does not start.
     stepping.append("set", "/p", "x" * MIB)
     stepping.rewrite()
     finish(steps[2])
@@ -500,7 +500,7 @@ def test_store_on_a_full_disk_is_reported(
     finish(journal.store(list(range(1000))))
     assert journal.trouble == os.strerror(errno.ENOSPC)
     assert "cannot be written, a crash would lose the graph" in caplog.text
-    # No retry before half a minute has passed.
+    # There is no retry before half a minute has passed.
     disk.error = None
     finish(journal.store([1]))
     assert "write" not in disk.calls[disk.calls.index("fsync") :][2:]
@@ -629,7 +629,7 @@ def test_lock_is_held_until_close_and_holds_the_pid(journal: Journal, path: Path
         other.lock()
     assert (busy.value.path, busy.value.pid) == busy.value.args == (path, os.getpid())
     assert str(busy.value) == f"{path} is held by another master (pid {os.getpid()})"
-    # A journal without the lock changes nothing in the file.
+    # A journal that does not have the lock changes nothing in the file.
     journal.start()
     other.start()
     assert other.trouble == str(busy.value)
@@ -698,7 +698,7 @@ def test_read_returns_the_changes_the_age_and_the_boot(
     assert left
     assert not left.same_boot
 
-    # As if the clock was set back.
+    # This simulates that the clock was set back.
     os.utime(path, (1, time.time() + 100))
     left = journal.read()
     assert left

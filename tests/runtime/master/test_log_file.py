@@ -33,7 +33,7 @@ def test_flood_of_warnings_is_written_in_batches(tmp_path: Path, monkeypatch: py
         for number in range(20):
             file.line(f"line {number}")
             file.handle(logging.LogRecord("x", logging.WARNING, "", 0, f"warning {number}", None, None))
-        # The warning is in the file by now, and the lines before it.
+        # By now the file contains the warning, and the lines before it.
         assert (tmp_path / "master.log").read_text().count("\n") == 40
         at_once = len(written)
         file.line("the last")
@@ -53,7 +53,7 @@ def test_much_text_is_written_before_the_time_is_up(tmp_path: Path) -> None:
         file = LogFile(tmp_path / "rosout.log", 10_000_000, "rosout")
         for _ in range(100):
             file.text("x" * 999)
-        # Each batch of 64 KiB has 66 lines: one more does not fit.
+        # Each batch of 64 KiB has 66 lines, because one more does not fit.
         assert (tmp_path / "rosout.log").stat().st_size == 66 * 1000
         file.close()
         assert (tmp_path / "rosout.log").stat().st_size == 100 * 1000

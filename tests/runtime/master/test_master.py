@@ -1,4 +1,4 @@
-"""runtime/master/master over real sockets: the answers of real rosmaster (master_answers.json), and its calls to nodes."""
+"""runtime/master/master over real sockets: the responses of real rosmaster (master_answers.json), and its calls to nodes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ HERE = Path(__file__).parent
 
 
 def plain(value: Any) -> Any:
-    """Return an answer as JSON represents it."""
+    """Return a response as JSON represents it."""
     match value:
         case Binary():
             return {"binary": value.data.hex()}
@@ -43,7 +43,7 @@ def plain(value: Any) -> Any:
 
 
 def answers(uri: str) -> list[Any]:
-    """Return the answer to each call; replace values that differ between processes."""
+    """Return the response to each call; replace values that differ between processes."""
     found: list[Any] = []
     with ServerProxy(uri) as proxy:
         for method, *args in CALLS:
@@ -58,7 +58,7 @@ def answers(uri: str) -> list[Any]:
 
 
 def notices(uri: str, expected: list[list[Any]] | None = None) -> list[list[Any]]:
-    """Return the notifications that the nodes of SCENE receive after each call, sorted; wait for ``expected`` of them."""
+    """Return the notifications that the nodes in SCENE receive after each call, sorted; wait for ``expected`` of them."""
     nodes = [Slave(), Slave()]
     found: list[list[Any]] = []
 
@@ -92,7 +92,7 @@ def counted(expected: list[list[Any]] | None, at: int, node: int) -> int:
 
 
 def without_controls(value: Any) -> Any:
-    """Return an answer of rosmaster without the rows of names that minirospy refuses."""
+    """Return a response of rosmaster without the rows whose names minirospy refuses."""
     if not isinstance(value, list):
         return value
     return [
@@ -142,7 +142,7 @@ class Slave:
         return self.called.get(timeout=30)
 
     def all_until_quiet(self) -> list[tuple[Any, ...]]:
-        """Return the calls within half a second; only used for recording."""
+        """Return the calls received within half a second; only used for recording."""
         found = []
         with contextlib.suppress(queue.Empty):
             while True:
@@ -190,7 +190,7 @@ def test_the_older_node_of_a_name_is_shut_down(proxy: ServerProxy, slaves: list[
     assert "new node registered with same name" in reason
     state: Any = proxy.getSystemState("/test")
     assert state[2][0] == [["/u", ["/same"]]]
-    # Its late unregistration does not affect the new node.
+    # The old node's late unregistration does not affect the new node.
     assert proxy.unregisterPublisher("/same", "/u", old.uri)[2] == 0  # type: ignore[index]
 
 
@@ -208,7 +208,7 @@ def test_a_subscriber_that_never_answers_delays_no_other(proxy: ServerProxy, sla
 def test_an_update_does_not_meet_the_answer_to_a_registration(
     proxy: ServerProxy, slaves: list[Slave], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # If real rospy receives the update first and the older answer later, it stays without the publisher.
+    # If real rospy received the update first and the older response later, it would stay without the publisher.
     old, fresh = slaves
     monkeypatch.setattr(notifier, "_HOLD_SECONDS", 0.0)
     proxy.registerSubscriber("/old", "/t", "std_msgs/Bool", old.uri)
@@ -293,7 +293,7 @@ def test_bad_requests_are_refused_and_do_no_harm(master: str, request_bytes: byt
 
 
 def test_the_kept_answer_to_get_system_state_is_never_an_old_one() -> None:
-    """After any change, the journal leads to the same graph, and the same names."""
+    """After each change, replaying the journal must lead to the same graph, with the same names."""
     rng = random.Random(1)
     nodes, uris, topics = ("/a", "/b", "/c"), ("http://h:1/", "http://h:2/"), ("/t", "/u", "/v")
 

@@ -1,4 +1,4 @@
-"""Invalid input from clients: the answers that docs/master.md lists, and no lost registrations."""
+"""Invalid input from clients: the responses that docs/master.md lists, and no lost registrations."""
 
 from __future__ import annotations
 
@@ -169,14 +169,14 @@ BAD: dict[str, tuple[bytes, str]] = {
 
 
 def result_of(answer: Any) -> Any:
-    """Return the result of a call, computed in one step or several."""
+    """Return the result of a call, whether it is computed in one step or in several."""
     return finish(answer) if isinstance(answer, Generator) else answer
 
 
 def exchange(uri: str, data: bytes) -> bytes:
-    """Return the master's response, up to the end of the connection or of the response."""
+    """Return the master's response, up to the end of the connection or response."""
     port = int(uri.rsplit(":", 1)[1])
-    # Reading a million elements takes seconds, and on a busy machine many times as long.
+    # Reading a million elements takes seconds, or many times as long on a busy machine.
     with socket.create_connection(("127.0.0.1", port), 100) as sock:
         sock.sendall(data)
         answer = b""
@@ -261,7 +261,7 @@ def test_of_many_connections_the_longest_silent_go(loop: LoopThread) -> None:
             assert proxy.getPid("/test")[0] == 1  # type: ignore[index]
         status: Any = proxy.minirospy.status("/test")
         assert status[2]["clients"] == 20
-        # The oldest connections are closed, the newest are not.
+        # The oldest connections are closed, but not the newest.
         assert crowd[0].recv(1) == b""
         crowd[-1].sendall(called("getPid", "/x"))
         assert crowd[-1].recv(12) == b"HTTP/1.1 200"
@@ -307,7 +307,7 @@ def test_networks() -> None:
 
     assert [access.allows(peer) for peer in allowed] == [True] * len(allowed)
     assert [access.allows(peer) for peer in refused] == [False] * len(refused)
-    # This machine reaches itself at any of its addresses.
+    # This machine may connect to itself at any of its addresses.
     assert access.allows("172.16.0.5", "172.16.0.5")
     assert Access().allows("8.8.8.8")
 

@@ -39,7 +39,7 @@ BIN = Path(sys.executable).parent
 
 
 class Fakes:
-    """Nodes that answer each call with success, each on its own port, on the test's loop."""
+    """Nodes that respond to each call with success, each on its own port, on the test's loop."""
 
     def __init__(self) -> None:
         self.called: list[tuple[int, str, list[Any]]] = []
@@ -70,7 +70,7 @@ def run(test: Coroutine[Any, Any, None]) -> None:
 
 
 def state(master: Master) -> Any:
-    """Return everything that a master returns to queries."""
+    """Return everything that a master returns in response to queries."""
     query = master.dispatch
     found = [query(what, ["/x"])[2] for what in ("getSystemState", "getTopicTypes", "getParamNames")]
     nodes = sorted(master.registry.nodes().items())
@@ -117,7 +117,7 @@ def test_killed_master_is_recovered_whole(path: Path) -> None:
         second = await start(path)
         assert state(second) == before
         assert "recovered 2 nodes and 1 parameter of" in second.news[0]
-        # The nodes may have missed a call while no master was running: they are notified of the current state.
+        # The nodes may have missed a call while no master was running, so they are notified of the current state.
         await until(
             lambda: {method for _, method, _ in nodes.called} == {"getName", "publisherUpdate", "paramUpdate"}
         )
@@ -178,7 +178,7 @@ def test_dead_nodes_are_forgotten_and_their_subscribers_notified(path: Path) -> 
         await until(lambda: second.registry.nodes() == {"/live": live})
         assert list(second.parameters.subscriptions()) == []
         await until(lambda: ("publisherUpdate", ["/master", "/t", []]) in [each[1:] for each in nodes.called])
-        # Pruned permanently: it does not return after the next crash.
+        # The node is unregistered permanently: it does not return after the next crash.
         await second.close(keep_journal=True)
         third = await start(path)
         assert third.registry.nodes() == {"/live": live}
@@ -207,7 +207,7 @@ def test_old_session_is_recovered_only_if_a_node_answers(
         else:
             os.utime(path, (time.time() - 86400 * 3,) * 2)
         if lives:
-            # On a busy machine its answer may arrive late.
+            # On a busy machine the node's response may arrive late.
             monkeypatch.setattr(master_module, "_QUICK_CHECK_SECONDS", 30.0)
         second = await start(path)
         assert call(second, "getParamNames", "/x") == (["/p"] if lives else [])
@@ -319,7 +319,7 @@ def test_master_gives_a_sign_of_life_every_thirty_seconds(path: Path) -> None:
         os.utime(path, (1, 1))
         assert master._touching
         assert before + 30 <= master._touching.when() <= loop.time() + 30
-        # As the timer does.
+        # Call the timer's function.
         first = master._touching
         master._touch()
         assert path.stat().st_mtime > 1
@@ -348,7 +348,7 @@ def test_damaged_journal_is_recovered_up_to_the_damage(path: Path, damage: str) 
         assert call(second, "getParamNames", "/x") == [f"/p{number}" for number in range(kept)]
         assert "recovered up to the last whole record" in second.news[0]
         assert path.with_name("journal-1.damaged").exists()
-        # Data written from now on is intact.
+        # Data written from now on is not damaged.
         assert parse_journal(path.read_bytes()).damage == ""
         await second.close()
 
@@ -402,7 +402,7 @@ def test_journal_of_another_master_is_written_once_that_one_has_ended(
 
 
 def test_master_without_the_port_never_locks_the_journal(path: Path) -> None:
-    """Otherwise it could briefly keep the lock from the master that got the port, which would then run without a journal."""
+    """Otherwise it could briefly hold the lock, and the master that got the port would run without a journal."""
 
     async def test() -> None:
         with socket.socket() as other:
@@ -478,7 +478,7 @@ def test_full_disk_does_not_stop_the_master(path: Path, monkeypatch: pytest.Monk
 
 
 def full_disk(patch: pytest.MonkeyPatch, room: int = 0) -> None:
-    """Let the journal's files grow by only ``room`` bytes, and allow no new file if that is 0."""
+    """Let the journal's files grow by only ``room`` bytes; if that is 0, do not allow any new file."""
     real_open, real_write, left = os.open, os.write, [room]
 
     def open_(path: Any, flags: int, mode: int = 0o777, **options: Any) -> int:
@@ -522,7 +522,7 @@ def test_start_on_a_full_disk_recovers_and_retries_the_journal(
             assert "recovered 2 nodes and 1 parameter" in second.news[0]
             assert "No space left on device; set ROS_HOME (it is tried again every 30 s)" in second.news[1]
             assert call(second, "minirospy.status", "/x")["journal"] == "failing: No space left on device"
-            # Nodes that do not answer are unregistered nevertheless.
+            # Nodes that do not respond are unregistered nevertheless.
             await until(lambda: set(second.registry.nodes()) == {"/live"})
             assert path.read_bytes() == before
             assert not path.with_name("journal-1.new").exists()
@@ -657,7 +657,7 @@ def test_journal_replays_to_the_same_state_after_any_calls(
         for number in range(400):
             method, *args = random_call(rng)
             master.dispatch(method, args)
-            # Serialized once and again after each change: clients receive the current tables.
+            # The response is serialized once, and again after each change, so clients receive the current tables.
             served = parse_response(serialize_response(master.serve("getSystemState", ["/x"])))
             assert served == master.dispatch("getSystemState", ["/x"])
             if number % 20 == 19:
@@ -694,10 +694,10 @@ class Killed:
         self.port = port
         self.uri = f"http://127.0.0.1:{port}/"
         self._opened: list[subprocess.Popen[bytes]] = []
-        self.first = self.start()  # seconds until an empty master answered
+        self.first = self.start()  # seconds until an empty master responded
 
     def start(self) -> float:
-        """Start it; return the seconds until it answers with its complete state."""
+        """Start the master; return the seconds until it responds with its complete state."""
         self.process = self.open()
         try:
             return self.wait()
@@ -726,7 +726,7 @@ class Killed:
                 time.sleep(0.01)
 
     def kill(self) -> float:
-        """Kill and restart it; return the seconds until it answers."""
+        """Kill and restart the master; return the seconds until it responds."""
         self.process.send_signal(signal.SIGKILL if sys.platform != "win32" else signal.SIGTERM)
         self.process.communicate()
         return self.start()
@@ -744,7 +744,7 @@ class Killed:
 
 
 class BackgroundClient:
-    """A client of a master, in a thread, that makes calls for the nodes at ``uris`` until :meth:`end`."""
+    """A client of a master that runs in a thread and makes calls for the nodes at ``uris`` until :meth:`end`."""
 
     def __init__(self, master: str, uris: list[str]) -> None:
         self._master = master
@@ -769,7 +769,7 @@ class Registering(BackgroundClient):
         super().__init__(master, uris)
 
     def lasts(self, seconds: float, answers: int) -> bool:
-        """Wait for this many more answers, and for this long after them; return whether the client still runs."""
+        """Wait for this many more responses, and for this long after them; return whether the client is still running."""
         wanted = len(self.answered) + answers
         while len(self.answered) < wanted:
             if not self._thread.is_alive() or self._over.wait(0.01):
@@ -804,7 +804,7 @@ def known(master: str) -> set[tuple[str, str, str]]:
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no kill -9")
 @pytest.mark.timeout(600)
 def test_two_hundred_nodes_survive_their_master() -> None:
-    """CRASHES=50 in the environment makes it a long test."""
+    """Set CRASHES=50 in the environment for a long test."""
     crashes = int(os.environ.get("CRASHES", "4"))
     loop, fakes = LoopThread("fakes"), Fakes()
 
@@ -826,7 +826,7 @@ def test_two_hundred_nodes_survive_their_master() -> None:
         loop.close()
         master.end()
     print(f"{crashes} crashes, {len(client.answered)} answers kept, back after {min(times):.2f} s or more")
-    # Starting Python takes most of the time. A machine that stalls makes some starts longer.
+    # Starting Python takes most of the time. Some starts take longer if the machine stalls.
     assert min(times) < 5 * master.first + 2.0, (times, master.first)
 
 
@@ -848,7 +848,7 @@ class Oracle(BackgroundClient):
         super().__init__(master, uris)
 
     def lasts(self, calls: int) -> bool:
-        """Wait until this many more calls are acknowledged; return whether they were within a minute."""
+        """Wait until this many more calls are acknowledged; return False if that takes more than a minute."""
         wanted, end = self.acknowledged + calls, time.monotonic() + 60.0
         while self.acknowledged < wanted:
             if time.monotonic() > end or not self._thread.is_alive() or self._over.wait(0.01):
@@ -886,7 +886,7 @@ class Oracle(BackgroundClient):
                     with self.lock:
                         if self.unsure is None:
                             self._call(proxy, rng)
-                    # Let a thread that waits for the lock acquire it.
+                    # Let a thread that is waiting for the lock acquire it.
                     time.sleep(0.0005)
 
     def _call(self, proxy: ServerProxy, rng: random.Random) -> None:
@@ -920,7 +920,7 @@ class Oracle(BackgroundClient):
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no kill -9")
 @pytest.mark.timeout(1200)
 def test_double_start_leaves_one_master_with_graph_and_journal() -> None:
-    """CRASHES=50 in the environment makes it a long test."""
+    """Set CRASHES=50 in the environment for a long test."""
     crashes = int(os.environ.get("CRASHES", "2"))
     loop, fakes = LoopThread("fakes"), Fakes()
 
@@ -935,7 +935,7 @@ def test_double_start_leaves_one_master_with_graph_and_journal() -> None:
         master = Killed(port)
         stack.callback(master.end)
         with ServerProxy(master.uri) as proxy:
-            # 20 MB take long enough to read that both starts overlap.
+            # Reading 20 MB takes long enough that both starts overlap.
             for number in range(10):
                 proxy.setParam("/test", f"/large/{number}", [f"{number} " + 1000 * "x"] * 2000)
         oracle = Oracle(master.uri, loop.run(open_all(), 20.0))
@@ -962,6 +962,6 @@ def test_double_start_leaves_one_master_with_graph_and_journal() -> None:
 
 
 def first_to_end(processes: list[subprocess.Popen[bytes]]) -> list[subprocess.Popen[bytes]]:
-    """Return the processes, with the one first that has exited."""
+    """Return the processes, starting with the one that has exited first."""
     wait_until(lambda: any(each.poll() is not None for each in processes))
     return sorted(processes, key=lambda each: each.poll() is None)

@@ -1,4 +1,4 @@
-"""runtime/master/notifier: nodes that do not answer share a few slots, and do not delay other nodes longer."""
+"""runtime/master/notifier: nodes that do not respond share a few slots, and do not delay other nodes for long."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ALIVE = [f"http://alive{number}:1/" for number in range(6)]
 
 
 class Scene:
-    """A notifier whose calls the test answers."""
+    """A notifier to whose calls the test responds."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(notifier_module, "_MAX_CONCURRENT_CALLS", 4)
@@ -45,7 +45,7 @@ class Scene:
 
     @property
     def calls(self) -> list[tuple[str, list[object]]]:
-        """Method and arguments of each call."""
+        """The method and arguments of each call."""
         return [(call.method, call.args) for call in (parse_call(body) for _, body in self.bodies)]
 
     def start(
@@ -60,7 +60,7 @@ class Scene:
             self.notifier.send(PublisherUpdate(uri, topic))
 
     async def answer(self, clock: ManualLoop, uris: list[str], *, is_dead: bool) -> None:
-        """Answer all calls to ``uris``, one after the other, as they arrive."""
+        """Respond to all calls to ``uris``, one after the other, as they arrive."""
         left = set(uris)
         while left:
             await clock.advance(0.01)
@@ -205,7 +205,7 @@ def test_nothing_is_sent_after_close(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_updates_of_many_publishers_are_rate_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A list of 1,000 is followed by a pause of 50 ms; other topics of the node are not delayed."""
+    """A list of 1,000 publishers is followed by a pause of 50 ms; the node's other topics are not delayed."""
 
     async def scene(clock: ManualLoop) -> None:
         scene = Scene(monkeypatch)
@@ -225,7 +225,7 @@ def test_updates_of_many_publishers_are_rate_limited(monkeypatch: pytest.MonkeyP
         await clock.advance(0.02)
         await scene.answer(clock, [uri], is_dead=False)
         assert [args[1] for _, args in scene.calls] == ["/many", "/few", "/many"]
-        # A node whose pause is over uses neither memory nor time.
+        # A node whose pause has ended uses neither memory nor time.
         await clock.advance(0.06)
         assert not scene.notifier._nodes
         await scene.notifier.close()
@@ -241,7 +241,7 @@ def test_an_update_that_waited_lists_later_publishers_too(monkeypatch: pytest.Mo
         scene.notify([one], "/many")
         await scene.answer(clock, [one], is_dead=False)
 
-        # This one pauses for 15 ms, while a publisher registers.
+        # This node's topic pauses for 15 ms, during which a publisher registers.
         scene.notify([one, other], "/many")
         await scene.answer(clock, [other], is_dead=False)
         scene.publishers.append("http://x:2/")

@@ -1,4 +1,4 @@
-"""A node in a separate process under attack: it keeps answering, and its memory and log stay small.
+"""A node in a separate process under attack: it continues to respond, and its memory use and log stay small.
 
 benchmarks/bad_peers.py has the same attacks, and measures them.
 """
@@ -33,7 +33,7 @@ def bad_peers() -> ModuleType:
 
 @pytest.fixture
 def victim(master: str, bad_peers: ModuleType) -> Iterator[tuple[object, str, str]]:
-    """Return the node, its XML-RPC address and the address of its services."""
+    """Return the node, its XML-RPC address and its services' address."""
     node = bad_peers.Victim([sys.executable, "-c", bad_peers.NODE], dict(os.environ), "ready")
     with ServerProxy(master) as proxy:
         api, service = proxy.lookupNode("/test", "/victim"), proxy.lookupService("/test", "/flag")
@@ -61,6 +61,6 @@ def test_bad_peers(victim: tuple[object, str, str], bad_peers: ModuleType, maste
         assert row.answered, row
         assert row.height - row.before < 40, row
 
-    # At most ten lines of each kind in ten seconds; each attack opens two hundred connections.
+    # At most ten lines of each kind are logged in ten seconds; each attack opens two hundred connections.
     most = 30 * (1 + (time.monotonic() - start_time) // 10)
     assert len(node.lines) < most, node.lines  # type: ignore[attr-defined]

@@ -16,12 +16,13 @@ from minirospy.runtime.node.topics import Publication
 from minirospy.runtime.transport.loop import LoopThread
 
 STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "string data\n")
-# Seconds for which the other thread may run in the middle; with the lock it waits for all of them, then continues.
+# Seconds for which the other thread may run in between. If there is a lock, the thread waits for it, so all of the
+# time passes.
 MEANWHILE = 0.3
 
 
 class Interrupted(Publication):
-    """A latched publication that lets another thread run in the middle of publish() and accept()."""
+    """A latched publication that lets another thread run in the middle of publish() and of accept()."""
 
     when_latched: Callable[[], None] | None = None
     when_linked: Callable[[], None] | None = None
@@ -45,7 +46,7 @@ def loop() -> Iterator[LoopThread]:
 def subscriber(
     loop: LoopThread, publication: Publication
 ) -> Iterator[tuple[Callable[[], None], socket.socket]]:
-    """Return a function that connects a subscriber, and the socket that it reads."""
+    """Return a function that connects a subscriber, and the socket from which the subscriber reads."""
     ours, theirs = socket.socketpair()
     ours.setblocking(False)
     fields = {"callerid": "/s", "topic": "/t", "type": STRING.name, "md5sum": STRING.md5sum}
@@ -64,7 +65,7 @@ async def _closed(publication: Publication) -> None:
 
 
 def start(function: Callable[[], None]) -> threading.Thread:
-    """Start a thread, and give it a moment to run."""
+    """Start a thread, and let it run for a moment."""
     thread = threading.Thread(target=function)
     thread.start()
     thread.join(MEANWHILE)
@@ -72,7 +73,7 @@ def start(function: Callable[[], None]) -> threading.Thread:
 
 
 def frames(sock: socket.socket, last: bytes) -> list[bytes]:
-    """Return the message bodies after the header, up to ``last``."""
+    """Return the bodies of the messages after the header, up to ``last``."""
     file = sock.makefile("rb")
     file.read(int.from_bytes(file.read(4), "little"))
     found: list[bytes] = []

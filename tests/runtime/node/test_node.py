@@ -166,7 +166,7 @@ def test_parameter_updates_are_delivered_in_order() -> None:
 
     def on_parameter(key: str, value: int) -> None:
         if value == 1:
-            # A second worker would report the second change meanwhile.
+            # A second worker would report the second change in the meantime.
             later.wait(0.1)
         values.append(value)
         if value == 2:

@@ -1,4 +1,4 @@
-"""A service and its clients in the memory of one process: bytes in, bytes out, and which side closes when."""
+"""A service and its clients in one process: bytes in, bytes out, and which side closes the connection when."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ class Unprintable(Exception):
 
 FAULTS: dict[bytes, tuple[Exception, bytes]] = {
     b"value": (ValueError("no such joint"), b"error processing request: no such joint"),
-    # An error of a file that the handler reads, not of the connection.
+    # This error is about a file that the handler reads, not about the connection.
     b"os": (FileNotFoundError("no map"), b"error processing request: no map"),
     b"wire": (WireError("short"), b"error processing request: short"),
     b"bytes": (ValueError("name \udcff"), b"error processing request: name \\udcff"),
     b"sent": (ServiceException("name \udcff"), b"name \\udcff"),
     b"text": (Unprintable(), b"error processing request: Unprintable"),
 }
-"""Request -> the handler's exception, and the client's response."""
+"""Dict from request to the handler's exception and the client's response."""
 
 EXITS: dict[bytes, tuple[BaseException, bytes]] = {
     b"exit": (SystemExit(3), b"error processing request: SystemExit: 3"),
@@ -50,7 +50,7 @@ EXITS: dict[bytes, tuple[BaseException, bytes]] = {
 
 
 class Scene(NamedTuple):
-    """A node, its loop, and its services /worker and /loop, which behave equally."""
+    """A node, its loop, and its services /worker and /loop, which behave the same."""
 
     node: Node
     loop: LoopThread
@@ -268,7 +268,7 @@ Serve = Callable[[bytes], str]
 
 @pytest.fixture
 def liar() -> Iterator[Serve]:
-    """Return a function that serves fixed bytes to a connection and closes it; the function returns the URI."""
+    """Yield a function that serves fixed bytes to one connection and closes it. The function returns the URI."""
     threads: list[threading.Thread] = []
 
     def serve(answer: bytes) -> str:

@@ -1,4 +1,4 @@
-"""runtime/node/topics and runtime/node/node: links between nodes of one loop, with real sockets, and how links are closed."""
+"""runtime/node/topics and runtime/node/node: links between nodes on one loop, with real sockets, and how links are closed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ FOREIGN = {"md5sum": ANY, "type": STRING.name, "callerid": "/foreign"}
 
 @pytest.fixture(params=["auto", "tcp"])
 def transport(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let nodes of this machine use any transport, or only TCP."""
+    """Let nodes on this machine use any transport, or only TCP."""
     monkeypatch.setenv("MINIROSPY_TRANSPORT", request.param)
 
 
@@ -143,7 +143,7 @@ async def subscribe_to(
     *,
     on_loop: bool = False,
 ) -> Subscription:
-    """Return a subscription that was notified of one publisher, played by ``foreign``."""
+    """Return a subscription that was notified of one publisher, which is simulated by ``foreign``."""
     subscription = node.make_subscription("/t", STRING, deliver, on_loop=on_loop)
     monkeypatch.setattr(subscription._rpc, "call", foreign.answer)
     subscription.publishers_changed(["http://127.0.0.1:1/"])
@@ -194,7 +194,7 @@ def test_a_refused_subscriber_logs_why_and_retries_only_after_a_change(
             subscription = await listen(b, "/t", Box())
             await until(lambda: "refused the connection" in caplog.text)
             assert not publication.links
-            # Its task has logged that; it finishes one loop iteration later.
+            # The connecting task has logged this; it finishes one loop iteration later.
             await until(lambda: not subscription._connecting)
             await a.unadvertise(publication)
             right = await publish(a, "/t")
@@ -396,7 +396,7 @@ def test_without_a_queue_publish_waits_for_the_reader() -> None:
             while received < len(whole):
                 received += len(await loop.sock_recv(sock, 1 << 20))
             await done
-            # A reader that disconnects ends the wait too.
+            # The wait must also end if the reader disconnects.
             done = loop.run_in_executor(None, publication.publish, whole)
             await until(lambda: publication.links[0].waiting)
             sock.close()
@@ -406,7 +406,7 @@ def test_without_a_queue_publish_waits_for_the_reader() -> None:
 
 
 async def raw_subscriber(node: Node, **changes: str) -> socket.socket:
-    """Return a connection that has sent a subscriber's header for /t and received the response, and does not read any more."""
+    """Return a connection that has exchanged headers as a subscriber to /t, and from which nothing more is read."""
     sock = await tcp.connect("127.0.0.1", node.tcpros_port)
     fields = {"topic": "/t", "md5sum": STRING.md5sum, "type": STRING.name, "callerid": "/raw", **changes}
     await tcp.send_header(sock, fields)
@@ -491,7 +491,7 @@ def test_a_publisher_update_that_overtakes_the_answer_is_not_undone(monkeypatch:
 
 
 def test_a_refusal_that_a_new_list_overtakes_is_not_the_last_word(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The publisher unregistered and registered again; that update arrived during the handshake."""
+    """The publisher unregistered and registered again, and the update about that arrived during the handshake."""
 
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -512,7 +512,7 @@ def test_a_refusal_that_a_new_list_overtakes_is_not_the_last_word(monkeypatch: p
 
 
 def test_publisher_list_of_an_earlier_subscription_is_queried_again() -> None:
-    """rosmaster's lists wait in a queue, and may arrive after the answer to a later registration."""
+    """rosmaster queues its lists, which may therefore arrive after the response to a later registration."""
 
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -540,7 +540,7 @@ def test_publisher_listed_again_while_connecting_is_connected_once(
             async def open_all_the_same(uri: str) -> Any:
                 nonlocal opening, opened
                 opening += 1
-                # As asyncio.wait_for before Python 3.12 may do.
+                # asyncio.wait_for before Python 3.12 may do this.
                 with contextlib.suppress(asyncio.CancelledError):
                     await is_named_again.wait()
                 link = await open_link(uri)
@@ -560,7 +560,7 @@ def test_publisher_listed_again_while_connecting_is_connected_once(
 
 
 def slow(node: Node, monkeypatch: pytest.MonkeyPatch, slow_calls: str) -> None:
-    """Delay a node's calls to its master whose method has this prefix; they are not cancelled."""
+    """Delay a node's calls to its master if the method has this prefix; they are not cancelled."""
     ask = node._registrations.call
 
     async def ask_late(method: str, *args: Any) -> Any:
@@ -576,7 +576,7 @@ def slow(node: Node, monkeypatch: pytest.MonkeyPatch, slow_calls: str) -> None:
 
 
 async def offer(node: Node, kind: str) -> Callable[[], Coroutine[Any, Any, None]]:
-    """Register something of a kind; return a function that unregisters it."""
+    """Register an object of this kind; return a function that unregisters it."""
     if kind == "publisher":
         publication = await publish(node, "/x")
         return lambda: node.unadvertise(publication)
@@ -589,7 +589,7 @@ async def offer(node: Node, kind: str) -> Callable[[], Coroutine[Any, Any, None]
 
 
 def known(master: Master) -> dict[str, list[str]]:
-    """Return kind -> the nodes that are registered for /x."""
+    """Return a dict from kind to the nodes that are registered for /x."""
     registry = master.registry
     tables = {
         "publisher": registry.publishers(),
@@ -632,7 +632,7 @@ def test_the_shutdown_of_the_node_does_not_overtake_a_registration(
             await a.close()
             with contextlib.suppress(asyncio.CancelledError, MasterUnreachableError):
                 await offering
-            # If it was overtaken, it has arrived by then.
+            # If another call overtook it, it has arrived by then.
             await asyncio.sleep(0.1)
             assert not known(master)
 
@@ -669,7 +669,7 @@ def test_close_gives_up_registrations_with_a_silent_master(
 def test_a_master_that_was_away_gets_the_registrations_it_missed(
     monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    """The master kept its tables, so it knows the node."""
+    """The master kept its tables, so it still knows the node."""
 
     async def scene() -> None:
         async with graph("/a", watch_seconds=0.05) as (master, (a,)):
@@ -742,7 +742,7 @@ def test_closing_the_last_topic_is_not_taken_for_a_new_master(
 def test_a_node_of_an_illegal_name_is_not_taken_for_forgotten(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The master refuses to look up such a name, each time; rospy lets the node run."""
+    """The master refuses each lookup of such a name, but rospy lets the node run."""
 
     async def scene() -> None:
         async with graph("/led actuator", watch_seconds=0.02) as (_, (a,)):
@@ -771,7 +771,7 @@ def test_a_master_that_forgot_everything_gets_all_registrations_again(
             subscription = await listen(b, "/t", box)
             again = threading.Event()
             b.when_registered_again.append(again.set)
-            # The publisher's endpoint opens a moment before the subscriber's.
+            # The publisher's end opens a moment before the subscriber's.
             await until(lambda: publication.links and subscription.links)
             link = subscription.links[0]
             port = master.port
@@ -837,7 +837,7 @@ def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: 
         async with graph("/a", "/b") as (_, (a, b)):
             publication = await publish(a, "/t")
             subscription = await listen(b, "/t", Box())
-            # The publisher's endpoint opens a moment before the subscriber's.
+            # The publisher's end opens a moment before the subscriber's.
             await until(lambda: publication.links and subscription.links)
             subscription.registered_again([])
             subscription.publishers_changed(["http://127.0.0.1:1/"])
@@ -1076,7 +1076,7 @@ def test_a_publisher_that_registers_again_is_connected_once(
 def test_subscriber_whose_listener_fails_is_not_counted_and_the_fault_is_logged(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    """The publisher's own function fails: the connection is closed, and the node can still be closed."""
+    """The publisher's own function raises: the connection is closed, and the node can still be closed."""
 
     async def scene() -> None:
         async with graph("/talker") as (_, (talker,)):

@@ -1,4 +1,4 @@
-"""runtime/rpc/async_client and runtime/master/notifier: connections that are kept, lost, refused or late; long lists."""
+"""runtime/rpc/async_client and runtime/master/notifier: connections that are reused, lost, refused or late; long lists."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CALL = serialize_call("getPid", ["/x"])
 
 
 class Publishers:
-    """A graph in which topics have publishers, without parameters."""
+    """A graph whose topics have publishers, and which has no parameters."""
 
     def __init__(self, uris_of: Callable[[str], list[str]]) -> None:
         self.publisher_uris = uris_of
@@ -113,7 +113,7 @@ def test_a_call_under_way_ends_with_its_client_or_its_time_limit() -> None:
         with socket.create_server(("127.0.0.1", 0)) as silent:
             uri = f"http://127.0.0.1:{silent.getsockname()[1]}/"
             client = AsyncRpcClient()
-            # It accepted the connection: the fault is in its process, not its address.
+            # The server accepted the connection, so the fault is in its process, not its address.
             with pytest.raises(RpcTimeout, match=r"timed out after 0\.05 s"):
                 await client.call(uri, "a", timeout=0.05)
             waiting = asyncio.ensure_future(client.call(uri, "a"))
@@ -194,7 +194,7 @@ def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
 
 
 def test_a_kept_connection_ends_with_its_server(monkeypatch: pytest.MonkeyPatch) -> None:
-    # The connection is closed with its server, not because it was idle.
+    # The connection is closed because the server closes, not because it was idle.
     monkeypatch.setattr("minirospy.runtime.rpc.async_client._KEEP_SECONDS", 1000.0)
 
     async def test() -> None:

@@ -1,4 +1,4 @@
-"""The transitions of a server's connection: the table alone, without sockets."""
+"""The transitions of a server's connection: the table only, without sockets."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from minirospy.runtime.rpc.connection_state import READING, TRANSITIONS, Event, 
 
 
 def reached(start: State) -> set[State]:
-    """Return the states that a connection may have after ``start``."""
+    """Return the states that a connection may reach from ``start``."""
     found: set[State] = set()
     new = {start}
     while new:
@@ -54,5 +54,5 @@ def test_reading_stops_and_resumes(stop: Event, resume: Event) -> None:
 
 
 def test_refused_client_is_still_read() -> None:
-    """Closing a socket with unread bytes would reset the connection before the client has its answer."""
+    """Closing a socket with unread bytes would reset the connection before the client has received its response."""
     assert all(state in READING for state in TRANSITIONS[Event.REFUSE].values())

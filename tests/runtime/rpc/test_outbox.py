@@ -1,4 +1,4 @@
-"""Data that waits for a socket without room: sent in order, counted, and discarded."""
+"""Data queued for a socket that is not writable: sent in order, counted, and discarded."""
 
 from __future__ import annotations
 

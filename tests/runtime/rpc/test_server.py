@@ -1,4 +1,4 @@
-"""runtime/rpc/server: clients take turns, and a time limit applies only to clients that make no progress."""
+"""runtime/rpc/server: clients are served in turns, and a time limit applies only to clients that make no progress."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def test_a_client_is_not_read_from_while_its_method_waits(last_closes: bool) -> 
             await until(lambda: connection._message)
             for _ in range(100):
                 await asyncio.sleep(0)
-            # Data that it has read from the socket is not parsed, either.
+            # The received data that is already in memory is not parsed, either.
             assert connection._reader.held < 500 * len(requests[0])
             go_on.set()
             greedy.setblocking(False)
@@ -170,7 +170,7 @@ def test_a_client_that_does_not_read_its_answers_is_not_read_from() -> None:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 65536)
         await loop.sock_connect(client, ("127.0.0.1", server.port))
 
-        # More than the system's buffers hold; a server that continued to read would read all of it.
+        # The requests exceed the system's buffers; a server that continued to read would read all of them.
         asked = [call("m", number, "x" * 10_000) for number in range(4000)]
         left = memoryview(b"".join(asked))
         blocked = 0
@@ -215,7 +215,7 @@ def test_clients_do_not_wait_for_a_crowd_that_disconnects(is_known: bool) -> Non
             await until(lambda: len(server.connections) == crowd + 1)
             for sock in silent:
                 sock.close()
-            # Its request arrives after all of theirs are finished.
+            # This client's request arrives after all requests of the other clients are finished.
             if not is_known:
                 good = stack.enter_context(connect(server))
             good.sendall(call("getPid"))
@@ -239,7 +239,7 @@ class Late:
 
 
 def admit(server: RpcServer, late: Late, *, is_new: bool = False) -> bool:
-    """Do as the loop does if a connection has data."""
+    """Do the same as the loop does if a connection has data."""
     is_admitted = server.admit(late, is_new=is_new)  # type: ignore[arg-type]
     if is_admitted:
         late.read()
@@ -279,7 +279,7 @@ def test_new_connections_are_read_from_both_ends_of_the_queue() -> None:
         await server.close()
         return log
 
-    # The client that has been idle longest before it disconnects is at one end, the newest at the other.
+    # One end is the client that has been idle longest before it disconnects, the other end is the newest client.
     assert set(asyncio.run(scene())[:4]) == {"7", "0", "6", "1"}
 
 
@@ -300,7 +300,7 @@ def test_reading_ends_when_the_time_for_it_is_over(monkeypatch: pytest.MonkeyPat
         return len(log)
 
     monkeypatch.setattr(servers, "time", SimpleNamespace(perf_counter=clock))
-    # The clock is read after each 16 of them.
+    # The clock is read after every 16 connections.
     assert asyncio.run(scene()) == 3 * 16 - 1
 
 

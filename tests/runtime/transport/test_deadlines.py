@@ -1,4 +1,4 @@
-"""runtime/transport/deadlines: one timer of the loop for the time limits of many things."""
+"""runtime/transport/deadlines: a single loop timer for the time limits of many operations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A process at its limit of threads or open files: one clear line, no busy loop, and it continues when there is room."""
+"""A process at its limit of threads or open files logs one clear line, does not spin, and continues when the limit allows."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STRING = InterfaceType("std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", "s
 
 
 class Limit:
-    """Lets no thread start while ``is_reached``."""
+    """Prevents threads from starting while ``is_reached`` is set."""
 
     def __init__(self, start: Callable[[threading.Thread], None]) -> None:
         self.is_reached = False
@@ -148,7 +148,7 @@ def test_callbacks_in_order_go_on_after_the_thread_limit(
 
 def test_other_runtime_errors_keep_their_type() -> None:
     class PythonFinalizationError(RuntimeError):
-        """Stands in for the exception of Python 3.13."""
+        """Represents the exception that Python 3.13 has."""
 
     def finalize() -> None:
         with naming_thread_limit():
@@ -196,7 +196,7 @@ def run(scene: Callable[[], Coroutine[Any, Any, None]]) -> None:
 
 
 class Full:
-    """A listening socket whose accept() fails while ``is_full``."""
+    """A listening socket whose accept() fails while ``is_full`` is set."""
 
     def __init__(self, sock: Any) -> None:
         self._sock = sock

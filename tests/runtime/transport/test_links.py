@@ -26,7 +26,7 @@ KINDS = ["tcp", "unix"] if hasattr(socket, "AF_UNIX") else ["tcp"]
 
 @pytest.fixture(params=KINDS)
 def pair(request: pytest.FixtureRequest) -> Iterator[tuple[socket.socket, socket.socket]]:
-    """Return both sockets of a connection within this machine."""
+    """Return both sockets of a connection on this machine."""
     if request.param == "unix":
         one, other = socket.socketpair(socket.AF_UNIX)
     else:
@@ -46,7 +46,7 @@ def loop() -> Iterator[LoopThread]:
 
 @dataclass
 class QueueSize:
-    """The number of frames that a slow receiver gets."""
+    """The number of frames that a slow receiver receives."""
 
     newest: int
 
@@ -88,7 +88,7 @@ def test_frames_of_several_threads_stay_whole(
     data = receive_all(pair[1], sum(map(len, frames)) * 5)
     for thread in threads:
         thread.join()
-    # Data that the peer has received may not be counted yet.
+    # Data that the peer has already received may not be counted yet.
     loop.run(link.drain(30))
     seen = []
 
@@ -185,7 +185,7 @@ def test_reader_busy_polls_while_messages_arrive_quickly(
 ) -> None:
     """``seconds``: the longest wait that counts as short. The reader never busy-polls for the first message.
 
-    ``is_alone``: whether no other reader of the node has read meanwhile.
+    ``is_alone``: no other reader of the node has read in the meantime.
     """
     one, other = socket.socketpair()
     looked = 0
@@ -233,7 +233,7 @@ def test_reader_busy_polls_while_messages_arrive_quickly(
 def test_reader_blocks_after_busy_polling_without_success(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A gap is as long as the busy-poll and the block together; bytes that were late do not count as quick ones."""
+    """A gap lasts as long as the busy-poll and the blocking together; bytes that arrive late do not count as quick."""
     one, other = socket.socketpair()
     looks: list[str] = []
     clock = SimpleNamespace(now=0.0)
@@ -442,7 +442,7 @@ def test_newest_of_large_messages(pair: tuple[socket.socket, socket.socket]) -> 
 def test_slow_reader_gets_every_frame_while_it_reads(
     pair: tuple[socket.socket, socket.socket], loop: LoopThread, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The sender's wait for room never expires here, however long another program occupies the reader's processor."""
+    """The sender's wait for space never times out here, even if other programs occupy the reader's processor for long."""
     monkeypatch.setattr(links, "time", SimpleNamespace(monotonic=lambda: 0.0, perf_counter=time.perf_counter))
     monkeypatch.setattr(links, "is_writable", lambda sock, _: is_writable(sock, 30_000))
     link = open_link(loop, pair[0], 10, lambda _: None)
@@ -474,7 +474,7 @@ def test_peer_that_does_not_read_is_not_waited_for(
         link.send(frame)
     for _ in range(1000):
         link.send(frame)
-    # TCP makes a little more room for a while, and each time the peer gets another chance.
+    # TCP accepts a little more for a while, and each time the peer gets another chance.
     assert 1 <= len(waits) < 20
     assert link.waiting <= 3
 

@@ -54,7 +54,7 @@ def test_a_second_close_does_not_interrupt_the_end() -> None:
     thread.close()
     with pytest.raises(LoopClosedError):
         wait(10)
-    # close() gives up on a thread that stalls.
+    # close() stops waiting for a thread that stalls.
     thread._thread.join(30)
     assert thread.loop.is_closed()
     assert ended == ["task"]
@@ -75,18 +75,18 @@ def test_calls_start_in_their_order() -> None:
 
 
 def test_a_handler_at_any_step_of_a_call_may_call_the_loop() -> None:
-    """A signal handler runs between any two steps of the main thread, and shuts the node down, which waits for the loop."""
+    """A signal handler may run between any two steps of the main thread. It shuts the node down, which waits for the loop."""
     thread = LoopThread("test-loop")
     at = 0
-    # A list, not a counter that is rebound: before Python 3.12, a profile function's changes to its caller's
+    # Use a list, not a counter that is rebound: before Python 3.12, a profile function's changes to its caller's
     # variables may be undone.
     steps: list[str] = []
     is_at_step = threading.Event()
     inner: list[int] = []
 
     async def outer() -> int:
-        # The call finishes, for which the loop needs the lock of the caller's future, while the caller is at the
-        # step; or while it waits, if that is before the step.
+        # Finish while the caller is at the step, for which the loop needs the lock of the caller's future. If the
+        # caller waits for this call before it reaches the step, continue after a moment.
         is_at_step.wait(0.05)
         return 1
 
@@ -113,7 +113,7 @@ def test_a_handler_at_any_step_of_a_call_may_call_the_loop() -> None:
 
 
 def test_a_thread_that_is_interrupted_as_it_starts_closes_its_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The thread is running by then: closing its loop from outside would raise RuntimeError in it."""
+    """At this point the thread is running, so closing its loop from outside would raise RuntimeError in it."""
     threads: list[threading.Thread] = []
     faults: list[threading.ExceptHookArgs] = []
     start = threading.Thread.start

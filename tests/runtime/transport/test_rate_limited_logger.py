@@ -1,4 +1,4 @@
-"""runtime/transport/rate_limited_logger: logs the first of many equal lines, then their number."""
+"""runtime/transport/rate_limited_logger: logs the first of many equal lines, then the number of the others."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def test_localhost_is_ipv4_or_ipv6() -> None:
 
 
 async def serve(received: list[dict[str, str]]) -> tcp.Listener:
-    """Return a listener that records the headers that it receives, and answers each."""
+    """Return a listener that records the headers that it receives, and responds to each."""
 
     async def accept(sock: socket.socket, _address: str) -> None:
         received.append(await tcp.receive_header(sock))
@@ -174,8 +174,8 @@ def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
         listener = await serve(received)
         silent: list[socket.socket] = []
         try:
-            # As many as this process may open: it has both sockets of each connection open, unless the listener
-            # closes its own.
+            # Use as many as this process may open: it has both sockets of each connection open, unless the listener
+            # closes its own socket.
             for number in range(1000):
                 silent.append(await tcp.connect("127.0.0.1", listener.port))
                 if number % 100 == 99:
@@ -197,7 +197,7 @@ def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
 
 
 def test_long_headers_share_a_limited_memory() -> None:
-    """A client that sends the start of a long header occupies memory; a header of ordinary length is accepted nevertheless."""
+    """A client that sends the start of a long header occupies memory; a header of normal length must still be accepted."""
 
     async def scene() -> None:
         loop, memory = asyncio.get_running_loop(), tcp.HeaderMemory(300_000)

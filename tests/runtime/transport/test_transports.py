@@ -1,4 +1,4 @@
-"""How two nodes of one machine connect by a Unix socket, and use TCP otherwise."""
+"""How two nodes on one machine connect by a Unix socket, and use TCP otherwise."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def test_both_sides_have_to_want_it(
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
             for node, name in ((a, of_a), (b, of_b)):
-                # As if the node had been started with this setting.
+                # This has the same effect as starting the node with this setting.
                 if name == "tcp":
                     node.this_host = ""
             box = Box()
@@ -126,7 +126,7 @@ def test_both_sides_have_to_want_it(
 
 
 def test_tcp_is_used_if_the_socket_is_unreachable(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As in a sandbox that isolates processes."""
+    """This simulates a sandbox that isolates processes."""
 
     def refuse(name: str) -> Any:
         raise PermissionError(name)
@@ -204,13 +204,13 @@ def test_an_answer_is_expected_awake_and_not_for_long(monkeypatch: pytest.Monkey
     monkeypatch.setattr(sockets, "BUSY_POLL_SECONDS", 60.0)
     one, other = socket.socketpair()
     with one, other:
-        sockets.busy_poll(one)  # a socket of this process
+        sockets.busy_poll(one)  # a socket of this process is not polled
         assert turns == 0
         monkeypatch.setattr(sockets, "peer", lambda _: sockets.Peer(process=0, user=0, group=0))
         sockets.busy_poll(one)
         assert (turns, one.recv(1)) == (3, b"x")
         monkeypatch.setattr(sockets, "BUSY_POLL_SECONDS", 0.0)
-        sockets.busy_poll(one)  # no response
+        sockets.busy_poll(one)  # no response arrives
         assert turns == 4
         with pytest.raises(BlockingIOError):
             sockets.busy_receive(one, memoryview(bytearray(1)))
@@ -236,7 +236,8 @@ def test_a_master_is_reached_by_each_of_its_names(uri: str) -> None:
 
 def test_a_socket_name_of_another_user_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
-    # As if this process, which took the name, belonged to a user who is neither this one nor root.
+    # This has the same effect as if this process, which took the name, belonged to a user other than this one and
+    # root.
     monkeypatch.setattr(local, "_TRUSTED", frozenset())
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
@@ -288,7 +289,7 @@ def test_publisher_chooses_no_other_socket_of_this_machine(name: str) -> None:
 
 
 def test_without_unix_sockets_there_is_tcp(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As if systemd's RestrictAddressFamilies excludes them, or no file descriptor is left."""
+    """This simulates systemd's RestrictAddressFamilies, or a process without free file descriptors."""
 
     def restricted(*_: object) -> None:
         raise OSError(errno.EAFNOSUPPORT, "Address family not supported by protocol")
@@ -386,7 +387,7 @@ def test_large_request_is_not_copied_for_each_partial_send() -> None:
 
 
 def test_a_node_that_ends_gives_its_name_free_before_its_port(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Otherwise the next server of that port would have no Unix socket."""
+    """Otherwise the next server on that port would have no Unix socket."""
     order: list[str] = []
     close = Listener.close
 
@@ -505,7 +506,7 @@ def test_a_subscriber_that_is_killed_in_the_middle_of_a_message(
                 await loop.run_in_executor(None, publication.publish, frame)
                 assert process.stdout
                 await loop.run_in_executor(None, process.stdout.readline)
-                # Its callback sleeps: this thread stays in the middle.
+                # The callback sleeps, so this thread stays in the middle of publishing.
                 await loop.run_in_executor(None, publication.publish, frame)
                 link = publication.links[0]
                 assert link.waiting == 1
@@ -545,7 +546,7 @@ def test_the_environment_names_a_transport_that_there_is() -> None:
 
 
 def _received_before_the_header(sock: socket.socket, ahead: bytes) -> bytes:
-    """Return what a client of "/s" sends after its header before it receives one: ``ahead``, or data within a moment."""
+    """Return the data that a client of "/s" sends after its header before it receives one; ``ahead`` is expected."""
     header = serialize_header(service_client_header("/s", "*", "/c"))
     got = b""
     sock.settimeout(30)
@@ -577,7 +578,7 @@ def test_a_request_goes_ahead_of_the_servers_header_by_a_unix_socket_alone(famil
                 sock.sendall(serialize_header({"callerid": "/s", "md5sum": "*", "type": "a/B"}))
                 sock.settimeout(10)
                 request = before or sock.recv(1000)
-                # A response that arrives with the header, or directly after it, is found.
+                # A response that arrives together with the header, or directly after it, must be found.
                 sock.sendall(serialize_response(request))
             return before
 

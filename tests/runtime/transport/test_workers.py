@@ -1,4 +1,4 @@
-"""Workers: exceptions of a function are logged, and the next function runs."""
+"""Workers: an exception in a function is logged, and the next function runs."""
 
 from __future__ import annotations
 
