@@ -6,10 +6,10 @@ master (ROS_MASTER_URI) must not know the node any more.
 
 usage: python signal_steps.py WAY [EVERY]
 
-``passes``: the signal arrives at the step, and the main thread continues. ``stands``: the main thread stays at the step until
-the signal is dispatched there. ``elsewhere``: another thread shuts the node down while the main thread stays at the step.
-``twice``: two signals, of which the second may interrupt the hook, and the wait for the master. EVERY 30 tests each thirtieth
-step. Prints the faults; the exit status is 1 if there are any.
+``passes``: the signal arrives at the step, and the main thread continues. ``stands``: the main thread stays at the step
+until the signal is dispatched there. ``elsewhere``: another thread shuts the node down while the main thread stays at
+the step. ``twice``: two signals, of which the second may interrupt the hook and the wait for the master. EVERY 30 tests
+every thirtieth step. Prints the faults; the exit status is 1 if there are any.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from roscpp import msg, srv  # noqa: F401
 
 from minirospy.base.errors import RpcRefused
 
-# Import the modules of init_node: an import's steps do not count as the node's.
+# Import the modules that init_node uses, because an import's steps do not count as the node's.
 from minirospy.client import params, shutdown, startup  # noqa: F401
 from minirospy.client.session import current_session
 from minirospy.runtime.master import log_file  # noqa: F401
@@ -43,7 +43,7 @@ from minirospy.runtime.transport import loop
 _AT_ONCE = 3
 _numbers = itertools.count()
 _GUARD = 60.0  # seconds after which a process is considered hung; a machine that runs tests may stall
-# Maximum seconds at a step: in a critical section or before the library's thread has started, no signal is
+# Maximum seconds to stay at a step. In a critical section, or before the library's thread has started, no signal is
 # dispatched.
 _STAND = 0.3
 
@@ -83,9 +83,9 @@ _WAYS = {way.__name__: way for way in (passes, stands, twice, elsewhere)}
 
 
 def run_node(name: str, at: int, way: Callable[[], None], notes: int) -> None:
-    """Make this process a node that is shut down at a step; write the counted steps and the position to ``notes``.
+    """Make this process a node that is shut down at step ``at``; write the counted steps and the position to ``notes``.
 
-    At step 0 it is not shut down.
+    At step 0 the node is not shut down.
     """
     # Disable timeouts that depend on the machine's speed: the interrupt of a running main thread, the report of slow
     # work.
@@ -163,7 +163,7 @@ class Trial:
 
     @property
     def has_ended(self) -> bool:
-        """Return whether it has exited; kill a process that hangs."""
+        """Return whether the process has exited; kill a process that hangs."""
         if time.monotonic() > self._end:
             os.kill(self._pid, signal.SIGKILL)
         pid, status = os.waitpid(self._pid, os.WNOHANG)
@@ -171,7 +171,7 @@ class Trial:
         return pid != 0
 
     def result(self, master: MasterProxy) -> tuple[str, str]:
-        """Return its notes, and the fault of its exit; "" if there is none."""
+        """Return the process's notes, and the fault at its exit, or "" if there is none."""
         texts = []
         for file in (self._output, self._notes):
             with file:
@@ -192,7 +192,7 @@ class Trial:
 def main(way: str, every: str = "1") -> int:
     """Try the steps; return the exit status."""
     master = MasterProxy(os.environ["ROS_MASTER_URI"], "/signal_steps")
-    # Imports and caches of the first call must not count as steps of init_node.
+    # Imports and caches in the first call must not count as steps of init_node.
     master.get_pid()
     counting = Trial(0, _WAYS[way])
     while not counting.has_ended:

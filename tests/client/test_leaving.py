@@ -1,4 +1,4 @@
-"""A node leaves the graph however it shuts down: the master does not know it any more, and its process exits with status 0."""
+"""A node leaves the graph however it shuts down: the master no longer knows it, and its process exits with status 0."""
 
 from __future__ import annotations
 

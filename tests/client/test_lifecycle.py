@@ -1,4 +1,7 @@
-"""A node's lifecycle in cases in which real rospy hangs or fails: signals, forks, threads, pytest. tests/referee has the rest."""
+"""A node's lifecycle in cases in which real rospy hangs or fails: signals, forks, threads, pytest.
+
+tests/referee has the rest.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ GUARD = 45.0  # seconds after which a program is considered hung; a machine that
 
 
 def read_line(process: subprocess.Popen[str]) -> str:
-    """Return a line that a program prints. Read no more than that: communicate() would miss buffered data."""
+    """Return a line that a program prints, and read no more, because communicate() would miss buffered data."""
     assert process.stdout
     line = b""
     while not line.endswith(b"\n") and (byte := os.read(process.stdout.fileno(), 1)):
@@ -58,7 +61,7 @@ NO_REPORT = "from minirospy.client import shutdown; shutdown._REPORT_SECONDS = 1
 
 
 def deliver(process: subprocess.Popen[str], number: int) -> None:
-    """Send a signal and wait until the process has received it: of two pending ones it receives one."""
+    """Send a signal, and wait until the process has received it, because of two pending signals it receives only one."""
     process.send_signal(number)
     if sys.platform != "linux":
         time.sleep(0.1)
@@ -72,9 +75,9 @@ def deliver(process: subprocess.Popen[str], number: int) -> None:
 
 
 def signalled(script: str, number: int) -> tuple[int, str, str, float]:
-    """Return a program's exit status, its output after the signal, and its duration."""
+    """Return a program's exit status, its output after the signal, and how long it ran."""
     process = start(script)
-    # Its stdin stays open: a program that reads it must exit because of the signal.
+    # Keep the program's stdin open: a program that reads it must exit because of the signal.
     open_input, process.stdin = process.stdin, None
     assert open_input
     with open_input:
@@ -84,7 +87,7 @@ def signalled(script: str, number: int) -> tuple[int, str, str, float]:
         return process.returncode, output, errors, time.monotonic() - start_time
 
 
-SECONDS = 3.0  # one second is promised; a machine that runs tests may be busy
+SECONDS = 3.0  # seconds; one is promised, but a machine that runs tests may be busy
 
 
 def in_time(program: Callable[[], float]) -> None:
@@ -116,7 +119,7 @@ finally:
 """
 
 ONE_SIGNAL = {
-    # The program's code; its output from the signal on.
+    # The program's code, and its output from the signal on.
     "time.sleep": ("ready(); time.sleep(60)", "hook finally atexit"),
     "a lock": ("ready(); threading.Event().wait()", "hook finally atexit"),
     "a busy loop": ("ready()\nwhile True: pass", "hook finally atexit"),
@@ -145,8 +148,8 @@ ONE_SIGNAL = {
     ),
 }
 TWO_SIGNALS = {
-    # The program's code; its output between the signals, including on stderr what it waits for; its output
-    # afterwards.
+    # The program's code; its output between the signals, including the report on stderr of what it waits for; its
+    # output afterwards.
     "a slow loop that polls": (
         "while not rospy.is_shutdown(): ready(); time.sleep(60)",
         "hook",
@@ -206,7 +209,7 @@ def test_one_signal_ends_a_program_that_python_can_interrupt(master: str, what: 
 
     def program() -> float:
         status, output, errors, seconds = signalled(script, number)
-        # On a machine that stalls, it reports after two seconds what it waits for.
+        # On a machine that stalls, the program reports after two seconds what it is waiting for.
         errors = re.sub(r"\Ashutdown: still waiting for .*\n", "", errors) if seconds > 2 else errors
         assert (status, output.split(), errors) == (0, prints.split(), "")
         assert not is_known(master, "/program")
@@ -233,7 +236,7 @@ def test_a_second_signal_ends_a_program_that_goes_on(master: str, what: str, num
     process.send_signal(number)
     process.wait(GUARD)
     if child := re.search(r"process child \((\d+)\)", report):
-        # It outlives its parent, and has the pipes open.
+        # The child outlives its parent, and keeps the pipes open.
         os.kill(int(child[1]), signal.SIGKILL)
     output, errors = process.communicate(timeout=GUARD)
     assert (process.returncode, output.split(), errors) == (0, then.split(), "")
@@ -311,11 +314,11 @@ def test_c_code_is_awaited_and_finally_runs(master: str, signals: int, prints: s
     for _ in range(signals - 1):
         deliver(process, signal.SIGINT)
     if signals < 3:
-        # The library's thread notices the signal; then the call of C code returns.
+        # The library's thread notices the signal; after that, the call of C code returns.
         assert process.stdin
         process.stdin.write(("INTERRUPT" if signals == 1 else "KEYBOARD_INTERRUPT") + "\n")
     else:
-        # communicate() closes stdin, and so would end the call of C code.
+        # communicate() closes stdin, which would end the call of C code.
         process.wait(timeout=GUARD)
     output, errors = process.communicate(timeout=GUARD)
     assert (process.returncode, errors) == (status, "")
@@ -324,9 +327,9 @@ def test_c_code_is_awaited_and_finally_runs(master: str, signals: int, prints: s
 
 @POSIX_ONLY
 def test_hooks_run_in_time_while_the_main_thread_is_in_c_code(master: str) -> None:
-    """The half second after which another thread runs them belongs to the state machine, which is tested with a manual clock.
+    """The test of the state machine covers the half second after which another thread runs the hooks, with a manual clock.
 
-    The program counts the ticks in it: elapsed time on a busy machine shows nothing.
+    Here the program counts the clock ticks, because elapsed time proves nothing on a busy machine.
     """
     process = start(IN_C_CODE)
     process.send_signal(signal.SIGTERM)
@@ -394,7 +397,7 @@ finally:
 
 @contextlib.contextmanager
 def master_that_stops(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], object]]:
-    """Run a master; yield a function that stops it: it then accepts connections, but never answers."""
+    """Run a master; yield a function that stops it: after that it accepts connections, but never responds."""
     loop, go_on = LoopThread("test-master"), threading.Event()
     serving = Master()
     loop.run(serving.start())
@@ -460,7 +463,7 @@ print("still there")
 
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux has process namespaces")
 def test_the_first_process_of_a_container(master: str) -> None:
-    """The kernel does not deliver a signal to it that it does not handle."""
+    """The kernel does not deliver signals to this process that it does not handle."""
     unshare = ["unshare", "--pid", "--fork", "--kill-child"]
     if (
         not shutil.which("unshare")
@@ -517,7 +520,7 @@ print("cleaned up", flush=True)
 
 @POSIX_ONLY
 def test_a_program_that_stands_still_keeps_its_time(master: str) -> None:
-    """Its grace period after a signal is time in which it can run, also on a machine that stalls."""
+    """The grace period after a signal is time during which the program can run, even on a machine that stalls."""
     process = start("""
 import signal, time, rospy
 rospy.init_node("still")
@@ -957,7 +960,7 @@ except rospy.ROSInitException as error:
 
 @POSIX_ONLY
 def test_a_hook_does_not_log_into_a_line_that_is_being_written(master: str) -> None:
-    """Files and streams are not re-entrant: a signal in the middle of a line waits until the line is written."""
+    """Files and streams are not reentrant: a signal in the middle of a line must wait until the line is written."""
     process = start("""
 import atexit, logging, os, signal
 import rospy
@@ -989,7 +992,7 @@ rospy.loginfo("line")
 
 @POSIX_ONLY
 def test_a_fork_is_left_to_the_system_until_it_polls(master: str) -> None:
-    """A Python handler would wait for the C code of a pool's worker, sometimes forever."""
+    """A Python handler would wait for the C code in a pool's worker, sometimes forever."""
     process = start("""
 import os, signal, sys, time
 import rospy

@@ -101,7 +101,7 @@ def hear(program: Program) -> str:
 
 
 def test_a_persistent_proxy_outlives_its_server(started: list[Program]) -> None:
-    """rospy's proxy raises AttributeError at each call from then on."""
+    """Afterwards, rospy's proxy would raise AttributeError at each call."""
     client = start(started, PERSISTENT)
     for name in ("one", "two"):
         server = start(started, SERVER, name)
@@ -154,7 +154,7 @@ def test_closing_a_persistent_proxy_ends_the_call_of_another_thread(started: lis
 
 
 def test_a_proxy_follows_a_service_that_moves(started: list[Program]) -> None:
-    """It connects to the last known address first; the response comes from the node that the master returns."""
+    """The proxy connects to the last known address first; the response comes from the node that the master returns."""
     client = start(started, PERSISTENT.replace("persistent=True", "persistent=False"))
     servers = []
     for name in ("one", "two"):
@@ -163,7 +163,7 @@ def test_a_proxy_follows_a_service_that_moves(started: list[Program]) -> None:
         for _ in range(2):
             say(client)
             assert hear(client) == name
-    # The first still runs, and serves its clients.
+    # The first server is still running, and serves its clients.
     assert servers[0].poll() is None
     servers[1].kill()
     servers[1].wait()
@@ -172,7 +172,7 @@ def test_a_proxy_follows_a_service_that_moves(started: list[Program]) -> None:
 
 
 def test_a_shutdown_ends_a_call_that_waits(started: list[Program]) -> None:
-    """rospy waits until the handler has returned."""
+    """rospy would wait until the handler has returned."""
     server = start(started, SERVER, "server")
     assert hear(server) == "ready"
     client = start(started, WAITING)
@@ -183,7 +183,7 @@ def test_a_shutdown_ends_a_call_that_waits(started: list[Program]) -> None:
 
 
 def test_a_request_that_does_not_fit_is_answered(started: list[Program], master: str) -> None:
-    """rospy's thread exits, and the client waits forever."""
+    """rospy's thread would exit, and the client would wait forever."""
     server = start(started, SERVER, "server")
     assert hear(server) == "ready"
     proxy = MasterProxy(master, "/test")
@@ -203,7 +203,7 @@ def test_a_request_that_does_not_fit_is_answered(started: list[Program], master:
 
 
 def test_call_of_missing_service_raises_one_error(started: list[Program]) -> None:
-    """rospy also prints its own internals."""
+    """rospy would also print its own internals."""
     client = start(
         started,
         """

@@ -1,4 +1,4 @@
-"""The rules of a shutdown, with a manual clock; and the moments between a signal and the main thread's reaction."""
+"""The rules of a shutdown, with a manual clock, and the time between a signal and the main thread's reaction."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def machine() -> ShutdownMachine:
 
 
 def timeline(machine: ShutdownMachine, start: float, end: float) -> list[tuple[float, Action]]:
-    """Return the actions of ten ticks a second from ``start`` to ``end``, each with its time."""
+    """Return the actions at ten ticks per second from ``start`` to ``end``, each with its time."""
     times = [round(tenth / 10, 1) for tenth in range(round(start * 10), round(end * 10) + 1)]
     return [(now, action) for now in times for action in machine.tick(now)]
 
@@ -75,7 +75,7 @@ def test_a_second_signal_ends_the_wait_for_the_master_alone(machine: ShutdownMac
     machine.phase = Phase.LEAVING
     assert machine.signal(1.0) == [Action.STOP_LEAVING]
     machine.phase = Phase.LEFT
-    # A main thread that continues is interrupted, as after one signal.
+    # A main thread that continues is interrupted, as it is after a single signal.
     assert timeline(machine, 1.0, 1.9) == [(1.5, Action.INTERRUPT)]
     assert machine.signal(3.0) == [Action.EXIT]
 
@@ -160,7 +160,7 @@ def test_a_thread_that_was_notified_meanwhile_is_not_interrupted(
 def test_a_signal_waits_for_the_next_call_of_rospy(
     lifecycle: Lifecycle, watchdog: SignalWatchdog, call: str
 ) -> None:
-    """Until then the program may be about to use an object that a hook releases."""
+    """Until then the program may be about to use an object that a hook would release."""
     watchdog._on_signal(signal.SIGINT, None)
     assert not lifecycle.is_shutdown_requested
     if call == "poll_shutdown":
@@ -244,7 +244,7 @@ def no_collection() -> Iterator[None]:
 def test_a_second_signal_at_any_step_of_a_shutdown_lets_it_finish(
     lifecycle: Lifecycle, watchdog: SignalWatchdog
 ) -> None:
-    """It may interrupt a hook, but never leaves a shutdown that is claimed and not carried out."""
+    """The second signal may interrupt a hook, but must not leave a shutdown that is claimed but not carried out."""
     steps, at = 0, 1
 
     def count(frame: FrameType, event: str, argument: object) -> None:
@@ -267,7 +267,7 @@ def test_a_second_signal_at_any_step_of_a_shutdown_lets_it_finish(
             sys.setprofile(profile)
         if steps < at:
             break
-        # If it is interrupted before it starts, the program's exit starts it.
+        # If the shutdown is interrupted before it starts, the program's exit starts it.
         assert lifecycle.left.is_set() or lifecycle.signal_shutdown("atexit")
         assert not lifecycle.deferral.is_active
 
@@ -278,7 +278,7 @@ def test_a_second_signal_at_any_step_of_a_shutdown_lets_it_finish(
 
 
 def test_an_interrupt_of_init_node_is_expected_while_hooks_run(lifecycle: Lifecycle) -> None:
-    """The wait for the master ends at the shutdown request: hooks may run in another thread."""
+    """The wait for the master ends at the shutdown request, because hooks may run in another thread."""
     expected: list[bool] = []
     lifecycle.add_hook(lambda: expected.append(lifecycle.is_interrupt(lifecycle.interrupted("text"))))
     assert not lifecycle.is_interrupt(ROSInterruptException())
@@ -384,7 +384,10 @@ class System:
     def __init__(
         self, watchdog: SignalWatchdog, signalled: float, turn: float, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        """``signalled``: the time of the signal. ``turn``: the duration of an undisturbed wait of the watchdog."""
+        """Create the system.
+
+        ``signalled``: the time of the signal. ``turn``: the duration of the watchdog's undisturbed wait.
+        """
         self.now = 0.0
         self.nudged: list[float] = []
         self._watchdog = watchdog
@@ -424,7 +427,7 @@ class System:
 def test_fifty_milliseconds_for_the_next_call_of_rospy_start_at_the_signal(
     watchdog: SignalWatchdog, monkeypatch: pytest.MonkeyPatch, turn: float
 ) -> None:
-    """Any idle time before does not matter."""
+    """Any idle time before the signal is not counted."""
     system = System(watchdog, 1000.0, turn, monkeypatch)
     system.watch()
     assert system.nudged == [1000.0 + turn * math.ceil(0.05 / turn)]

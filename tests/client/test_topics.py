@@ -1,6 +1,6 @@
 """client/topics beyond rospy: warnings, waiting for subscribers, freshness, and robustness.
 
-tests/referee/cases/topics*.py compare the rest with rospy. Each test is a separate program, since a process has one node.
+tests/referee/cases/topics*.py compare the rest with rospy. Each test is a separate program, because a process has one node.
 """
 
 from __future__ import annotations
@@ -224,7 +224,7 @@ print(eventually(lambda: len(calls) == 6), calls)
 
 
 def test_slow_callback_gets_the_newest_message(start: Start) -> None:
-    """The classic trap: large images, a slow callback, queue_size=1, and the default buff_size."""
+    """This is a common mistake: large images, a slow callback, queue_size=1, and the default buff_size."""
     output, _ = finished(
         start("""
 rospy.init_node("camera")
@@ -244,8 +244,8 @@ assert eventually(lambda: 100 in heard)
 print(len(heard) < 10, heard[-1])
 """)
     )
-    # If all arrived in order, the second would follow the first. Messages in the sockets may still precede the
-    # newest.
+    # If all messages arrived in order, the second would follow the first. Messages in the sockets may still precede
+    # the newest.
     assert output == "True 100\n"
 
 
@@ -395,7 +395,7 @@ print("alone", flush=True)
     output, errors = talker.communicate("go\n", timeout=30)
 
     assert (output, talker.returncode) == ("alone\n", 0)
-    # Python 3.13 shows the line too.
+    # Python 3.13 also prints the source line.
     (warning,) = [text for text in errors.splitlines() if not text.startswith(" ")]
     assert "SyntaxWarning" in warning
 

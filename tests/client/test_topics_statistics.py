@@ -1,4 +1,4 @@
-"""client/statistics: the counts of a window, and its adaptation. Times are arguments, not waited for."""
+"""client/statistics: the counts in a window, and how the window adapts. Times are passed as arguments."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Stamped:
 
 
 def reports(counter: TopicStatisticsCounter, hertz: float, seconds: float) -> list[Report]:
-    """Return the reports on a publisher of ``hertz`` messages a second."""
+    """Return the reports about a publisher of ``hertz`` messages per second."""
     times = [int(number / hertz * SECOND) + SECOND for number in range(int(hertz * seconds) + 1)]
     return [report for now in times if (report := counter.count(String(), TALKER, 7, now))]
 
