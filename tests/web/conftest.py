@@ -1,4 +1,4 @@
-"""A bridge on a loop of the test, and clients with real sockets."""
+"""A bridge on a loop in the test, and clients with real sockets."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = ["FOXGLOVE", "Client", "RosbridgeClient", "Running", "bridge", "patien
 _T = TypeVar("_T")
 FOXGLOVE = Subprotocol("foxglove.websocket.v1")
 
-# A test's client may not read for a long time. Since version 15, websockets sends pings by itself.
+# A test's client may not read for a long time; since version 15, websockets itself sends pings.
 _PATIENT_CLIENT: dict[str, Any] = {"open_timeout": PATIENCE}
 if "ping_interval" in inspect.signature(connect).parameters:
     _PATIENT_CLIENT["ping_interval"] = None
@@ -116,7 +116,7 @@ class Running:
 
 
 class Client:
-    """A client of the Foxglove protocol; received messages are kept by op until a test reads them."""
+    """A client of the Foxglove protocol; received messages are stored by op until a test reads them."""
 
     def __init__(
         self,
@@ -144,11 +144,11 @@ class Client:
         self.socket.send(data)
 
     def next(self, op: str, accepts: Callable[[dict[str, Any]], bool] = lambda _: True) -> dict[str, Any]:
-        """Return the next JSON message of an op."""
+        """Return the next JSON message with this op that ``accepts`` accepts."""
         return self._next(lambda each: isinstance(each, dict) and each["op"] == op and accepts(each))  # type: ignore[return-value]
 
     def next_binary(self, opcode: int) -> bytes:
-        """Return the next binary message of an opcode."""
+        """Return the next binary message with this opcode."""
         return self._next(lambda each: isinstance(each, bytes) and each[0] == opcode)  # type: ignore[return-value]
 
     def channel(self, topic: str) -> int:
@@ -192,7 +192,7 @@ class Client:
 
 
 class RosbridgeClient:
-    """A rosbridge client; received messages are kept until a test reads them. CBOR is decoded by its library."""
+    """A rosbridge client; received messages are stored until a test reads them. The library cbor2 decodes CBOR."""
 
     def __init__(self, port: int, *, path: str = "/", **options: Any) -> None:
         self._stack = contextlib.ExitStack()
@@ -205,7 +205,7 @@ class RosbridgeClient:
         self.socket.send(json.dumps(fields))
 
     def next(self, op: str, **fields: Any) -> dict[str, Any]:
-        """Return the next message of an op with these fields."""
+        """Return the next message with this op and these fields."""
         for number, each in enumerate(self._kept):
             if _has(each, op, fields):
                 return self._kept.pop(number)

@@ -1,4 +1,4 @@
-"""Access control: Host, Origin, tokens; and the names that clients may use."""
+"""Access control: Host, Origin and tokens, and the names that clients may use."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def test_loopback_is_known_by_name_and_address() -> None:
 def test_tokens_are_random_and_have_their_form() -> None:
     made = {new_token() for _ in range(100)}
     assert len(made) == 100
-    # 128 bits in base64.
+    # 22 base64 characters represent 128 bits.
     assert {len(each) for each in made} == {22}
     for token in (*made, "a" * 8, "_-" * 100):
         assert is_token(token) is True

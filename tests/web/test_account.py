@@ -1,4 +1,4 @@
-"""The account of a server's memory: clients' shares, data that several clients wait for, and the order of releasing it."""
+"""The account of a server's memory: clients' shares, data queued for several clients, and the order in which it is released."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from minirospy.web.server.queue import SendQueue
 
 
 class Holder:
-    """A client that releases all its data when requested."""
+    """A client that releases all its memory when requested."""
 
     def __init__(self, account: Account, address: str = "a", *, is_owner: bool = False) -> None:
         self.account = account
@@ -130,7 +130,7 @@ _STEPS = st.lists(
 
 @given(_STEPS)
 def test_account_is_the_sum_of_what_waits(steps: list[tuple[int, str, int]]) -> None:
-    """When a message leaves a queue in any way, its large pieces leave the account."""
+    """Whenever a message leaves a queue, for whatever reason, its large pieces leave the account."""
     account = Account()
     shares = [account.open("a", lambda: None) for _ in range(4)]
     queues = [SendQueue(4 * LARGE_PIECE, share=share) for share in shares]
@@ -187,7 +187,7 @@ def test_shedding_does_not_choose_again_within_itself() -> None:
 
     def shed_first() -> None:
         order.append("first starts")
-        # A response to the client, such as the reason, counts while the account is over its limit.
+        # A response to the client, such as the reason, counts even while the account exceeds its limit.
         first.set(first.size + 1)
         order.append("first ends")
         first.set(0)

@@ -1,4 +1,4 @@
-"""Which connection is closed for a new one: silent, idle and greedy ones, by address and rights."""
+"""Which connection is closed for a new one: silent, idle and greedy connections, by address and rights."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_address_with_too_many_silent_connections_loses_the_oldest() -> None:
     assert choose([*young, *others], rank=Rank.SILENT) is None
     young.append(Seat("a", Rank.SILENT, 0.5))
     assert choose([*others, *young], rank=Rank.SILENT) is young[MAX_SILENT - 1]
-    # Of two such addresses, the one with more connections.
+    # If two addresses have too many of them, the address with more connections is chosen.
     more = [Seat("c", Rank.SILENT, 0.1) for _ in range(MAX_SILENT + 2)]
     assert choose([*young, *more], rank=Rank.SILENT) in more
 
@@ -97,14 +97,14 @@ def test_address_with_more_than_half_gives_way_to_one_with_few() -> None:
     greedy = [Seat("greedy", Rank.WRITE, number / 10) for number in range(9)]
     others = [Seat(f"b{number}", Rank.WRITE, 5.0) for number in range(7)]
     assert choose([*greedy, *others]) is greedy[-1]
-    # An eighth of the connections is not few.
+    # An eighth of the connections is too many to count as few.
     newcomers = [Seat("new", Rank.WRITE, 5.0) for _ in range(2)]
     assert choose([*greedy, *others[:5], *newcomers]) is None
     assert choose([*greedy, *others[:6], newcomers[0]]) is greedy[-1]
     # Half is not more than half.
     assert choose([*greedy[:8], *others, Seat("c", Rank.WRITE, 0.0)]) is None
     assert choose([*greedy, *others], rank=Rank.READ) is None
-    # The owner's address is also that of its programs.
+    # The owner's programs have the same address.
     owners = [Seat("greedy", Rank.OWN, 1.0) for _ in range(20)]
     assert choose([*owners, *others], rank=Rank.WRITE) is None
     assert choose([*owners, greedy[3], *others], rank=Rank.WRITE) is greedy[3]

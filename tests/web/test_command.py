@@ -107,7 +107,7 @@ def test_listening_bridge_requires_the_token_that_it_prints(
         assert found
         client = Client(port, path=f"/?token={found[1]}")
         assert "clientPublish" not in client.next("serverInfo")["capabilities"]
-        # The tokens are in a file of this user, from which --status reads them.
+        # The tokens are in a file that belongs to this user, from which --status reads them.
         assert command.main(["--status", "--port", str(port)]) == 0
         out = capsys.readouterr().out
         assert "127.0.0.1 (foxglove, read-only," in out

@@ -1,4 +1,4 @@
-"""The rate limit of new connections, with a clock that the test controls."""
+"""The rate limit for new connections, with a clock that the test controls."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The lines of the bridge on /diagnostics: one for each client, a warning while messages are dropped."""
+"""The bridge's entries on /diagnostics: one for each client, with a warning while messages are dropped."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_diagnostics_name_clients_and_warn_of_drops(
         finally:
             publishing.cancel()
 
-    # The client does not read any more.
+    # The client does not read any more data.
     warned = bridge.run(overflow())
     assert "messages dropped in a second" in warned.message
     counts = {each.key: int(each.value) for each in warned.values}

@@ -1,4 +1,4 @@
-"""Parameter changes of which the master notifies the bridge, as clients receive them."""
+"""Parameter changes that the master reports to the bridge, as clients receive them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Graph:
         self.spawned.append(work)
 
     def change(self, name: str, value: object) -> None:
-        """Notify of a change, and finish the tasks that follow from it."""
+        """Report a change, and finish the tasks that it starts."""
 
         async def finish() -> None:
             for listener in list(self.node.parameters.listeners):

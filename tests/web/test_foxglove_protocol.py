@@ -1,4 +1,4 @@
-"""Frames of the Foxglove protocol as in its specification, and refused frames."""
+"""Frames of the Foxglove protocol, compared with its specification, and refused frames."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 def text_of(frame: bytes) -> tuple[int, str]:
-    """Return the subscription and the string of a message with a std_msgs/String."""
+    """Return the subscription and the string in a message that contains a std_msgs/String."""
     opcode, subscription, _ = struct.unpack_from("<BIQ", frame)
     assert opcode == 1
     (length,) = struct.unpack_from("<I", frame, 13)
@@ -199,7 +199,7 @@ def test_type_that_is_not_installed_is_read_from_its_publisher(bridge: Running) 
 
 
 def test_definition_that_differs_replaces_the_channel(bridge: Running) -> None:
-    """This publisher's definition differs from the installed std_msgs/String."""
+    """The publisher's definition differs from the installed std_msgs/String."""
     made = raw_class(InterfaceType("std_msgs/String", "1" * 32, "int32 x\n"))
     publisher = bridge.publisher(bridge.node("odd"), "/odd", made, latch=True)
     bridge.call(lambda: publisher.publish_raw(struct.pack("<i", 5)))
@@ -416,7 +416,7 @@ def test_simulated_time_is_sent_and_stamps_messages(master: str, run_bridge: Cal
 
 
 def test_restarted_publisher_is_connected_again(bridge: Running) -> None:
-    """The restart is between two refreshes of the graph: the client keeps its subscription."""
+    """The restart occurs between two refreshes of the graph, and the client keeps its subscription."""
     node = bridge.node("talker")
     publisher = bridge.publisher(node, "/chatter", String, latch=True)
     bridge.run(publisher.publish("first"))

@@ -1,4 +1,4 @@
-"""Texts of clients: their memory; JSON with limits, and the incremental parser compared with the library's."""
+"""Strings from clients: their memory use, JSON with limits, and the incremental parser compared with the library's."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ALPHABET = '[]{}",:01.e-+ \n\\atrufalsn'
 
 
 def outcome(load: Any, text: str) -> str:
-    """Return a parser's result: the value's repr, which also compares NaN, or that it is refused."""
+    """Return a parser's result: the value's repr, which also compares NaN, or the fact that the string was refused."""
     try:
         return repr(load(text))
     except (ValueError, RecursionError):
@@ -148,7 +148,7 @@ def slow_width(text: str) -> int:
 def test_width_and_size_are_those_of_memory(part: str, times: int) -> None:
     text = part * times
     assert width_of(text) == slow_width(text)
-    # Not the test's own string, which may cache a copy in UTF-8.
+    # Do not use the test's own string, which may have a cached copy in UTF-8.
     made = "".join(text)
     assert size_in_memory(text.encode(errors="surrogatepass")) == slow_width(made) * len(made)
 
@@ -166,7 +166,7 @@ def test_one_wide_character_makes_a_text_four_times_as_large() -> None:
     [(",", 4_000_000, "values"), ("[", 1_000_000, "values"), ("{", 1_000_000, "values")],
 )
 def test_values_lists_and_objects_are_limited(mark: str, most: int, what: str) -> None:
-    """Marks within strings count, too: such a text is parsed quickly."""
+    """Brackets and commas inside strings count too, because such text is parsed quickly."""
     text = f'"{mark * most}"'
     assert load_json(text) == mark * most
     with pytest.raises(ValueError, match=f"more than {most} {what}"):
@@ -174,7 +174,7 @@ def test_values_lists_and_objects_are_limited(mark: str, most: int, what: str) -
 
 
 def test_strings_are_limited() -> None:
-    """Each takes more memory than a number: names of fields count as well."""
+    """Each string takes more memory than a number; names of fields count as well."""
     text = "[0" + ',""' * 1_999_999
     assert load_json(f'{text},""]') == [0] + [""] * 2_000_000
     with pytest.raises(ValueError, match="more than 2000000 strings"):
@@ -229,7 +229,7 @@ def test_large_value_becomes_a_text_in_pieces(value: object, monkeypatch: pytest
 
     monkeypatch.setattr(json_text, "dump_json", dump)
     assert dump_json_in_pieces(value) == expected
-    # 65,536 characters, each of which may become a pair of escapes.
+    # The piece has 65,536 characters, each of which may become a pair of escapes.
     assert longest <= 12 * 65_536
     assert len(expected) < 13 * 65_536 or longest < len(expected) / 2
 

@@ -1,4 +1,4 @@
-"""The memory of a bridge's process under attack, from /proc, so only on Linux. The tests measure no times."""
+"""The memory of a bridge's process under attack, read from /proc, so only on Linux. The tests measure no times."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from pathlib import Path
 import pytest
 from websockets.frames import Opcode
 
-MAX_PEAK = 400_000_000  # bytes of the process, with Python and all libraries
+MAX_PEAK = 400_000_000  # maximum bytes of the process, with Python and all libraries
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="by /proc")
 
 
 class Attacked:
-    """A bridge as a process, and clients of it that do not read."""
+    """A bridge as a process, and its clients, which do not read."""
 
     def __init__(self, stack: contextlib.ExitStack) -> None:
         self._stack = stack
@@ -73,14 +73,14 @@ class Attacked:
         return self.client(self.rosbridge_port)
 
     def synchronize(self) -> None:
-        """Return when the bridge has handled what has reached it."""
+        """Return when the bridge has handled everything that has reached it."""
         sock = self.rosbridge()
         for number in range(20):
             sock.sendall(frame(b'{"op": "jump", "id": "%d"}' % number))
             assert sock.recv(4096)
 
     def side_by_side(self, count: int, work: Callable[[], object]) -> None:
-        """Run ``work`` in ``count`` threads in parallel, one for each client; a client that is disconnected stops."""
+        """Run ``work`` in ``count`` parallel threads, one for each client; a client that is disconnected stops."""
 
         def run() -> None:
             with contextlib.suppress(OSError):
@@ -124,7 +124,7 @@ def meshes(attacked: Attacked) -> None:
 
 
 def fragments(attacked: Attacked) -> None:
-    """Twenty clients send fragments of wide characters whose messages are never complete."""
+    """Twenty clients send fragments with wide characters, whose messages are never complete."""
     data = "\U0001f600" + "a" * 250_000
 
     def send() -> None:
@@ -136,7 +136,7 @@ def fragments(attacked: Attacked) -> None:
 
 
 def half_messages(attacked: Attacked) -> None:
-    """Eight clients send most of a message of 60 MB."""
+    """Eight clients send most of a 60 MB message each."""
     data = frame(bytes(55_000_000), Opcode.BINARY, announced=60_000_000)
     attacked.side_by_side(8, lambda: attacked.foxglove().sendall(data))
 
@@ -170,7 +170,7 @@ def calls(attacked: Attacked) -> None:
 
 
 def many_values(attacked: Attacked) -> None:
-    """Send texts that have as many values as are allowed, and one that has too many strings, at the same time."""
+    """Send text with the maximum number of values and, at the same time, text with too many strings."""
     numbers = frame(b'{"op": "publish", "topic": "/x", "msg": {"a": [0' + b",1.5" * 3_990_000 + b"]}}")
     strings = frame(b'{"op": "publish", "topic": "/x", "msg": {"a": [0' + b',"ab"' * 1_990_000 + b"]}}")
     more = frame(b'{"op": "publish", "topic": "/x", "msg": {"a": [0' + b',"ab"' * 3_990_000 + b"]}}")

@@ -1,4 +1,4 @@
-"""The owners of sockets on this machine, by a query and by the table of all sockets."""
+"""The owners of sockets on this machine, found by querying the kernel and by reading the table of all sockets."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_owner_of_a_socket_is_known_in_each_state(
             own, other = (peer[0], peer[1]), (here[0], here[1])
             assert owner_of(own, other) == os.getuid()
             assert is_own_user(own, other)
-            # Its state is FIN_WAIT now, and it still reads.
+            # The client's state is now FIN_WAIT, and it still reads.
             client.shutdown(socket.SHUT_WR)
             assert accepted.recv(1) == b""
             assert owner_of(own, other) == os.getuid()
@@ -58,7 +58,7 @@ def test_owner_of_a_socket_is_known_in_each_state(
             assert owner_of(own, ("127.0.0.7", other[1])) is None
             assert owner_of(("?", own[1]), other) is None
             assert owner_of(own, ("::2" if "." in own[0] else "127.0.0.1", other[1])) is None
-            # A server listens at this endpoint, but has no such connection.
+            # A server listens on this endpoint, but has no such connection.
             assert owner_of(other, ("127.0.0.7" if "." in own[0] else "::2", own[1])) is None
             # The kernel lists a socket that no process has open as root's.
             client.close()

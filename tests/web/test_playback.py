@@ -22,7 +22,7 @@ PLAYING, PAUSED, ENDED = 0, 1, 3
 
 @pytest.fixture
 def player(master: str, tmp_path: Path) -> Iterator[Client]:
-    """Return a client of a player of 100 s with a message each second, paused at its start."""
+    """Return a client of a player for a bag of 100 s with a message per second; the player is paused at the start."""
     name = make_bag(tmp_path / "a.bag", [("/a", number, f"message {number}") for number in range(101)])
     command = [
         sys.executable,
@@ -58,7 +58,7 @@ def player(master: str, tmp_path: Path) -> Iterator[Client]:
 def control(
     client: Client, command: int, speed: float, seek: int | None, request: bytes
 ) -> tuple[int, int, float, int]:
-    """Return the player's state in its response: status, time, speed, whether it seeked."""
+    """Return the player's state in its response: status, time, speed, and whether it has seeked."""
     client.send_binary(
         struct.pack("<BBfBQI", 3, command, speed, seek is not None, seek or 0, len(request)) + request
     )
@@ -95,7 +95,7 @@ def test_front_end_controls_the_player(player: Client) -> None:
     while player.next_binary(5)[1] != ENDED:
         pass
 
-    # At the end, seek back at another rate.
+    # At the end of the bag, seek back and change the rate.
     status, time, _, _ = control(player, 0, 20.0, START + 98 * SECOND, b"back")
     assert status == PLAYING
     assert [text_of(player.next_binary(1))[1] for _ in range(3)] == [

@@ -1,4 +1,4 @@
-"""The services of rosapi, and tf2_web_republisher: pure parts, and real calls through a bridge."""
+"""rosapi's services, and tf2_web_republisher: pure parts, and real calls through a bridge."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_pair_is_sent_if_it_moved_enough() -> None:
 
 
 class RefusedCall(Exception):
-    """A call whose response is an error."""
+    """The response to a call is an error."""
 
 
 @pytest.fixture

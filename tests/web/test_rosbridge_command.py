@@ -24,7 +24,7 @@ Start = Callable[..., None]
 
 @pytest.fixture
 def start(master: str) -> Iterator[Start]:
-    """Return a function that starts a command and waits for a line that contains a text."""
+    """Return a function that starts a command and waits for a line that contains a given string."""
     started: list[subprocess.Popen[str]] = []
 
     def starting(text: str, *words: str) -> None:

@@ -1,4 +1,4 @@
-"""The pure half of rosbridge: conversations of its protocol document, conversions, fragments, and refusals."""
+"""The pure part of rosbridge: the conversations in its protocol document, conversions, fragments, and refusals."""
 
 from __future__ import annotations
 
@@ -437,7 +437,7 @@ def test_messages_that_wait_share_the_room_of_their_client() -> None:
         assert not one.arrived(bytes(3000), 0.1)
     assert (one.dropped, other.dropped) == (3, 0)
     assert not other.arrived(bytes(6000), 0.1)
-    # The newest message of a topic is kept in any case.
+    # A topic's newest message is kept in any case.
     assert other.dropped == 0
     assert not other.arrived(bytes(1), 0.1)
     assert (other.dropped, budget.taken <= 10_000) == (1, True)
@@ -474,7 +474,7 @@ def test_fragments_that_wait_are_bounded() -> None:
         assert waiting.add(piece, 30.0) is None
     with pytest.raises(OperationError, match="too many"):
         waiting.add(protocol.Fragment("big", "x" * 10_000_000, 6, 9), 30.0)
-    # This includes fragments without a string.
+    # The limit includes fragments without text.
     with pytest.raises(OperationError, match="too many"):
         deque((waiting.add(protocol.Fragment(number, "", 0, 2), 40.0) for number in range(100_000)), 0)
 
@@ -502,7 +502,7 @@ def test_one_wide_character_in_fragments_does_not_make_a_message_four_times_as_l
     with pytest.raises(OperationError, match="message i is too large: 64000000 bytes of memory are allowed"):
         waiting.add(protocol.Fragment("i", "x" * 8_000_000, 2, 3), 0.0)
     assert waiting.size == 0
-    # Without it there is room.
+    # Without the discarded message there is enough space.
     waiting.add(protocol.Fragment("i", "x" * 8_000_000, 0, 2), 0.0)
     joined = waiting.add(protocol.Fragment("i", "x" * 8_000_000, 1, 2), 0.0)
     assert joined
@@ -575,7 +575,7 @@ def test_message_is_encoded_as_by_the_real_server(name: str) -> None:
         message.header.seq = recorded["none"]["msg"]["header"]["seq"]  # rospy sets the sequence number
     assert json.loads(json.dumps(conversion.values(message))) == recorded["none"]["msg"]
     if "cbor" not in recorded:
-        # The real server fails for arrays of fixed length.
+        # The real server fails on arrays of fixed length.
         assert name == "camera"
         return
     found = cbor2.loads(cbor2.dumps(conversion.cbor_values(message)))

@@ -49,7 +49,7 @@ def latched(bridge: Running, topic: str, message: Any) -> Node:
 def received(
     bridge: Running, node: Node, topic: str, class_: type, count: int = 1
 ) -> Callable[[], list[Any]]:
-    """Subscribe; return a function that waits for the messages."""
+    """Subscribe to a topic; return a function that waits for the messages."""
 
     async def subscribe() -> Any:
         return await node.subscribe(topic, class_, queue_size=100)
@@ -150,7 +150,7 @@ def test_no_client_waits_for_the_large_message_of_another(bridge: Running) -> No
             client.send(op="unsubscribe", topic=1, id="behind")
             other = bridge.rosbridge()
             other.synchronize()
-            # The message counts as unfinished, and the data after it is not read.
+            # The message counts as unfinished, so the data after it is not read.
             listener = bridge.bridge.listeners["rosbridge"]
             wait_until(lambda: max(each.unfinished for each in listener.connections) > 300_000)
         finally:
@@ -305,7 +305,7 @@ def test_client_without_rights_sends_nothing_large(run_bridge: Callable[..., Run
         client = bridge.rosbridge(path=f"/?token={opening}")
         client.socket.send(cbor2.dumps({"op": "subscribe", "topic": "/a", "more": [0] * 9000}))
         assert "bytes of CBOR is too large: this token is read-only" in client.next("status")["msg"]
-        # Nor with a token in parts.
+        # A token in parts is not accepted, either.
         client = bridge.rosbridge(path=f"/?token={opening}")
         text = json.dumps({"op": "subscribe", "topic": "/a", "more": [0] * 25_000})
         for at, half in enumerate((text[:40_000], text[40_000:])):
@@ -389,7 +389,7 @@ def test_throttled_client_gets_the_newest_message(bridge: Running) -> None:
     found = [client.next("publish")["msg"]["data"]]
     while found[-1] != 19:
         found.append(client.next("publish")["msg"]["data"])
-    # On a machine that stalls, some messages in between arrive in time.
+    # On a machine that stalls, some of the messages in between may arrive in time.
     assert found[0] == 0
     assert found == sorted(found)
     assert len(found) <= 1 + (time.monotonic() - start_time) / 0.3
@@ -454,7 +454,7 @@ def test_unadvertised_topic_lasts_for_the_timeout(run_bridge: Callable[..., Runn
             {"op": "subscribe", "topic": "/x", "type": "nowhere_msgs/Thing"},
             "subscribe: Unable to load the manifest for package nowhere_msgs. Caused by: nowhere_msgs",
         ),
-        # Modules without a spec, and modules that are not packages.
+        # These are modules without a spec, and modules that are not packages.
         *(
             (
                 {"op": op, "topic": "/x", "service": "/x", "type": f"{module}/Thing"},
@@ -508,7 +508,7 @@ def test_unadvertised_topic_lasts_for_the_timeout(run_bridge: Callable[..., Runn
 def test_refused_operation_gets_one_status(bridge: Running, fields: dict[str, Any], text: str) -> None:
     latched(bridge, "/taken", String("x"))
     client = bridge.rosbridge()
-    # The server has refreshed the graph.
+    # By now the server has refreshed the graph.
     client.send(op="subscribe", topic="/taken")
     client.next("publish")
     client.send(**{"id": "it", **fields})
@@ -736,7 +736,7 @@ def test_clients_are_published_as_by_rosbridge_server(bridge: Running) -> None:
 
 
 def test_operation_of_a_client_that_has_left_is_never_started(bridge: Running) -> None:
-    """The client disconnects in the loop iteration in which its message arrived."""
+    """The client disconnects in the same loop iteration in which its message arrives."""
 
     def leave() -> None:
         client = Mock(may_write=True)

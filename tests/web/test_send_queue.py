@@ -1,4 +1,4 @@
-"""The queue of a slow client: bounded, drops a topic's oldest message first, always has the newest."""
+"""The queue for a slow client: limited, drops a topic's oldest message first, and always has the newest."""
 
 from __future__ import annotations
 

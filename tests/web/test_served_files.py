@@ -1,4 +1,4 @@
-"""Files that are sent in pieces: all of their bytes, one piece in memory, and failures."""
+"""Files that are sent in pieces: all bytes arrive, only one piece is in memory, and failures are reported."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def answer_of(file: BinaryIO, size: int) -> FileAnswer:
 
 
 def sent(answer: FileAnswer) -> tuple[list[bytes], FileSender]:
-    """Return the pieces of a file for a client that accepts each immediately."""
+    """Return a file's pieces for a client that accepts each piece immediately."""
 
     async def run() -> tuple[list[bytes], FileSender]:
         ready = asyncio.Event()

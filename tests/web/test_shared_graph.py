@@ -1,4 +1,4 @@
-"""The ROS side that clients share: subscriptions that end while they start, and services that end while a call waits."""
+"""The ROS side that clients share: subscriptions that end while they start, and services that end during a call."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running,
         for _ in range(turns):
             await asyncio.sleep(0)
         publication.close()
-        # Raise the exceptions of the tasks.
+        # Raise the tasks' exceptions.
         await asyncio.wait_for(asyncio.gather(*graph._tasks), 30)
         assert "/short" not in graph.node._published
 
@@ -72,7 +72,7 @@ def test_service_whose_node_answers_late_is_offered(bridge: Running) -> None:
                 sock, _ = server.accept()
                 with sock:
                     may_answer.wait()
-                    # The probe may have given up: then there is another.
+                    # The probe may have timed out: then there is another one.
                     with contextlib.suppress(OSError):
                         sock.sendall(serialize_header(fields))
                         sock.recv(4096)
@@ -129,7 +129,7 @@ def test_earlier_look_does_not_replace_the_snapshot_of_a_later_one(
 
 @pytest.mark.parametrize("turns", range(6))
 def test_graph_that_is_closed_as_it_is_to_look_again_ends(bridge: Running, turns: int) -> None:
-    """asyncio.wait_for before Python 3.12 swallows the cancellation if the event arrives in the same iteration."""
+    """Before Python 3.12, asyncio.wait_for swallows the cancellation if the event arrives in the same iteration."""
 
     async def look_and_close() -> None:
         graph = SharedGraph(bridge.bridge.node, max_refresh_interval=60.0)

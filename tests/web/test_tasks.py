@@ -1,4 +1,4 @@
-"""Long-running tasks of the bridges: an unexpected exception is reported in one line, and the task continues."""
+"""The bridges' long-running tasks: an unexpected exception is reported in one line, and the task continues."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ LIMIT = 60.0
 
 
 class Failing:
-    """A function that raises an unexpected exception at the calls with these numbers, and sets an event at its last call."""
+    """A function that raises an unexpected exception in the calls with these numbers, and sets an event in its last call."""
 
     def __init__(self, fails_at: set[int], calls: int, returns: object = None) -> None:
         self._fails_at = fails_at
@@ -193,7 +193,7 @@ def test_robot_that_cannot_be_shown_does_not_affect_others(
         made.contents.robots = lambda _lost=(): robots  # type: ignore[method-assign]
         await made._reconcile()
         assert shown == ["b"]
-        # It is retried without a new token.
+        # The request is retried without a new token.
         fails = False
         await until(lambda: "a" in shown)
         await made.close()

@@ -1,4 +1,4 @@
-"""The tokens of a user, in a file that only this user reads."""
+"""A user's tokens, in a file that only this user can read."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_tokens_are_kept_private_and_renewed(tmp_path: Path) -> None:
     (file,) = tmp_path.iterdir()
     if sys.platform != "win32":
         assert file.stat().st_mode & 0o077 == 0
-        # Others may have read the file, or own it.
+        # Other users may have read the file, or own it.
         file.chmod(0o644)
         assert read_tokens(tmp_path) is None
         first = kept_tokens(tmp_path)

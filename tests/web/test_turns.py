@@ -1,4 +1,4 @@
-"""How the clients of a server share its event loop: the order of their work, with a clock that the test controls."""
+"""How a server's clients share its event loop: the order of their work, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Machine:
-    """A clock, the iterations of a loop, and clients whose work takes time."""
+    """A clock, a loop's iterations, and clients whose work takes time."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -42,7 +42,7 @@ class Machine:
         return self.turns.start(self.shares[name])
 
     def iterate(self) -> list[str]:
-        """Run a loop iteration; return the clients whose work was done, in order."""
+        """Run a loop iteration; return the clients whose work ran, in order."""
         before = len(self.done)
         ready, self.soon[:] = list(self.soon), []
         for function in ready:
@@ -204,7 +204,10 @@ def test_client_is_not_charged_while_other_processes_run() -> None:
 
 
 def test_interactive_client_goes_before_clients_whose_work_is_never_done() -> None:
-    """It goes first even if it uses more than an equal share of the time: its requests take longer than a slice."""
+    """The interactive client goes first even if it uses more than an equal share of the time.
+
+    Its requests take longer than a slice.
+    """
     machine = Machine()
     machine.join("good", 0.003)
     for number in range(250):
@@ -218,7 +221,7 @@ def test_interactive_client_goes_before_clients_whose_work_is_never_done() -> No
         before = len(machine.done)
         while "good" not in machine.done[before:]:
             machine.iterate()
-        # It waits for the rest of the bulk clients' slices, not for a slice of each.
+        # The client waits for the rest of the bulk clients' slices, not for a slice of each.
         assert machine.done[before:].index("good") <= 12
         machine.iterate()
 
@@ -253,7 +256,7 @@ def test_bulk_client_becomes_interactive_after_a_short_burst() -> None:
         machine.iterate()
     for _ in range(20):
         machine.iterate()
-    # Its burst was longer than ten slices: it waits like the other client, then no more.
+    # The client's burst was longer than ten slices, so it waits like the other client, and after that no longer.
     waits = []
     for _ in range(2):
         machine.send("a", 1)
@@ -279,5 +282,5 @@ def test_new_clients_start_at_the_same_tag_if_none_waits() -> None:
     machine.done.clear()
     while machine.left["busy"]:
         machine.iterate()
-    # The client that needs less goes first: its use before it was idle does not count.
+    # The client that needs less goes first: the time that it used before it was idle does not count.
     assert machine.done[:2] == ["good", "idle"]

@@ -1,4 +1,4 @@
-"""Images over HTTP by web_video_server's URLs: the encodings, and streams with real sockets."""
+"""Images over HTTP with web_video_server's URLs: the encodings, and streams with real sockets."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait longer for an image than a machine may stall."""
+    """Let requests wait longer for an image than a machine may stall."""
     monkeypatch.setattr("minirospy.web.video.pages._SNAPSHOT_SECONDS", 60.0)
 
 
@@ -275,7 +275,7 @@ def test_hidden_topic_is_not_shown(run_bridge: Callable[..., Running]) -> None:
 
 @pytest.mark.parametrize("path", ["/stream", "/snapshot"])
 def test_client_that_leaves_early_leaves_no_subscription(camera: Running, path: str) -> None:
-    """It disconnects during a refresh of the graph."""
+    """The client disconnects during a refresh of the graph."""
     bridge = camera.bridge
     request = SimpleNamespace(query={"topic": "/camera/image"})
     exchange: Any = Mock(request=request, is_open=False)

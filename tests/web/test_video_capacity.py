@@ -1,4 +1,4 @@
-"""The limit of images that are processed at the same time, and the number of pixels in a message."""
+"""The limit on images that are processed at the same time, and the number of pixels in a message."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_work_that_does_not_fit_waits_in_order() -> None:
 
         tasks = [asyncio.ensure_future(work(*each)) for each in (("a", 6), ("b", 5), ("c", 1), ("d", 99))]
         await asyncio.sleep(0)
-        # c would fit, but comes after b.
+        # c would be within the limit, but comes after b.
         assert (done, capacity.taken_units) == (["a"], 6)
         events["a"].set()
         await tasks[0]
@@ -60,7 +60,7 @@ def test_cancelled_work_gives_its_turn_back(has_turn: bool) -> None:
             await asyncio.sleep(0)
             if not has_turn:
                 first.cancel()
-        # At the end of the block, it is the turn of the first one, which has not run yet.
+        # At the end of the block, the first one is next, but it has not run yet.
         first.cancel()
         await asyncio.wait([first, second])
         assert first.cancelled()

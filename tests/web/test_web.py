@@ -184,7 +184,7 @@ def test_fragments_of_a_message_are_joined(bridge: Running) -> None:
 
 
 def fragment(length: int, *, starts: bool = False) -> bytes:
-    """Return a frame that is a part of a binary message, but not the last one."""
+    """Return a frame that is a part of a binary message, but not the last part."""
     return (
         bytes([Opcode.BINARY if starts else Opcode.CONT, 0xFE])
         + length.to_bytes(2, "big")
@@ -227,7 +227,7 @@ def test_client_that_answers_pings_stays_connected(run_bridge: Callable[..., Run
     client.next("serverInfo")
     client.socket.ping().wait(30)
     (connection,) = bridge.bridge.listeners["foxglove"].connections
-    # It sends nothing without a request from now on.
+    # From now on, the connection sends nothing without a request.
     liveness = connection._liveness
     heard = liveness.received
     wait_until(lambda: liveness.received > heard)
@@ -244,7 +244,7 @@ def test_clients_that_answer_no_ping_are_disconnected(run_bridge: Callable[..., 
 
 @pytest.fixture
 def strangers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make the listeners treat a test's clients as those of another user."""
+    """Make the listeners treat the test's clients as clients of another user."""
     monkeypatch.setattr("minirospy.web.server.listener.is_own_user", lambda peer, here: False)
 
 
@@ -252,7 +252,7 @@ def strangers(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_connections_beyond_the_limit_are_refused(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(limits=Limits(connections=10, reserve=10, handshake_seconds=1000.0))
     first = bridge.client()
-    # The number of connections that an address may have without a request.
+    # This is the number of connections that an address may have without a request.
     held = [bridge.client().socket.socket for _ in range(3)]
     held += [socket.create_connection(("127.0.0.1", bridge.port), 30) for _ in range(16)]
     for _ in range(200):
@@ -313,7 +313,7 @@ def test_thousand_connections_leave_the_first_ones_unaffected(
 
 
 def idle_clients(bridge: Running, count: int) -> list[socket.socket]:
-    """Return clients that have been served, and are idle."""
+    """Return clients that have been served and are idle."""
     socks = []
     for _ in range(count):
         socks.append(socket.create_connection(("127.0.0.1", bridge.port), 30))
@@ -339,7 +339,7 @@ def test_idle_clients_do_not_block_new_ones(run_bridge: Callable[..., Running]) 
                 each.active -= 60.0 - number
 
         bridge.call(age)
-        # The longest idle client is closed, with a message that says so.
+        # The client that has been idle longest is closed, with a message that says why.
         assert_alive(bridge.client())
         assert (1013).to_bytes(2, "big") + b"another client needs the place" in read_all(idle[0])
         assert bridge.call(lambda: len(listener.connections)) == 20
@@ -365,7 +365,7 @@ def test_owner_is_admitted_if_others_occupy_all_connections(run_bridge: Callable
         for owner in owners:
             assert_alive(owner)
         assert bridge.call(lambda: {each.rank for each in listener.connections}) == {Rank.OWN}
-        # They do not displace each other.
+        # These clients do not displace each other.
         with pytest.raises(InvalidStatus, match="503"):
             bridge.client(path="/?token=right-token-000")
 
@@ -379,7 +379,7 @@ def test_programs_of_the_same_user_get_in_and_stay(
     own: set[int] = set()
 
     def is_own_user(peer: tuple[str, int], here: tuple[str, int]) -> bool:
-        # As in the kernel's table, in which one user owns all clients of this test.
+        # In the kernel's table, one user owns all clients of this test.
         return owners.is_own_user(peer, here) and peer[1] in own
 
     monkeypatch.setattr("minirospy.web.server.listener.is_own_user", is_own_user)
@@ -398,7 +398,7 @@ def test_programs_of_the_same_user_get_in_and_stay(
             mine.connect(("127.0.0.1", bridge.port))
             mine.sendall(HANDSHAKE.encode())
             assert mine.recv(12) == b"HTTP/1.1 101"
-            # For any idle time, no stranger displaces it.
+            # However long it is idle, no other user's client displaces it.
             bridge.call(lambda: setattr(listener, "rate", ConnectionRate(1000, 1000, time.monotonic)))
 
             def age() -> None:
@@ -423,7 +423,7 @@ def test_connections_that_send_nothing_are_closed(run_bridge: Callable[..., Runn
 
 
 def test_connection_that_a_browser_opened_in_advance_outlives_its_use() -> None:
-    # Chromium's net::kUnusedIdleSocketTimeout; a busy machine adds to it.
+    # This is Chromium's net::kUnusedIdleSocketTimeout; a busy machine needs more.
     assert Limits().handshake_seconds >= 2 * 10
 
 
@@ -488,7 +488,7 @@ def test_message_rate_is_held_back_and_nothing_is_lost(run_bridge: Callable[...,
 
 
 class Turns:
-    """A loop whose iterations the test runs."""
+    """A loop whose iterations are run by the test."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -534,7 +534,7 @@ def test_messages_that_take_long_are_handled_in_turns() -> None:
     connection.received(frames[:500])
     assert 1 <= len(handled) <= 3
     pipe.pause.assert_called()
-    # Data in transit follows the queued data.
+    # Data received from now on follows the queued data.
     connection.received(frames[500:])
     assert len(handled) <= 3
     while len(handled) < len(texts):
@@ -557,7 +557,7 @@ EMPTY_FRAMES = {
 def connected(
     limits: Limits, seconds_of_frame: float, grant: Grant = Grant.READ, account: Account | None = None
 ) -> tuple[Turns, Connection, Mock]:
-    """Return a loop, a connection after its handshake, and its pipe; each frame advances the loop's clock by some seconds."""
+    """Return a loop, a connection after its handshake, and its pipe. Each frame advances the loop's clock by some seconds."""
     loop, pipe = Turns(), Mock(is_full=False, unsent=0, endpoints=Endpoints(1, "127.0.0.1", 2))
     site = Mock(limits=limits, turns=FairTurns(loop.call_soon, loop.time), account=account or Mock())
     site.check.return_value = grant
@@ -589,7 +589,7 @@ def test_frames_of_any_kind_are_handled_in_turns(kind: str) -> None:
     while loop.frames < 10_000:
         before = loop.frames
         loop.iterate()
-        # In one iteration: 4 ms of 10 us each, and one more slice.
+        # One iteration handles 4 ms of frames that take 10 us each, and one more slice.
         assert before < loop.frames <= before + 411
     loop.iterate()
     pipe.resume.assert_called()
@@ -634,14 +634,14 @@ def test_work_for_a_client_is_done_in_its_turn_and_bounded() -> None:
         done.append(number)
         loop.now += 0.01
 
-    # The first one is done immediately, which uses up the allowance.
+    # The first piece of work is done immediately, which uses up the allowance.
     for number in range(8):
         connection.in_turn(partial(work, number), bytes(300))
     assert done == [0]
     assert connection.queue.dropped == 4
     loop.iterate()
     assert done == [0, 5]
-    # Also while the client has sent its maximum, and before the data that it has sent.
+    # Responses are also sent while the client has used up its quota, and before the data that it has sent is handled.
     connection.received(EMPTY_FRAMES["pongs"])
     for _ in range(3):
         loop.iterate()
@@ -676,7 +676,7 @@ def test_messages_that_wait_for_their_turn_are_in_the_account_of_memory() -> Non
     assert done == [0, 1, 2]
     assert account.total == 0
 
-    # Beyond the limit they are dropped, like queued messages.
+    # Beyond the limit the jobs are dropped, like queued messages.
     loop.now += 1.0
     for number in range(3, 7):
         connection.in_turn(partial(work, number), bytes(400_000))
@@ -759,7 +759,7 @@ def test_client_that_reads_no_pongs_leaves_the_newest_waiting() -> None:
 
 
 def test_clients_are_pinged_before_they_are_disconnected() -> None:
-    """As after a suspend: the last bytes are old, and no ping has been sent since."""
+    """After the machine was suspended, the last data is old, although no ping has been sent since."""
     loop, pipe = Turns(), Mock(is_full=False, endpoints=Endpoints(1, "127.0.0.1", 2))
     site = Mock(limits=Limits(), turns=FairTurns(loop.call_soon, loop.time))
     site.check.return_value = Grant.READ
@@ -809,7 +809,7 @@ def test_stuck_client_among_ten_loses_its_own_messages_alone(run_bridge: Callabl
     assert [each["dropped"] for each in states[:9]] == [0] * 9
     assert states[9]["dropped"] > 0
 
-    # It reads again, and receives the newest message of both topics.
+    # The client reads again, and receives the newest message on both topics.
     last = b""
     while b"99" not in last[13:]:
         last = stuck.next_binary(1)

@@ -1,4 +1,4 @@
-"""The WebSocket protocol of one client, liveness and deferred work: bytes, times and calls as input, without sockets."""
+"""The WebSocket protocol of one client, its liveness and deferred work: bytes, times and calls in, without sockets."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def image_body(level: int) -> bytes:
 
 
 def make_bag(path: Path, seconds: int = 20, *, hostile: str = "") -> Path:
-    """Write ten strings a second on /chatter, two images a second on /camera, one latched string on /map."""
+    """Write a bag with ten strings per second on /chatter, two images per second on /camera, and one latched string on /map."""
     with path.open("wb") as stream:
         writer = BagWriter(stream)
         described = {"type": String._type, "md5sum": String._md5sum, "message_definition": String._full_text}

@@ -1,4 +1,4 @@
-"""A dashboard on a loop of the test, and requests with real sockets."""
+"""A dashboard on a loop in the test, and requests with real sockets."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TOKEN = "owner-token-0"
 
 
 class Served:
-    """A running dashboard, and other nodes of the same graph."""
+    """A running dashboard, and other nodes in the same graph."""
 
     def __init__(self, options: BridgeOptions) -> None:
         self._loop = LoopThread("test-dashboard")

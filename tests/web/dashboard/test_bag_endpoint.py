@@ -47,7 +47,7 @@ class Client:
         self.socket.send(json.dumps({"op": op, **fields}))
 
     def next(self, name: str, accepts: Callable[[Any], bool] = lambda _: True) -> Any:
-        """Return the next value of this name that is accepted."""
+        """Return the next value with this name that ``accepts`` accepts."""
         while True:
             data = self.socket.recv(timeout=60)
             if isinstance(data, bytes):
@@ -190,7 +190,7 @@ def test_nothing_is_published_until_that_is_switched_on(
     assert (chatter, map_) == ([], [])
     page.send("publish", topics=["/chatter", "/map"], clock=True)
     page.next("state", lambda state: state["published"] == ["/chatter", "/map"] and state["clock"])
-    # The latched message is from long before, and late subscribers need it.
+    # The latched message was sent long before, but late subscribers need it.
     wait_until(lambda: map_ == ["the map"])
     # Play slowly until the other subscriber is connected.
     page.send("play", seek=0, paused=False, rate=0.1)
@@ -298,7 +298,7 @@ def test_recording_is_completed_when_the_dashboard_ends(
 
 
 class Gate:
-    """Blocks a thread of the dashboard at a step until it is opened."""
+    """Blocks a thread of the dashboard at a certain step until it is opened."""
 
     def __init__(self) -> None:
         self.reached = threading.Event()
@@ -311,7 +311,7 @@ class Gate:
 
 @pytest.fixture
 def starting(monkeypatch: pytest.MonkeyPatch) -> Gate:
-    """Return the gate at which starting recordings block."""
+    """Return a gate that blocks recordings while they start."""
     gate = Gate()
 
     class Slow(Recording):
@@ -481,7 +481,7 @@ def test_page_that_shows_a_paused_bag_looks_only_when_something_changes(
         return await follow(session)
 
     monkeypatch.setattr(BagSession, "follow", counted)
-    # The test measures that nothing happens in this time.
+    # Check that nothing happens during this time.
     time.sleep(1.0)
     assert len(looks) <= 2
     # The player reaches the end by itself.

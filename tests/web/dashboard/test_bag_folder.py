@@ -1,4 +1,4 @@
-"""The bags that the page may open: no path leads outside of the folder."""
+"""The bags that the page may open: no path leads out of the folder."""
 
 from __future__ import annotations
 

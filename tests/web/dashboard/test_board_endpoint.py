@@ -1,4 +1,4 @@
-"""The board over WebSocket: states and commands of the page."""
+"""The board over WebSocket: states for the page, and commands from it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def opened(served: Served, query: str = "", token: str = "") -> Any:
 
 
 def state(socket: Any, accepts: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """Return the first state that is accepted."""
+    """Return the first state that ``accepts`` accepts."""
     while True:
         found: dict[str, Any] = json.loads(socket.recv(timeout=60))
         if accepts(found):
@@ -130,6 +130,7 @@ def test_board_that_cannot_be_shown_has_its_error(
 
     monkeypatch.setattr(board_endpoint, "state_of", fail)
     with opened(serve()) as socket:
-        # Closed as soon as it arrives: the connection to the board is closed nevertheless, which a fixture checks.
+        # The client disconnects as soon as this arrives. The connection to the board is closed nevertheless, as a
+        # fixture checks.
         found = state(socket, lambda each: "error" in each)
     assert found["error"] == "the dashboard failed to show the board: ZeroDivisionError"

@@ -25,7 +25,7 @@ def test_code_is_used_once_within_a_minute() -> None:
     kept = Codes(lambda: now)
     first, second = kept.new("token-1"), kept.new("token-2")
     assert first != second
-    # 128 bits in base64.
+    # 22 base64 characters represent 128 bits.
     assert len(first) == 22
     assert (kept.token_of(first), kept.token_of(first), kept.token_of("x")) == ("token-1", "token-1", "")
     assert (kept.redeem("x"), kept.redeem(first), kept.redeem(first)) == ("", "token-1", "")
@@ -82,7 +82,7 @@ def test_code_is_exchanged_by_this_user_alone(
     kept = served.dashboard.codes
     code = kept.new("token-1")
     assert exchanged(served.port, "", half_closes=half_closes) == (403, "this link has been used\n")
-    # None: a client whose socket is not found, as in another network namespace.
+    # None means that the client's socket is not found, as in another network namespace.
     for owner in (os.getuid() + 4711, None):
         monkeypatch.setattr(codes, "owner_of", lambda end, other_end, owner=owner: owner)
         status, text = exchanged(served.port, code, half_closes=half_closes)
@@ -99,7 +99,7 @@ def test_code_is_exchanged_by_this_user_alone(
 def test_another_user_does_not_get_the_token(
     half_closes: bool, serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The dashboard pretends to run as another user: the socket table shows the client as a stranger."""
+    """The dashboard pretends to run as another user, so that the socket table shows the client as a different user."""
     served = serve()
     assert served.dashboard
     monkeypatch.setattr(codes, "_ROOT", -1)

@@ -1,4 +1,4 @@
-"""Driving by the server's endpoint: the last message is zero for any failure of the client."""
+"""Driving through the server's endpoint: whatever failure a client has, the last message is zero."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def robot(serve: Callable[..., Served]) -> tuple[Served, Callable[..., Any]]:
-    """Return a dashboard, and a function that returns the next message of /cmd_vel that fulfils a condition."""
+    """Return a dashboard, and a function that returns the next message on /cmd_vel that fulfils a condition."""
     served = serve()
     return served, listen(served)
 
@@ -128,7 +128,7 @@ def is_zero(twist: Twist) -> bool:
 
 
 class RawClient:
-    """A client that can be cut off: a plain socket, without a WebSocket close."""
+    """A client whose connection can be cut: a plain socket, without a WebSocket close."""
 
     def __init__(self, port: int) -> None:
         self.socket = socket.create_connection(("127.0.0.1", port), 60)
@@ -150,7 +150,7 @@ class RawClient:
 
 
 def move(client: RawClient, until: Callable[..., Any]) -> None:
-    """Drive; connect the topic first, which may take a busy machine longer than a client may be silent."""
+    """Drive until a message arrives; first connect the topic, which may take longer than a client may be silent."""
     client.send(AT_REST)
     until(is_zero)
     client.send(FORWARD)
@@ -193,7 +193,7 @@ def test_robot_stops_when_the_client_is_silent_and_moves_again(robot: Any) -> No
         for _ in range(2):
             client.send(json.dumps(FORWARD))
             until(moves)
-            # The connection is open, but no data arrives: as from a page that hangs, or through a pulled cable.
+            # The connection is open, but no data arrives, as from a page that hangs or through a pulled cable.
             until(is_zero)
             assert json.loads(client.recv(timeout=60)) == {"stopped": "/cmd_vel"}
 
@@ -232,7 +232,7 @@ def test_robot_stops_when_the_dashboard_is_closed(serve: Callable[..., Served]) 
 
 
 class RawSubscriber:
-    """A robot with a separate thread: a subscriber of the dashboard's node, by XML-RPC and TCPROS."""
+    """A robot with a separate thread: it subscribes to the dashboard's node by XML-RPC and TCPROS."""
 
     def __init__(self, served: Served, topic: str) -> None:
         with ServerProxy(served.node_of_dashboard._node.uri) as node:
@@ -288,7 +288,7 @@ def test_robot_stops_while_the_loop_of_the_server_is_blocked(robot: Any, is_lost
     finally:
         released.set()
     if not is_lost:
-        # It drives again as soon as commands are read again.
+        # The client drives again as soon as its commands are read again.
         client.send(FORWARD)
         subscriber.until(moves)
         client.socket.close()

@@ -1,4 +1,4 @@
-"""The files of the page: loaded files exist, nothing is inline, libraries match their digests, the size is limited."""
+"""The page's files: files that are loaded exist, nothing is inline, libraries match their digests, the size is limited."""
 
 from __future__ import annotations
 
@@ -89,5 +89,5 @@ def test_page_is_small() -> None:
     sizes = {path: len(file.packed) for path, file in FILES.items() if path != "/"}
     on_demand = sum(size for path, size in sizes.items() if path.startswith(("/vendor/three/", "/js/scene/")))
     assert sum(sizes.values()) - on_demand < 300_000
-    # Loaded when the 3D view is first opened.
+    # These files are loaded when the 3D view is first opened.
     assert on_demand < 300_000

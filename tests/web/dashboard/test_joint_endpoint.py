@@ -41,7 +41,7 @@ class Client:
         self.socket.send(json.dumps({"op": op, **fields}))
 
     def next(self, name: str, accepts: Callable[[Any], object] = lambda _: True) -> Any:
-        """Return the next value of this name that is accepted."""
+        """Return the next value with this name that ``accepts`` accepts."""
         while True:
             found: dict[str, Any] = json.loads(self.socket.recv(timeout=60))
             if name in found and accepts(found[name]):

@@ -56,7 +56,7 @@ class Client:
         return f"you may not {what}"
 
     async def until(self, count: int) -> list[dict[str, Any]]:
-        """Return the sent messages, once there are ``count``."""
+        """Return the sent messages as soon as there are ``count``."""
         while len(self.sent) < count and not self.closed:
             self._arrived.clear()
             await self._arrived.wait()
@@ -299,7 +299,7 @@ def test_changes_of_any_thread_are_looked_at_no_faster_than_the_pace() -> None:
                 session.post_change()
                 endpoint.post_change()
 
-        # The first refresh is long ago; a refresh after the next change waits for the rate limit.
+        # The first refresh was long ago; a refresh after the next change waits for the rate limit.
         for pause, looks in ((0.0, 2), (0.9, 2), (0.2, 3)):
             changing = asyncio.ensure_future(asyncio.to_thread(change))
             await manual_loop.until(changing.done)
@@ -316,7 +316,7 @@ def test_wait_ends_when_the_clock_has_passed_its_end(monkeypatch: pytest.MonkeyP
     tick = 1 / 64
 
     async def work(loop: ManualLoop) -> None:
-        # As on Windows before Python 3.13: timers fire up to a tick early.
+        # This simulates Windows before Python 3.13, where timers fire up to a tick early.
         monkeypatch.setattr(loop, "_clock_resolution", tick)
         waiting = asyncio.ensure_future(wait_until(asyncio.Event(), loop.time() + 0.05))
         await loop.advance(3 * tick)

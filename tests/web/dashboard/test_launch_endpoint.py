@@ -42,14 +42,14 @@ class Client:
         self.socket.send(json.dumps({"op": op, **fields}))
 
     def next(self, accepts: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
-        """Return the next message that is accepted."""
+        """Return the next message that ``accepts`` accepts."""
         while True:
             found: dict[str, Any] = json.loads(self.socket.recv(timeout=60))
             if accepts(found):
                 return found
 
     def run(self, accepts: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
-        """Return the state of the only launch, once it is accepted."""
+        """Return the state of the only launch as soon as ``accepts`` accepts it."""
         message = self.next(lambda found: found.get("launches") and accepts(found["launches"][-1]))
         launch: dict[str, Any] = message["launches"][-1]
         return launch
@@ -223,7 +223,7 @@ def test_client_without_token_cannot_start_launches(client: Callable[..., Client
 
 
 class Run:
-    """A launch that has stopped, or is requested to."""
+    """A launch that has stopped, or that was requested to stop."""
 
     def __init__(self, number: int) -> None:
         self.id = number
@@ -281,7 +281,7 @@ def test_restart_is_completed_if_its_page_closes(
 
 
 def test_launch_that_has_been_restarted_is_not_started_twice() -> None:
-    """A second client's request may start as the first client's is finished."""
+    """A second client's request may start when the first client's request finishes."""
     started: list[LaunchFile] = []
 
     async def work() -> None:
@@ -361,7 +361,7 @@ def test_page_that_shows_launches_looks_at_them_only_when_they_change(
     page.run(lambda run: run["state"] == "running" and node(run, "/talker")["pid"])
     looks: list[object] = []
     monkeypatch.setattr(LaunchSession, "follow", counted(LaunchSession.follow, looks))
-    # The test measures that nothing happens in this time.
+    # Check that nothing happens during this time.
     time.sleep(1.0)
     assert len(looks) <= 2
 

@@ -1,4 +1,4 @@
-"""The pure modules of the page, tested by node's own test runner."""
+"""The page's pure modules, tested by Node.js's own test runner."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def test_text_that_is_not_a_file_of_rviz_is_refused(text: str, error: str) -> No
 
 @pytest.fixture
 def opened(serve: Callable[..., Served]) -> Iterator[Callable[..., Callable[[object], Any]]]:
-    """Return a function that opens a dashboard's endpoint with this file; its result sends an operation."""
+    """Return a function that opens a dashboard's endpoint with this file; it returns a function that sends an operation."""
     sockets = ExitStack()
 
     def opening(file: Path | None, token: str = TOKEN, **options: Any) -> Callable[[object], Any]:

@@ -1,4 +1,4 @@
-"""The texts of the page in two languages: each has a translation with the same values, and no translation is unused."""
+"""The page's strings in two languages: each has a translation with the same values, and no translation is unused."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SOURCES = {
 
 
 def german() -> dict[str, str]:
-    """Return the table; its strings have only escapes that Python has, too."""
+    """Return the translation table, whose strings contain only escapes that Python also has."""
     text = (JS / "german.js").read_text(encoding="utf-8")
     pairs = re.findall(rf"({STRING}):\s*({STRING})", text)
     return {ast.literal_eval(key): ast.literal_eval(value) for key, value in pairs}

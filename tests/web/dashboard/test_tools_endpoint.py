@@ -1,4 +1,4 @@
-"""The tools' endpoint over WebSocket: page requests for which the Foxglove protocol has no message."""
+"""The tools' endpoint over WebSocket: requests from the page for which the Foxglove protocol has no message."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Tools:
         return found
 
     def request(self, **fields: object) -> dict[str, Any]:
-        """Return the answer to a request."""
+        """Return the response to a request."""
         self.socket.send(json.dumps({"id": 7, **fields}))
         while (found := self.receive()).get("id") != 7:
             pass
@@ -102,7 +102,7 @@ def test_invalid_request_is_refused(serve: Callable[..., Served], text: str) -> 
 
 
 def report(tools: Tools, accepts: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """Return the first report that is accepted."""
+    """Return the first report that ``accepts`` accepts."""
     while True:
         found = tools.receive()
         if "report" in found and accepts(found["report"]):
@@ -116,7 +116,7 @@ def node_in(found: dict[str, Any], name: str) -> dict[str, Any]:
 def test_nodes_are_reported_while_watched(
     serve: Callable[..., Served], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # On a busy machine an answer may arrive late.
+    # On a busy machine a response may arrive late.
     monkeypatch.setattr("minirospy.introspect.doctor.graph.CONNECT_SECONDS", 30.0)
     served = serve()
     talker = served.node("talker")

@@ -28,7 +28,7 @@ def test_page_has_the_layouts_that_links_name() -> None:
 def test_help_names_all_layouts() -> None:
     text = " ".join(_dashboard_parser().format_help().split())
     assert f"several views side by side: {', '.join(LAYOUTS)}" in text
-    # "console" and "teleop" are arguments of one view.
+    # "console" and "teleop" are not listed, because they are arguments of one view.
     assert "or a layout: workshop, rviz, classroom" in text
 
 
