@@ -1,4 +1,4 @@
-"""A small graph for the command tests: one node that publishes, subscribes and serves."""
+"""A small graph for command tests: one node that publishes, subscribes and serves."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BIN = Path(sys.executable).parent
 
 
 class Robot(NamedTuple):
-    """The node, its loop, the messages received on /listen, and the reasons of shutdown requests."""
+    """The node, its loop, the messages received on /listen, and the reasons for shutdown requests."""
 
     node: Node
     loop: LoopThread
@@ -45,7 +45,7 @@ class Robot(NamedTuple):
 
 @pytest.fixture
 def robot(master: str) -> Iterator[Robot]:
-    """Run /robot: it publishes /button_state, /ns/chatter, /poly, subscribes to /listen, serves two services."""
+    """Run /robot, which publishes /button_state, /ns/chatter and /poly, subscribes to /listen, and offers two services."""
     loop = LoopThread("robot")
     stopped: list[str] = []
     heard: list[bytes] = []
@@ -120,13 +120,13 @@ def without_ros_words(err: str) -> str:
 
 
 def own_lines(err: str) -> list[str]:
-    """Return the lines of an error that are minirospy's own."""
+    """Return those lines of an error that are minirospy's own."""
     return without_ros_words(err).splitlines()
 
 
 @pytest.fixture
 def command(capsys: pytest.CaptureFixture[str]) -> Command:
-    """Run a command in this process: ``command("rostopic", "list", "-v")``."""
+    """Return a function that runs a command in this process: ``command("rostopic", "list", "-v")``."""
 
     def run(name: str, *argv: str) -> Result:
         entry = find_script(name) or find_script(name.replace("_", "-")) or find_verb(name)

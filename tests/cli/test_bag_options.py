@@ -18,7 +18,7 @@ STAMPED = f"Header header\nint32[] ids\n{'=' * 80}\nMSG: std_msgs/Header\n{HEADE
 
 @pytest.fixture
 def bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Return a bag of strings on /chatter, and of a type that is not installed on a relative topic."""
+    """Return a bag with strings on /chatter, and with a type that is not installed on a relative topic."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
     stamped = connection(1, "far/ids", type="far_msgs/Ids", message_definition=STAMPED, md5sum="0")
@@ -54,7 +54,7 @@ def test_echo_prints_messages_fields_and_rows(command: Command, bag: str) -> Non
         command("rostopic", "echo", "-b", bag, "-a", "--filter", "topic == 'far/ids'").out.count("---") == 1
     )
     assert command("rostopic", "echo", "-b", bag, "-a").out.count("---") == 5
-    # ROS searches types of messages, not the field's type.
+    # ROS only looks up message types, not the type of this field.
     assert command("rostopic", "echo", "-b", bag, "--noarr", "/far/ids/ids").out == "[0, 0]\n---\n"
     assert command("rostopic", "echo", "-b", bag, "--nostr", "-n", "1", "/chatter/data").out == '"0"\n---\n'
     assert "<array type" in command("rostopic", "echo", "-b", bag, "--noarr", "/far/ids").out

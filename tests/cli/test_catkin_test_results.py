@@ -65,7 +65,7 @@ def test_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         (GOOD, Counts(2)),
         ('<testsuite tests="2" errors="0" failures="0" skip="1"/>', Counts(2, skipped=1)),
         ('<testsuite tests="2" errors="0" failures="0" disabled="1"/>', Counts(2, skipped=1)),
-        # The format that pytest writes.
+        # This is the format that pytest writes.
         (f'<testsuites name="pytest tests">{GOOD}{BAD}</testsuites>', Counts(5, 1)),
     ],
 )

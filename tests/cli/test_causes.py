@@ -57,7 +57,7 @@ def test_name_of_a_master_that_has_no_address(
 
 def test_address_of_another_machine_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_HOSTNAME", raising=False)
-    # A documentation address, which no machine has (RFC 5737).
+    # This address is reserved for documentation, so no machine has it (RFC 5737).
     monkeypatch.setenv("ROS_IP", "192.0.2.1")
     assert wrong_address(Environment.read()) == (
         "ROS_IP=192.0.2.1 is not an address of this machine: correct only behind NAT or in a container"
@@ -87,7 +87,8 @@ def test_suspended_node_is_said_to_be_suspended(master: str, command: Any) -> No
             assert process.stdout is not None
             assert process.stdout.readline() == "up\n"
             process.send_signal(signal.SIGSTOP)
-            # Wait until the process has stopped: its other threads run until one thread has handled the signal.
+            # Wait until the process has stopped, because its other threads run until one thread has handled the
+            # signal.
             os.waitid(os.P_PID, process.pid, os.WSTOPPED)
             status, _, err = command("rosnode", "ping", "-c", "1", "/node")
             echo = [str(Path(sys.executable).parent / "rostopic"), "echo", "/rosout"]

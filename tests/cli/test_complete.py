@@ -1,4 +1,4 @@
-"""cli/complete: completions with a graph, without a master, and for any input."""
+"""cli/complete: completions with a graph, without a master, and for arbitrary input."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ LEAVES = [
 
 @pytest.mark.parametrize("entry", COMMANDS, ids=lambda entry: entry.target)
 def test_every_command_is_completed(entry: Entry) -> None:
-    """A command has a grammar or a completer of its words; only `minirospy` and `complete` themselves have neither."""
+    """A command has a grammar or a completer for its words; only `minirospy` and `complete` have neither."""
     grammar = entry.load_grammar()
     assert callable(entry.load_main())
     assert grammar is None or isinstance(grammar, Command | Family)
@@ -302,7 +302,7 @@ def test_types(workspace: Path) -> None:
     assert tab("rosservice find std_s") == ["std_srvs/"]
     assert tab("rostopic pub /new std_msgs/Boo") == ["std_msgs/Bool"]
     assert tab("rosmsg show nobody/") == []
-    # The type's name without its package is completed, too.
+    # A type's name without its package is completed, too.
     assert tab("rosmsg show PoseWithCov") == ["PoseWithCovariance", "PoseWithCovarianceStamped"]
     assert tab("rossrv md5 SetB") == ["SetBool"]
     assert tab("rostopic find PoseW") == []
@@ -317,7 +317,7 @@ def test_a_message_to_be_changed(workspace: Path) -> None:
     assert tab("rostopic pub /t std_msgs/Empty ") == ['"{}"']
     assert tab("rostopic pub /t std_msgs/Bool true ") == []
     assert tab("rostopic pub /t std_msgs/Nothing ") == []
-    # A vertical tab represents a line feed, because a candidate is one line.
+    # A vertical tab represents a line feed, because each candidate is one line.
     assert tab("rostopic pub /t geometry_msgs/Point ") == ['"x: 0.0\vy: 0.0\vz: 0.0"']
     assert tab("rostopic pub /t my_robot/Leds ") == [
         "\"leds:\v- name: ''\v  place:\v  - 0.0\v  - 0.0\von: false\""
@@ -340,7 +340,7 @@ def test_quotes_that_are_open_stay(workspace: Path) -> None:
     assert candidates(4, ["rostopic", "pub", '"/t"', "std_msgs/Bool", '"']) == ['"data: false"']
     assert candidates(2, ["rosed", "my_robot", '"my '], one_line=True) == ['"my map.yaml"']
     assert candidates(2, ["rosed", "my_robot", "config/deep/my\\ "]) == ["config/deep/my\\ map.yaml"]
-    # A shell interprets nothing in single quotes: they are closed for the apostrophe.
+    # A shell interprets nothing within single quotes, so they are closed before the apostrophe.
     assert candidates(4, ["rostopic", "pub", "/t", "std_msgs/String", "'"]) == [r"'data: '\'''\'''"]
     words = ["roslaunch", "my_robot", "all.launch"]
     assert candidates(3, [*words, "name:="]) == [r"name:=a\ robot"]
@@ -363,7 +363,7 @@ def test_variables_and_home(workspace: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_nothing_in_a_text_is_history(robot: Robot) -> None:
-    """bash and zsh at a terminal replace !! by the last command, even within double quotes."""
+    """bash and zsh at a terminal replace !! with the previous command, even within double quotes."""
     from minirospy.ros.rosparam.commands import rosparam
 
     assert rosparam.main(["set", "/greeting", "it's you!"]) == 0
@@ -384,7 +384,7 @@ _FROM_ROS = {
     ),
     "geometry_msgs/Polygon": "points:\n- x: 0.0\n  y: 0.0\n  z: 0.0",
 }
-"""Output of ROS 1's rosmsg-proto."""
+"""The output of ROS 1's rosmsg-proto."""
 
 
 @pytest.mark.parametrize("type_", _FROM_ROS)
@@ -411,7 +411,7 @@ def test_topics(robot: Robot) -> None:
     assert tab("rostopic info ns/") == ["ns/chatter"]
     assert tab("minirospy topic bw /but") == ["/button_state"]
     assert tab("rostopic echo -n 3 /but") == ["/button_state"]
-    # The right side of a remapping.
+    # Complete the right side of a remapping.
     assert tab("rosrun rospy_tutorials talker chatter:=/but") == ["chatter:=/button_state"]
 
 
@@ -496,7 +496,7 @@ def test_a_master_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mon
         monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{silent.getsockname()[1]}")
         monkeypatch.setattr(completers, "LIVE_SECONDS", 0.2)
         took: list[float] = []
-        # A call gives up after five seconds; on a machine that stalls, try it up to three times.
+        # A call gives up after five seconds; try it up to three times if the machine stalls.
         while len(took) < 3 and min(took, default=9.0) > 4:
             start = time.monotonic()
             assert tab("rostopic echo ") == []

@@ -1,4 +1,4 @@
-"""minirospy doctor and roswtf: a graph with a fault, and the lines that report it."""
+"""minirospy doctor and roswtf: a graph with a fault, and the lines that report the fault."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_dead_unresolvable_and_third_party_nodes(
 def test_a_suspended_node_and_a_suspended_master(
     robot: Any, master: str, command: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As after Ctrl-Z: the system accepts connections for a stopped process."""
+    """After Ctrl-Z, the system still accepts connections for a stopped process."""
     connect_within(1.5, monkeypatch)
     with socket.create_server(("127.0.0.1", 0)) as suspended:
         uri = f"http://localhost:{suspended.getsockname()[1]}/"
@@ -155,7 +155,7 @@ def test_topics_of_different_types(robot: Any, other: Any, command: Any) -> None
 
 
 def test_a_connection_that_is_not_made(robot: Any, other: Any, command: Any) -> None:
-    """The types have the same name and different definitions."""
+    """The nodes' types have the same name but different definitions."""
     other("/button_state", InterfaceType(Bool._type, "0" * 32))
     status, out, _ = command("doctor")
     assert status == 1

@@ -1,4 +1,4 @@
-"""A publisher, by raw sockets, that sends hostile text in its connection header and messages."""
+"""A publisher that uses raw sockets to send hostile text in its connection header and messages."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MARK = "OWNED"
 
 
 class HostilePublisher:
-    """A node of raw sockets: answers every XML-RPC call as requestTopic, and every connection with its header."""
+    """A node of raw sockets: it responds to every XML-RPC call as to requestTopic, and to every connection with its header."""
 
     def __init__(self, header: dict[str, str], messages: list[bytes]) -> None:
         self._reply = serialize_header(header) + b"".join(map(serialize_frame, messages))
@@ -74,7 +74,7 @@ class HostilePublisher:
 
 @pytest.fixture
 def hostile(master: str, request: pytest.FixtureRequest) -> Iterator[HostilePublisher]:
-    """Return a publisher of /evil with the parameter's header and messages; the master has a harmless type for it."""
+    """Return a publisher of /evil with the parameter's header and messages; the master knows a harmless type for it."""
     header, messages = request.param
     publisher = HostilePublisher(header, messages)
     proxy = MasterProxy(master, "/evil_node")
@@ -124,7 +124,7 @@ def test_no_command_runs_the_code_of_a_publisher(
     (tmp_path / "evil_module.py").write_text(f"open({MARK!r}, 'w').close()\n")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     command = [str(BIN / name), verb, *options, "/evil"]
-    # Each command exits: at the refused definition, or after the one message that it waits for.
+    # Each command exits, either because the definition is refused, or after the one message that it waits for.
     done = subprocess.run(
         command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=False
     )

@@ -1,4 +1,4 @@
-"""Commands that a script starts with `&`: the shell ignores SIGINT for them, and `kill -INT` stops them nevertheless."""
+"""Commands that a script starts with `&`: the shell sets SIGINT to be ignored, but `kill -INT` stops them nevertheless."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 COMMANDS = {
-    # Command -> its words, and the output that it prints before it waits.
+    # Dict from a command to its words, and to the output that it prints before it waits.
     "rostopic echo": (["rostopic", "echo", "/button_state"], "data: "),
     "rostopic hz": (["rostopic", "hz", "/ns/chatter"], "subscribed to"),
     "rostopic bw": (["rostopic", "bw", "/ns/chatter"], "subscribed to"),
@@ -52,7 +52,7 @@ def test_an_ignored_sigint_ends_a_command(
     words, waits_with = COMMANDS[what]
     program = words[0] if os.path.isabs(words[0]) else str(BIN / words[0])
     process = subprocess.Popen(
-        # As a shell does for `&`.
+        # A shell does the same for `&`.
         ["/bin/sh", "-c", 'trap "" INT; exec "$@"', "sh", program, *words[1:]],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

@@ -64,7 +64,7 @@ def listening(process: psutil.Process) -> set[str]:
     """Return the addresses on which a process and its children listen."""
     found: set[str] = set()
     for each in (process, *process.children(recursive=True)):
-        # psutil 6 renamed it.
+        # psutil 6 renamed this method.
         connections: Any = getattr(each, "net_connections", None) or each.connections
         found |= {c.laddr.ip for c in connections("inet") if c.status == psutil.CONN_LISTEN}
     return found
@@ -72,7 +72,7 @@ def listening(process: psutil.Process) -> set[str]:
 
 @pytest.fixture
 def elsewhere(monkeypatch: pytest.MonkeyPatch) -> Mapping[str, str]:
-    """Set and return variables that a user's ~/.bashrc may have from other work."""
+    """Set and return variables that a user's ~/.bashrc may contain for other work."""
     monkeypatch.delenv("ROS_HOSTNAME")
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
     monkeypatch.setenv("ROS_IP", "192.0.2.7")
@@ -91,7 +91,7 @@ def test_a_local_roscore_listens_on_loopback_alone(how: str, elsewhere: Mapping[
             "`export MINIROSPY_LOCAL=1`\n" in printed
         )
         assert f"ROS_MASTER_URI=http://localhost:{port}/\n" in printed
-        # Its own /rosout node listens there, too.
+        # The master's own /rosout node listens there, too.
         assert listening(psutil.Process(process.pid)) == {"127.0.0.1"}
         names = run("rosnode", "list", ROS_MASTER_URI=f"http://localhost:{port}", MINIROSPY_LOCAL="1")
         assert names.stdout == "/rosout\n"

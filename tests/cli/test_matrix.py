@@ -1,6 +1,6 @@
 """Every command and verb with every kind of failure: one clear line, the documented status, no traceback, no hang.
 
-The rows are the commands' own lists (pyproject.toml, and each command's help): a verb without a row in ``ROWS`` fails.
+The rows are the commands' own lists (pyproject.toml, and each command's help), so a verb without a row in ``ROWS`` fails.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="pipes, signals and d
 
 
 class Row(NamedTuple):
-    """The words after a verb, for each case.
+    """The words that follow a verb in each case.
 
     ``good``: works on the graph of the fixture ``graph``; None if the command starts a program or a
-    master. ``unknown``: with a name that does not exist; "" if the verb takes no name. ``dead``: about the node that
-    does not answer. ``uses_master``: whether it needs a master. ``streams``: runs until Ctrl-C. ``quiet``: an unknown name
-    gives an empty result, as of a search. ``waits``: the command waits for the name, with a warning.
+    master. ``unknown``: a name that does not exist; "" if the verb takes no name. ``dead``: refers to the node that does
+    not respond. ``uses_master``: the verb needs a master. ``streams``: the verb runs until Ctrl-C. ``quiet``: an unknown name
+    gives an empty result, as in a search. ``waits``: the verb waits for the name, with a warning.
     """
 
     good: str | None = ""
@@ -56,7 +56,7 @@ class Row(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """A kind of definitions, and the types that its rows use."""
+    """A kind of definition, and the types that its rows use."""
 
     known: str
     unknown: str
@@ -127,9 +127,9 @@ ELSEWHERE = re.compile(
 """Commands that have their own matrices or tests."""
 
 USAGE_ERROR = 2
-EX_USAGE = 64  # exit status of ROS for an unknown verb
+EX_USAGE = 64  # ROS's exit status for an unknown verb
 
-# Exit status for a name that does not exist, if it is not 1: as in ROS.
+# Exit status for a name that does not exist, if it is not 1; the same as in ROS.
 ROS_STATUS = {
     "minirospy": USAGE_ERROR,
     "rosservice args": 2,
@@ -140,16 +140,17 @@ ROS_STATUS = {
     "rossrv package": EX_USAGE,
 }
 
-# Stderr of a command that succeeds: the nodes that do not answer.
+# Stderr of commands that succeed: the nodes that do not respond.
 REPORTED_BY_ROS = {"rosnode cleanup": "ERROR: connection refused to [http://localhost:1/]\n"}
 
-USAGE_STATUS = {"rosbag": 0, "rosgraph": 255}  # exit status of a usage error, if it is not 2: as in ROS
+# exit status of a usage error, if it is not 2; the same as in ROS
+USAGE_STATUS = {"rosbag": 0, "rosgraph": 255}
 
 GRAPH = [name for name, row in ROWS.items() if row.uses_master]
 
 
 def scripts() -> dict[str, tuple[str, str]]:
-    """Return the installed commands -> module and function."""
+    """Return the installed commands, as a dict from name to module and function."""
     found = {name: target.partition(":") for name, target in console_scripts().items()}
     return {name: (module, function) for name, (module, _, function) in found.items()}
 
@@ -194,7 +195,7 @@ def run(line: str, **streams: Any) -> Result:
 
 
 def usage_out(line: str) -> str:
-    """Return the stdout of a usage error: empty, except for rosgraph."""
+    """Return the stdout of a usage error, which is empty except for rosgraph."""
     return run("rosgraph -h").out.partition("usage: ")[0] if line == "rosgraph" else ""
 
 
@@ -213,7 +214,7 @@ def verbs(name: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def lines() -> list[str]:
-    """Return the commands and their verbs, as listed in the help."""
+    """Return the commands and their verbs, as the help lists them."""
     found = []
     for name in scripts():
         if not ELSEWHERE.match(name):
@@ -223,7 +224,7 @@ def lines() -> list[str]:
 
 @pytest.fixture
 def graph(robot: Robot, master: str, monkeypatch: pytest.MonkeyPatch) -> Robot:
-    """Return the robot, with loggers and a parameter; /ghost has only registrations of services and topics."""
+    """Return the robot, with loggers and a parameter. /ghost exists only as registrations of services and topics."""
     loggers = GetLoggersResponse()
     loggers.loggers.append(importlib.import_module("roscpp.msg").Logger("rosout", "info"))
     answer = io.BytesIO()
@@ -253,7 +254,7 @@ def _no_such_host(*_: object, **__: object) -> None:
 
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Shorten the time limits of calls to a master or node that does not answer."""
+    """Shorten the time limits for calls to a master or node that does not respond."""
     monkeypatch.setattr(master_proxy, "RpcClient", lambda uri, *_, **__: RpcClient(uri, 0.05))
 
 
@@ -288,7 +289,7 @@ def test_a_typo_in_an_option(lines: list[str]) -> None:
 
 def test_an_option_that_no_command_has() -> None:
     """Every installed command refuses an unknown option."""
-    # xacro's errors for options have the package's own text.
+    # xacro's errors about options are those of the xacro package.
     for name in scripts().keys() - {"xacro"}:
         result = run(f"{name} --nonsense")
         usage = USAGE_STATUS.get(name, 1 if name in ("rospack", "rosstack") else USAGE_ERROR)
@@ -299,13 +300,13 @@ def test_an_option_that_no_command_has() -> None:
 
 
 def test_a_missing_argument(lines: list[str]) -> None:
-    """Arguments that the usage does not have in brackets are required."""
+    """Arguments that are not in brackets in the usage are required."""
     for line in lines:
         usage = run(f"{line} -h").out.partition("\n\n")[0].partition(line)[2]
         while "[" in usage:
             usage = re.sub(r"\[[^][]*\](\.\.\.)?", "", usage)
 
-        # Optional arguments that ROS's usage does not have in brackets.
+        # These arguments are optional although ROS's usage does not put them in brackets.
         if usage.split() and line not in (
             "minirospy",
             "rosgraph",
@@ -355,7 +356,7 @@ ROS_OUTPUT = {
     "rosversion": "Cannot locate [nope]\n",
     "rosrun": f"[rosrun] Couldn't find executable named nope below {ROOT / 'msgs' / 'std_msgs'}\n",
 }
-"""Stdout of the real commands for a name that does not exist."""
+"""The real commands' stdout for a name that does not exist."""
 
 
 @pytest.mark.parametrize("line", [name for name, row in ROWS.items() if row.unknown and not row.waits])
@@ -454,7 +455,7 @@ PRINTING = [name for name, row in ROWS.items() if row.good is not None]
 @posix
 @pytest.mark.parametrize("line", PRINTING)
 def test_a_closed_pipe(line: str, graph: Robot) -> None:
-    """The reader closes the pipe, as in `| head -1`."""
+    """The reader closes the pipe, as `| head -1` does."""
     reader, writer = os.pipe()
     os.close(reader)
     with open(writer, "w", encoding="utf-8") as pipe:
@@ -514,7 +515,7 @@ def test_an_output_that_cannot_encode(graph: Robot) -> None:
     ],
 )
 def test_words_that_are_no_text(line: str, graph: Robot) -> None:
-    """An argument has a byte that is not UTF-8, in Python's surrogate form."""
+    """An argument contains a byte that is not UTF-8, as Python's surrogate."""
     result = run(f"{line} \udcff")
     assert (result.status, result.out) == (USAGE_ERROR, RULE if line == "rosnode info" else "")
     assert "not UTF-8 text" in one_line(result, line)
@@ -524,7 +525,7 @@ def test_words_that_are_no_text(line: str, graph: Robot) -> None:
 
 
 def _until_ctrl_c(line: str, text: str = "") -> Result:
-    """Run a command; send Ctrl-C once it has printed something, or ``text`` as part of its errors."""
+    """Run a command; send Ctrl-C once it has printed something, or ``text`` in its errors."""
     main = threading.main_thread().ident
     assert main is not None
     once = partial(next, iter([True]), False)
@@ -567,7 +568,7 @@ def test_suggestions_for_other_waits(graph: Robot) -> None:
     assert _until_ctrl_c("rosservice call --wait /set_led_stat", "did you mean").err == (
         "WARNING: service [/set_led_stat] is not there yet\ndid you mean /set_led_state?\n"
     )
-    # A service that is registered and does not answer has no suggestions.
+    # A service that is registered but does not respond has no suggestions.
     assert (
         _until_ctrl_c("rosservice call --wait /haunt").err == "WARNING: service [/haunt] is not there yet\n"
     )

@@ -1,4 +1,4 @@
-"""`minirospy python FILE`, which users of a separate installation need."""
+"""`minirospy python FILE`, which users need if minirospy has a separate environment."""
 
 from __future__ import annotations
 

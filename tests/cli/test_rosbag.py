@@ -1,4 +1,4 @@
-"""The command rosbag: output, files and exit statuses of its verbs."""
+"""The command rosbag: its verbs' output, files and exit statuses."""
 
 from __future__ import annotations
 
@@ -412,7 +412,7 @@ def test_bag_whose_chunk_header_is_damaged_stays_as_it_is(bag: Path, command: Co
 
 
 def test_record_takes_the_size_behind_split(capsys: pytest.CaptureFixture[str]) -> None:
-    """Scripts that are older than --size use this form; the second error is of a later step."""
+    """Scripts older than --size use this form; the second error is from a later step."""
     assert rosbag.main(["record", "/a", "--split", "5", "--lz4", "-j"]) == 2
     out, err = capsys.readouterr()
     assert out == ""

@@ -24,7 +24,7 @@ MISSING = CHANGE + "    1 rules missing:\n" + "".join(f"    {line}\n" for line i
 
 @pytest.fixture
 def bag(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a bag of colors without alpha, and a string, in the working directory."""
+    """Return a bag with colors without alpha, and a string, in the working directory."""
     monkeypatch.chdir(tmp_path)
     connections = [
         connection(

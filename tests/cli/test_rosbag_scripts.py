@@ -1,4 +1,4 @@
-"""The command rosbag_scripts: the programs of ROS's package rosbag, by `rosrun rosbag NAME`."""
+"""The command rosbag_scripts: the programs in ROS's package rosbag, run with `rosrun rosbag NAME`."""
 
 from __future__ import annotations
 

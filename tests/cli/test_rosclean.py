@@ -1,4 +1,4 @@
-"""The command rosclean: sizes as du shows them; the folders that purge removes, and its confirmation."""
+"""The command rosclean: sizes as du shows them, the folders that purge removes, and its confirmation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command rosconsole with a node that has loggers."""
+"""The command rosconsole, with a node that has loggers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ while not rospy.is_shutdown():
 
 @pytest.fixture
 def talker(master: str) -> Iterator[subprocess.Popen[str]]:
-    """Run the node /talker, which logs the lines of stdin: as an error if a line starts with an exclamation mark."""
+    """Run the node /talker, which logs the lines from stdin; a line that starts with an exclamation mark is an error."""
     process = subprocess.Popen(
         [sys.executable, "-c", _NODE],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=dict(os.environ),
@@ -99,7 +99,7 @@ def test_echo(
     echoes = [program(words), program([*words, "/other"]), program([*words, "-l", "info", "/talk"])]
     assert talker.stdin
 
-    # Repeat until both are subscribed: earlier log messages do not reach them.
+    # Repeat this until both are subscribed, because earlier log messages do not reach them.
     while any(echo.poll() is None for echo in (echoes[0], echoes[2])):
         talker.stdin.write("quiet\n!loud\n")
         talker.stdin.flush()

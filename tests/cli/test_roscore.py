@@ -49,7 +49,7 @@ class Core:
                 break
 
     def end(self, number: int = signal.SIGTERM) -> str:
-        """Stop it; return its remaining output."""
+        """Stop roscore; return its remaining output."""
         if self.process.poll() is None:
             self.process.send_signal(number)
         return self.process.communicate(timeout=30)[0]
@@ -87,7 +87,7 @@ def test_killed_session_is_continued(start: Start) -> None:
     assert "journal: recovered 0 nodes and 4 parameters of the master that stopped" in second.said
     assert f"setting /run_id to {run_id}\n" in second.said
     assert master.get_param("/kept") == {"a": [1, 2]}
-    # The killed roscore's /rosout registration and address are not listed a second time.
+    # The registration and address of the killed roscore's /rosout are not listed a second time.
     assert master.get_system_state().publishers == {"/rosout_agg": ["/rosout"]}
     second.end()
     third = start()
@@ -156,7 +156,7 @@ def test_folders_that_cannot_be_created_are_reported(
     assert "Errno" not in core.said
     assert f"setting /run_id to {run_id}\n" in core.said
 
-    # The /rosout node receives log messages, and runs without its file.
+    # The /rosout node receives log messages, and continues without its file.
     monkeypatch.setattr("minirospy.ros.rostopic.commands.rostopic_pub._LATCH_SECONDS", 0.2)
     assert rostopic(["pub", "-1", "/rosout", "rosgraph_msgs/Log", "{level: 2, msg: hello}"]) == 0
     master.close()
@@ -205,7 +205,7 @@ def test_log_folder(start: Start) -> None:
     master.close()
     core.end()
 
-    # The file exists from the start, for `tail -f`; with the first lines of real rosout.
+    # The file exists from the start, for `tail -f`, and starts with the same lines as real rosout's.
     assert re.fullmatch(r"\n\n[0-9]+\.[0-9]{9}  Node Startup\n", (folder / "rosout.log").read_text())
     log = (folder / "master.log").read_text()
     assert "[minirospy.master][INFO] " in log
@@ -239,7 +239,7 @@ for omit, message.level, message.msg in (
 
 
 def test_rosout_log_contains_messages_of_nodes(start: Start) -> None:
-    """The lines have the format of real rosout."""
+    """The lines have the same format as real rosout's."""
     core = start()
     subprocess.run([sys.executable, "-c", LOGS], check=True, timeout=60)
     core.end()
@@ -326,7 +326,7 @@ def test_usage_errors(words: list[str], says: str, capsys: pytest.CaptureFixture
 def test_rosout_node_lists_and_sets_the_loggers_of_the_master(
     start: Start, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As /rosout of real ROS, a roscpp node: its root logger is `ros`."""
+    """Real ROS's /rosout does the same: it is a roscpp node, whose root logger is `ros`."""
     from minirospy.ros.rosservice.commands.rosservice import main as rosservice
 
     start()
@@ -343,7 +343,7 @@ def test_rosout_node_lists_and_sets_the_loggers_of_the_master(
 
 
 def test_closed_standard_output_does_not_stop_the_master(start: Start) -> None:
-    """For `roscore -v | head -3`: later output is discarded, and registrations continue to work."""
+    """For `roscore -v | head -3`, later output is discarded, and registrations continue to work."""
     core = start("-v", "--no-journal")
     assert core.process.stdout
     core.process.stdout.close()
@@ -376,7 +376,7 @@ def test_missing_standard_output_does_not_stop_the_master(start: Start) -> None:
 def test_silent_master_at_the_port_is_known_by_its_journal(
     is_held: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The master is busy reading its journal, or stopped; a program without the journal's lock is another program."""
+    """A master that holds the journal's lock is busy reading its journal, or stopped; any other program is not a master."""
     monkeypatch.setattr(commands, "_ANSWER_SECONDS", 0.05)
     path = tmp_path / "journal-1"
     journal = Journal(path, list)
@@ -418,7 +418,7 @@ def test_roscore_next_to_a_suspended_master(options: tuple[str, ...], start: Sta
 def test_a_line_is_one_write(
     stream: str, call: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a buffer (PYTHONUNBUFFERED), a thread's line could be printed between the text and line end of another one."""
+    """Without a buffer (PYTHONUNBUFFERED), a line from one thread could be printed between another line's text and its end."""
     raw = Writes()
     monkeypatch.setattr(sys, stream, io.TextIOWrapper(raw, "utf-8", write_through=True))
     call("text")

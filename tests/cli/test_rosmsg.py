@@ -99,7 +99,7 @@ def test_the_programs(program: Start) -> None:
 
 
 def test_names_from_a_pipe(command: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """For `rostopic type /t | rosmsg show` and `rosservice type /s | rossrv show`."""
+    """Tests `rostopic type /t | rosmsg show` and `rosservice type /s | rossrv show`."""
     for words, text, out in (
         (("rosmsg", "show"), "std_msgs/Bool\n", "bool data\n\n"),
         (("rosmsg", "md5"), "std_msgs/Bool\nstd_msgs/Empty\n", f"{Bool._md5sum}\n{Empty._md5sum}\n"),

@@ -24,7 +24,7 @@ Start = Callable[[Sequence[str]], "subprocess.Popen[str]"]
 
 @pytest.fixture
 def ghost(master: str) -> str:
-    """Return the URI of /ghost, which is registered and does not answer."""
+    """Return the URI of /ghost, which is registered but does not respond."""
     uri = f"http://localhost:{free_port()}/"
     proxy = MasterProxy(master, "/ghost")
     proxy.register_publisher("/boo", "std_msgs/Bool", uri)
@@ -65,7 +65,7 @@ def test_info_shows_connections(robot: Any, program: Start, command: Any) -> Non
     (name,) = [each for each in command("rosnode", "list").out.split() if each != "/robot"]
     there = command("rosnode", "info", "/robot").out
     assert f"Connections:\n * topic: /button_state\n    * to: {name}\n    * direction: outbound" in there
-    # A Unix socket has no ports: real ROS prints nothing for a connection without ports.
+    # A Unix socket has no ports, and real ROS prints nothing for a connection without ports.
     is_unix = sys.platform == "linux"
     transport, ports = ("UNIXROS", "") if is_unix else ("TCPROS", r" \(\d+ - \S+:\d+\) \[\d+\]")
     assert re.search(rf"outbound{ports}\n    \* transport: {transport}\n", there)
@@ -153,7 +153,7 @@ def test_a_node_that_hangs_is_not_killed(
         assert err.startswith(
             f"rosnode: ERROR: node [/hung] does not answer at {uri} (timed out after 0.1 s): "
         )
-        # Give the robot time to answer.
+        # Give the robot time to respond.
         slave = nodes._slave
         monkeypatch.setattr(
             nodes,

@@ -1,4 +1,4 @@
-"""rospack: output and exit statuses; tests/interop/test_interop_rospack.py compares them with the real one's."""
+"""rospack: output and exit statuses; tests/interop/test_interop_rospack.py compares them with the real command's."""
 
 from __future__ import annotations
 

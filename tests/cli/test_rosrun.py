@@ -1,4 +1,4 @@
-"""The command rosrun: which program of a package it runs, how, and the errors if there is none."""
+"""The command rosrun: which program in a package it runs, how, and the errors if there is none."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="scripts of POSIX sys
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the package my: Python and shell scripts, two of them with the same name."""
+    """Return the package ``my``, with Python and shell scripts, two of which have the same name."""
     folder = tmp_path / "src" / "my"
     texts = {
         "scripts/talker.py": "#!/usr/bin/env python3\nimport sys\nprint('talks', *sys.argv[1:])\nsys.exit(7)\n",
@@ -92,7 +92,7 @@ def test_copy_in_devel_is_not_a_second_program(package: Path, tmp_path: Path) ->
 
 @posix
 def test_a_package_that_is_installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The programs of share/PKG are in lib/PKG: /usr/share and /usr/lib, or a workspace's install folder."""
+    """The programs for share/PKG are in lib/PKG: in /usr/share and /usr/lib, or in a workspace's install folder."""
     share, programs = tmp_path / "share" / "theirs", tmp_path / "lib" / "theirs"
     share.mkdir(parents=True)
     programs.mkdir(parents=True)
@@ -128,7 +128,7 @@ def test_a_script_without_a_first_line_is_the_shells(package: Path) -> None:
 
 
 def fails(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str]:
-    """Return the exit status and minirospy's own error line of a command that fails."""
+    """Run a command that fails; return its exit status and minirospy's own error line."""
     status = rosrun.main(words)
     own = own_lines(capsys.readouterr().err)
     assert len(own) == 1
@@ -165,12 +165,12 @@ def test_usage_errors(package: Path, capsys: pytest.CaptureFixture[str]) -> None
         "package [mi] not found: ROS_PACKAGE_PATH names the folders that are searched",
     )
     assert "did you mean talker.py?" in fails(capsys, "my", "taker.py")[1]
-    # The package is missing, or is not separated by a space.
+    # The package is missing, or not separated by a space.
     for word in ("talker.py", "my/talker.py"):
         assert fails(capsys, word) == (2, "type rosrun PACKAGE EXECUTABLE, as `rosrun my talker.py`")
     assert fails(capsys, "nowhere.py")[1].startswith("package [nowhere.py] not found")
 
-    # Without similar names, all programs are listed; a path is relative to the package.
+    # If there are no similar names, all programs are listed; a path is relative to the package.
     for wrong in ("zzz", "/etc/passwd"):
         status, said = fails(capsys, "my", wrong)
         assert status == 3

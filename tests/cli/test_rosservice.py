@@ -205,7 +205,7 @@ def test_a_terminal_asks_for_missing_values(robot: Any) -> None:
 
 
 def test_words_for_values_work_in_nested_headers() -> None:
-    """As in real rosservice: `auto` is a stamped header, `now` the current time."""
+    """In real rosservice, too, `auto` is a stamped header and `now` the current time."""
     from sensor_msgs.srv import SetCameraInfoRequest
 
     from minirospy.introspect.services import fill_request

@@ -153,7 +153,7 @@ def test_echo_waits_for_a_publisher_and_follows_it(robot: Any, program: Start) -
 
 
 def test_pub_the_workshops_way(robot: Any, program: Start) -> None:
-    """`rostopic pub /t type "data: True"` latches until Ctrl-C."""
+    """`rostopic pub /t type "data: True"` latches the message until Ctrl-C."""
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool", "data: True"])
     assert pub.stdout is not None
     assert pub.stdout.readline() == "publishing and latching message. Press ctrl-C to terminate\n"
@@ -371,7 +371,7 @@ def test_pub_of_the_empty_text(robot: Any, command: Any, monkeypatch: pytest.Mon
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a Unix pipe")
 def test_pub_of_a_pipe_that_stays_open(robot: Any, program: Start) -> None:
-    """For `rostopic echo /a | rostopic pub /b TYPE`: each message is published when it has arrived, not at end of file."""
+    """In `rostopic echo /a | rostopic pub /b TYPE`, each message is published as soon as it arrives, not at end of file."""
     pub = program(["rostopic", "pub", "/listen", "std_msgs/Bool"])
     assert pub.stdin is not None
     for text, heard in (("data: True\n---\n", [b"\x01"]), ("data: False\n---\n", [b"\x01", b"\x00"])):
@@ -390,7 +390,7 @@ def test_a_killed_tool_does_not_stay_registered(robot: Any, program: Start, comm
 
 
 def test_time_by_the_clock_topic(robot: Any, program: Start) -> None:
-    """With /use_sim_time, `now` and the arrival time are those of /clock."""
+    """With /use_sim_time, `now` and the arrival time are read from /clock."""
     with closing(MasterProxy(robot.node.environment.master_uri, "/test")) as master:
         master.set_param("/use_sim_time", True)
     type_ = InterfaceType(Clock._type, Clock._md5sum, Clock._full_text)
@@ -398,12 +398,12 @@ def test_time_by_the_clock_topic(robot: Any, program: Start) -> None:
     robot.publish("/clock", Clock(genpy.Time(100)))
     row = program(["rostopic", "echo", "-p", "-n1", "/button_state"])
     now = program(["rostopic", "pub", "-1", "-v", "--use-rostime", "/t", "std_msgs/Time", "now"])
-    # A node uses and echoes /clock with one subscription.
+    # This node uses and echoes /clock with a single subscription.
     clock = program(["rostopic", "echo", "-n1", "/clock"])
 
     assert clock.communicate(timeout=30)[0] == "clock: \n  secs: 100\n  nsecs:         0\n---\n"
     out, err = row.communicate(timeout=30)
-    # The message may arrive before the clock's first.
+    # The message may arrive before the first time on /clock.
     assert re.fullmatch(r"%time,field.data\n(100000000000|0),1\n", out)
     assert err == "WARNING: may be using simulated time\n"
     assert now.stdout is not None
@@ -430,7 +430,7 @@ def test_hz_of_a_field_and_bw_of_several_topics(robot: Any, program: Start) -> N
 
 
 def test_the_words_that_a_launch_file_adds(robot: Any, command: Any, program: Start) -> None:
-    """For `<node pkg="rostopic" type="rostopic" args="pub ..."/>`: __name:=, __ns:=, __log:= and remappings."""
+    """For `<node pkg="rostopic" type="rostopic" args="pub ..."/>` these are __name:=, __ns:=, __log:= and remappings."""
     everything = command("rostopic", "list").out
     assert command("rostopic", "list", "__name:=x", "__log:=/x.log", "_p:=1").out == everything
     assert command("rostopic", "type", "chatter", "__ns:=ns").out == "std_msgs/String\n"

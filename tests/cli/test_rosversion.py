@@ -34,7 +34,7 @@ def test_of_all(command: Command) -> None:
 
 
 def test_version_of_included_packages(command: Command) -> None:
-    """The version is that of the ROS release from which the definitions are, not minirospy's."""
+    """The version is that of the ROS release that the definitions come from, not minirospy's."""
     for package, version in (
         ("std_msgs", "0.5.13"),
         ("sensor_msgs", "1.13.1"),

@@ -30,7 +30,7 @@ posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such 
 
 
 def launched(file: Path) -> subprocess.CompletedProcess[str]:
-    """Run roslaunch on a file whose nodes exit by themselves."""
+    """Run roslaunch on a file whose nodes exit without being stopped."""
     return subprocess.run(
         [str(BIN / "roslaunch"), str(file)], capture_output=True, text=True, timeout=100, check=False
     )
@@ -46,12 +46,12 @@ def port(monkeypatch: pytest.MonkeyPatch) -> int:
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return a package of plain scripts."""
+    """Return a package that contains only scripts."""
     folder = tmp_path / "pkg"
     folder.mkdir()
     (folder / "package.xml").write_text("<package><name>pkg</name></package>")
     (folder / "wait.py").write_text(
-        # A single write per line: roslaunch writes to the same pipe at the same time.
+        # Use a single write per line, because roslaunch writes to the same pipe at the same time.
         "#!/usr/bin/env python3\n"
         "import sys, time\nsys.stdout.write(' '.join(['waiting', *sys.argv[1:]]) + '\\n')\nsys.stdout.flush()\n"
         "try:\n    time.sleep(60)\nexcept KeyboardInterrupt:\n    print('interrupted', flush=True)\n"
@@ -70,7 +70,7 @@ def started() -> Iterator[list[subprocess.Popen[str]]]:
     running: list[subprocess.Popen[str]] = []
     yield running
     for process in running:
-        # Stop its children too: an orphan would keep the pipe open.
+        # Stop the child processes too, because an orphan would keep the pipe open.
         with contextlib.suppress(psutil.Error):
             for child in psutil.Process(process.pid).children(recursive=True):
                 child.kill()
@@ -255,8 +255,8 @@ def test_a_required_node_ends_all(master: str, package: Path, code: int, status:
 def test_nodes_run_without_log_files(
     master: str, package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Their output goes to the terminal."""
-    # An unbuffered node writes the line end separately: a line of roslaunch may come between.
+    """The nodes' output goes to the terminal instead."""
+    # An unbuffered node writes the line end separately, so that a line from roslaunch may come in between.
     monkeypatch.setenv("PYTHONUNBUFFERED", "")
     (tmp_path / "file").touch()
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "file"))
@@ -368,7 +368,7 @@ def test_undeclared_launch_argument_is_a_warning(package: Path, capsys: pytest.C
 def test_args_line_without_ros_master_uri(
     package: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The line matches real ROS's, so that it works in every terminal."""
+    """The line is the same as real ROS's, so that it works in every terminal."""
     file = package / "a.launch"
     file.write_text('<launch><node name="n" ns="g" pkg="pkg" type="wait.py"/></launch>')
     assert roslaunch.main(["--args", "/g/n", str(file)]) == 0

@@ -1,4 +1,4 @@
-"""check_urdf and urdf_to_graphviz: output and files, with graphviz and without."""
+"""check_urdf and urdf_to_graphviz: output and files, with and without graphviz."""
 
 from __future__ import annotations
 

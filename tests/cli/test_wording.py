@@ -1,6 +1,6 @@
-"""ROS's own messages of commands, before minirospy's own line: scripts and ROS's tests match them.
+"""ROS's own messages for commands, printed before minirospy's own line: scripts and ROS's tests match them.
 
-The texts are ROS's; tests/interop compares them with the real commands' output.
+The messages are ROS's; tests/interop compares them with the real commands' output.
 """
 
 from __future__ import annotations
