@@ -185,7 +185,7 @@ class _Walk:
 
 
 class Block(NamedTuple):
-    """Elements that have the same bytes in CDR as in ROS 1, without padding: of ``size`` bytes, aligned to ``width``."""
+    """Elements whose bytes are the same in CDR and ROS 1, without padding. Each has ``size`` bytes, aligned to ``width``."""
 
     width: int
     size: int

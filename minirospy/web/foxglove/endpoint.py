@@ -143,7 +143,7 @@ class FoxgloveEndpoint:
         session.send(serializing.connection_graph_update(tables, (), ()))
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
-        """Replace a channel whose publisher's messages have another definition than the installed type."""
+        """Replace a channel whose publisher uses a definition that differs from the installed type's."""
         replaced = self.channels.redefine(channel, header)
         if replaced:
             _log.info(
