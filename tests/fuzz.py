@@ -73,8 +73,8 @@ class Target:
         ours.setblocking(False)
         with theirs:
             theirs.setblocking(False)
-            connection = connections.Connection(master._server, ours, self._loop)
-            master._server.connections[connection] = None
+            connection = connections.Connection(master.server, ours, self._loop)
+            master.server.connections[connection] = None
             for piece in data.split(CUT):
                 if piece and connection._state is connections.State.OPEN:
                     connection.received(piece)
@@ -82,7 +82,7 @@ class Target:
                     theirs.recv(1 << 20)
             connection.end()
         assert not self._faults.found, self._faults.found.pop()
-        assert master._server.held == 0
+        assert master.server.held == 0
         assert master.registry.node_uri(self._name) == "http://127.0.0.1:1/", "it forgot a node"
         assert master.registry.publisher_uris("/" + self._name[1:]) == ["http://127.0.0.1:1/"]
         parse_response(serialize_response(master.dispatch("getParam", ["/x", "/"])))
@@ -94,7 +94,7 @@ class Target:
         if self._master:
             await self._master.close()
         self._master = Master()
-        self._master._notifier.send = lambda notice: None
+        self._master.notifier.send = lambda notice: None
         await self._master.start()
         # A name that no input can guess, and so take over.
         self._name = f"/kept{random.getrandbits(64):x}"

@@ -224,8 +224,8 @@ class Target:
         def left() -> list[object]:
             connections = [each for listener in bridge.listeners.values() for each in listener.connections]
             rosbridge = [*bridge.rosbridge.sessions, *bridge.rosbridge.services]
-            graph = [*bridge.graph._publishers, *bridge.graph.topics]
-            return [*connections, *rosbridge, *bridge._video._feeds, *graph]
+            graph = [*bridge.graph.publishers, *bridge.graph.topics]
+            return [*connections, *rosbridge, *bridge.video.feeds, *graph]
 
         end = time.monotonic() + 60
         while left():

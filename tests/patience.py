@@ -8,16 +8,16 @@ __all__ = ["PATIENCE", "patient_limits"]
 
 PATIENCE = 60.0  # seconds; a machine that runs tests may stall for some
 LIMITS = (
-    "aio.topics._JOIN_SECONDS",
-    "fleet.definitions._SECONDS",
-    "web.foxglove.channels._SECONDS",
-    "introspect.node_queries._QUERY_SECONDS",
-    "ros2.action_to_ros1._SERVER_SECONDS",
-    "ros2.action_to_ros2._ACCEPT_SECONDS",
-    "ros2.bridge._JOIN_SECONDS",
-    "ros2.bridge._QUERY_SECONDS",
-    "ros2.services._QUERY_SECONDS",
-    "cli.bridge_status._SECONDS",
+    "aio.topics.JOIN_SECONDS",
+    "fleet.definitions.ANSWER_SECONDS",
+    "web.foxglove.channels.TYPE_SECONDS",
+    "introspect.node_queries.QUERY_SECONDS",
+    "ros2.action_to_ros1.SERVER_SECONDS",
+    "ros2.action_to_ros2.ACCEPT_SECONDS",
+    "ros2.bridge.JOIN_SECONDS",
+    "ros2.bridge.QUERY_SECONDS",
+    "ros2.services.QUERY_SECONDS",
+    "cli.bridge_status.ANSWER_SECONDS",
 )
 """Limits after which the product gives up, or continues without an answer, in seconds."""
 

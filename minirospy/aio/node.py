@@ -20,6 +20,7 @@ from minirospy.aio.services import Service, ServiceClass, ServiceProxy
 from minirospy.aio.time import Rate, SimulatedTime
 from minirospy.aio.topics import PublishedTopic, Publisher, SubscribedTopic, Subscription
 from minirospy.base import names
+from minirospy.base.clock import SILENT_CLOCK
 from minirospy.base.environment import Environment
 from minirospy.base.errors import (
     MasterUnreachableError,
@@ -180,7 +181,9 @@ class Node:
             if self._simulated_time or self._rosout:
                 prefer_ros1()
             if self._simulated_time and await self.get_param("/use_sim_time", False):
-                self._simulated = SimulatedTime(self._stopping)
+                self._simulated = SimulatedTime(
+                    self._stopping, on_silence=lambda: self.log.warning("%s", SILENT_CLOCK)
+                )
                 self._spawn(self._follow_clock(self._simulated))
             if self._rosout:
                 self._start_rosout()

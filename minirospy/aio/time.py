@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
-from collections.abc import AsyncIterator
+import time
+from collections.abc import AsyncIterator, Callable
 from typing import TYPE_CHECKING
 
+from minirospy.base.clock import FirstTimeWait
 from minirospy.base.errors import ROSInterruptException, ROSTimeMovedBackwardsException
 
 if TYPE_CHECKING:
@@ -56,8 +58,10 @@ class Rate:
 class SimulatedTime:
     """The time in the last /clock message, in nanoseconds; 0 before the first one."""
 
-    def __init__(self, stopping: asyncio.Event) -> None:
+    def __init__(self, stopping: asyncio.Event, on_silence: Callable[[], object] = lambda: None) -> None:
+        """Call ``on_silence()`` once if a sleep has waited two seconds for the first message."""
         self.now = 0
+        self._first = FirstTimeWait(on_silence)
         self._stopping = stopping
         self._tick = asyncio.Event()
 
@@ -71,8 +75,11 @@ class SimulatedTime:
 
         Raise ROSTimeMovedBackwardsException if time jumps back to before the sleep started.
         """
+        started = time.monotonic()
         while self.now == 0 and not self._stopping.is_set():
             await self._next_tick()
+            if self.now == 0:
+                self._first.check(started)
         start = self.now
         while self.now < start + nanoseconds and not self._stopping.is_set():
             await self._next_tick()

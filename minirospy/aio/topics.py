@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["PublishedTopic", "Publisher", "SubscribedTopic", "Subscription"]
 
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
-_JOIN_SECONDS = 1.0
+JOIN_SECONDS = 1.0
 
 
 class Subscription(Handle, Generic[_M_co]):
@@ -217,7 +217,7 @@ class Publisher(Handle, Generic[_M_co]):
         if state is None:
             return  # the topic was closed while registering
         with contextlib.suppress(asyncio.TimeoutError, ROSInterruptException):
-            await asyncio.wait_for(self._wait_for(state.publication.expected), _JOIN_SECONDS)
+            await asyncio.wait_for(self._wait_for(state.publication.expected), JOIN_SECONDS)
 
     async def close(self) -> None:
         """Stop publishing; the node's last publisher on a topic also unregisters the topic. Idempotent."""
@@ -323,7 +323,7 @@ class PublishedTopic:
         await asyncio.wait([self._registration])
         for link in self.publication.links:
             if not self._handles:
-                await link.drain(_JOIN_SECONDS)
+                await link.drain(JOIN_SECONDS)
         topic = self.publication.topic
         if self._handles or self._node._published.get(topic) is not self:
             return

@@ -11,12 +11,15 @@ import struct
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import Protocol
 
 from minirospy.base.errors import ROSTimeMovedBackwardsException
 
 __all__ = [
+    "SILENT_CLOCK",
     "Clock",
+    "FirstTimeWait",
     "SignalSafeEvent",
     "SimulatedClock",
     "WallClock",
@@ -31,6 +34,13 @@ other systems a Ctrl-C just before the start of a wait takes effect only after i
 """
 
 _POLL_SECONDS = 0.1
+_SILENT_SECONDS = 2.0  # a simulator's /clock arrives sooner after a node's start
+
+SILENT_CLOCK = (
+    "/use_sim_time is set, and no time has arrived on /clock yet: sleep(), Rate and Timer wait for it. Start the simulator or "
+    "`rosbag play --clock`; or type `rosparam set use_sim_time false`, and restart this node"
+)
+"""The warning about a clock that has no time."""
 
 
 class SignalSafeEvent(threading.Event):
@@ -122,12 +132,37 @@ class WallClock:
         return not wait_for_event(stop, max(0.0, nanoseconds / 1e9))
 
 
+class FirstTimeWait:
+    """Calls a function once if the first time of a simulated clock does not arrive within two seconds."""
+
+    def __init__(self, on_silence: Callable[[], object]) -> None:
+        self._pending = [on_silence]  # a list, because several threads may wait: pop() is atomic
+
+    def check(self, started: float) -> None:
+        """Call the function if the wait that began at ``started``, in seconds of time.monotonic(), has lasted too long."""
+        if self._pending and time.monotonic() - started >= _SILENT_SECONDS:
+            try:
+                on_silence = self._pending.pop()
+            except IndexError:
+                return
+            on_silence()
+
+
 class SimulatedClock:
     """A clock that is set by a simulator through /clock, or by a test."""
 
-    def __init__(self, now: int = 0, changed: threading.Condition | None = None) -> None:
-        """Start at ``now``; ``changed`` is notified each time the clock is set."""
+    def __init__(
+        self,
+        now: int = 0,
+        changed: threading.Condition | None = None,
+        on_silence: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Start at ``now``; ``changed`` is notified each time the clock is set.
+
+        ``on_silence()`` is called once, in a thread that has waited two seconds for the first time.
+        """
         self._now = now
+        self._first = FirstTimeWait(on_silence)
         self._changed = changed or threading.Condition()
         # Do not use the condition, because a signal handler may wait for a thread that sets the clock or sleeps.
         self._sleepers: list[SignalSafeEvent] = []
@@ -152,9 +187,12 @@ class SimulatedClock:
         """
         sleeper = SignalSafeEvent()
         self._sleepers.append(sleeper)
+        started = time.monotonic()
         try:
             while (start := self._now) == 0 and not stop.is_set():
                 self._wait(sleeper)
+                if self._now == 0:
+                    self._first.check(started)
             while (now := self._now) < start + nanoseconds and not stop.is_set():
                 if now < start:
                     raise ROSTimeMovedBackwardsException((start - now) / 1e9)

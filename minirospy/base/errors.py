@@ -154,10 +154,12 @@ class NotFoundError(MinirospyError):
 
 
 class MasterUnreachableError(MinirospyError):
-    """No master responds at ``uri``.
+    """No master responds at ``uri``. ``why``: the reason why this process cannot call it; ``cause``: why it does not respond.
 
-    ``why``: why this process cannot call the master; ``cause``: why the master does not respond.
+    ``ros_text`` is ROS's message for it.
     """
+
+    ros_text = "Unable to communicate with master!"
 
     def __init__(self, uri: str, why: str = "", cause: str = "") -> None:
         super().__init__(uri, why, cause)

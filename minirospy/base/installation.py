@@ -13,7 +13,7 @@ from pathlib import Path
 
 __all__ = ["install_command"]
 
-_IS_WINDOWS = os.name == "nt"
+IS_WINDOWS = os.name == "nt"
 _PIPX_FILE = "pipx_metadata.json"
 _UV_FILE = "uv-receipt.toml"
 
@@ -104,7 +104,7 @@ def _quoted_path(path: str) -> str:
     On Windows only the parts that need it are quoted: cmd.exe and PowerShell both run ``C:\\"Program Files"\\python.exe``,
     but PowerShell parses a line that starts with a quote as an expression.
     """
-    if not _IS_WINDOWS:
+    if not IS_WINDOWS:
         import shlex
 
         return shlex.quote(path)

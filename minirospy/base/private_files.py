@@ -20,9 +20,9 @@ __all__ = ["create_file", "open_file", "open_text", "read_file", "remove_file", 
 OPEN_ELSEWHERE_PATIENCE = 1.0
 """Seconds to retry on Windows while another process, such as a virus scanner, has the file open."""
 
-_REFUSES_OPEN_FILES = sys.platform == "win32"
+REFUSES_OPEN_FILES = sys.platform == "win32"
 
-_FLAGS = (
+OPEN_FLAGS = (
     getattr(os, "O_BINARY", 0)
     | getattr(os, "O_NOFOLLOW", 0)
     # Without this, opening a FIFO would block until another process opens its other end.
@@ -40,7 +40,7 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
         # Check this because Windows has no O_NOFOLLOW; on other systems it only makes the error clearer.
         raise _refusal(path, "it is a symbolic link, which is not followed")
 
-    file = os.open(path, (flags & ~os.O_TRUNC) | _FLAGS, mode)
+    file = os.open(path, (flags & ~os.O_TRUNC) | OPEN_FLAGS, mode)
     try:
         found = os.fstat(file)
         # Allow devices: only root can create them, and a user may choose /dev/null.
@@ -102,7 +102,7 @@ def _until_closed(action: Callable[[], None]) -> None:
             return
         except PermissionError:
             # On other systems the cause is the folder's permissions, which waiting does not change.
-            if not _REFUSES_OPEN_FILES or time.monotonic() >= end:
+            if not REFUSES_OPEN_FILES or time.monotonic() >= end:
                 raise
         time.sleep(pause)
         pause = min(2 * pause, 0.05)

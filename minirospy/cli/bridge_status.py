@@ -10,7 +10,7 @@ from minirospy.base.errors import BridgeError
 
 __all__ = ["show_status"]
 
-_SECONDS = 5.0
+ANSWER_SECONDS = 5.0
 _MAX_BYTES = 10_000_000
 _SCHEMES = {"video": "http"}
 _Json = Any
@@ -98,8 +98,8 @@ def _fetch(port: int, token: _Token) -> _Json:
 
     # The server is on this machine, so its certificate need not be verified.
     context = ssl._create_unverified_context()
-    plain = http.client.HTTPConnection("127.0.0.1", port, timeout=_SECONDS)
-    encrypted = http.client.HTTPSConnection("127.0.0.1", port, timeout=_SECONDS, context=context)
+    plain = http.client.HTTPConnection("127.0.0.1", port, timeout=ANSWER_SECONDS)
+    encrypted = http.client.HTTPSConnection("127.0.0.1", port, timeout=ANSWER_SECONDS, context=context)
     fault: Exception | None = None
     for connection in (plain, encrypted):
         try:

@@ -81,7 +81,7 @@ def _add_ignored(parser: Parser, *words: str, takes_value: bool = False) -> None
         parser.add_argument(*words, dest="ignored", action="store_true", help="accepted, without effect")
 
 
-def _dashboard_parser() -> Parser:
+def dashboard_parser() -> Parser:
     from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
     parser = _parser("minirospy dashboard", "Shows the graph and the board in a browser.")
@@ -448,7 +448,7 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
     return True
 
 
-DASHBOARD = Command("minirospy dashboard", _dashboard_parser, _dashboard)
+DASHBOARD = Command("minirospy dashboard", dashboard_parser, _dashboard)
 
 _ARGUMENTS: Mapping[str, tuple[Callable[[Parser], None] | None, Callable[..., tuple[str, Fields]]]] = {
     "rqt": (_add_plugin, _plugin),

@@ -390,4 +390,5 @@ FAMILY = Family(
         Verb("param", "print a robot's parameter: param robot1 /speed", _param_parser, _param),
     ),
     summary="join robots with their own masters over Zenoh",
+    wording={},
 )

@@ -191,7 +191,7 @@ get_caller_id = get_name
 
 def get_namespace() -> str:
     """Return the namespace of this node, with a trailing slash."""
-    return names.namespace_of(current_session().name)
+    return current_session().identity.namespace
 
 
 def get_node_uri() -> str | None:

@@ -9,7 +9,9 @@ import threading
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
-__all__ = ["report_waiting", "suppress_tracebacks"]
+from minirospy.base.escape import escaped
+
+__all__ = ["report_interrupt", "report_waiting", "suppress_tracebacks"]
 
 
 def report_waiting(*, is_leaving: bool) -> None:
@@ -19,6 +21,19 @@ def report_waiting(*, is_leaving: bool) -> None:
     # The terminal may have been closed.
     with contextlib.suppress(OSError, ValueError, AttributeError):
         print(f"shutdown: still waiting for {what}. {advice}", file=sys.stderr, flush=True)
+
+
+def report_interrupt(reason: str) -> None:
+    """Print that the main thread is interrupted, its location in the program, and the reason of the shutdown."""
+    main = threading.main_thread()
+    place = _place(sys._current_frames().get(main.ident or 0))
+    at = f" at {place}" if place else ""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        print(
+            f"shutdown: thread {main.name}{at} has not ended: interrupting it as Ctrl-C does ({escaped(reason)})",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def _what_runs() -> str:

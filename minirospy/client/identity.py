@@ -30,9 +30,12 @@ class Identity:
 
     def __init__(self, previous: Identity | None = None) -> None:
         """Use the identity ``previous`` until :meth:`take_name` is called, except for topic names."""
-        # Dict from resolved names to their remappings; empty before init_node
+        # Keys are resolved names, and __name and similar; empty before init_node. Programs change this and `mappings`
         self.remappings: dict[str, str] = previous.remappings if previous else {}
         self._name: str | None = previous._name if previous else None
+        # The namespace that the program has set, or None
+        self._namespace: str | None = previous._namespace if previous else None
+        self._mappings: dict[str, str] | None = previous._mappings if previous else None
         self._arguments: names.Arguments | None = previous._arguments if previous else None
         self._environment: Environment | None = previous._environment if previous else None
         self._is_named = False
@@ -52,15 +55,41 @@ class Identity:
         return self._arguments
 
     @property
+    def mappings(self) -> dict[str, str]:
+        """The remappings as written on the command line, including ``__name`` and other special keys."""
+        if self._mappings is None:
+            self._mappings = {**self.arguments.remappings, **self.arguments.special}
+        return self._mappings
+
+    @mappings.setter
+    def mappings(self, mappings: dict[str, str]) -> None:
+        self._mappings = mappings
+
+    def resolved_mappings(self, node_name: str) -> dict[str, str]:
+        """Return the remappings with both names resolved relative to the node ``node_name``; special keys stay unchanged."""
+        return {
+            key if key.startswith("__") else names.resolve(key, node_name): value
+            if key.startswith("__")
+            else names.resolve(value, node_name)
+            for key, value in self.mappings.items()
+        }
+
+    @property
     def name(self) -> str:
         """This node's global name; ``/unnamed``, in its namespace, before init_node."""
         if self._name is None:
             self._name = names.join(self.environment.namespace, _UNNAMED)
         return self._name
 
-    def be_called(self, name: str) -> None:
-        """Use the global name ``name`` until :meth:`take_name` is called."""
+    @property
+    def namespace(self) -> str:
+        """This node's namespace, with a trailing slash."""
+        return names.namespace_of(self.name) if self._namespace is None else self._namespace
+
+    def be_called(self, name: str, namespace: str | None = None) -> None:
+        """Use the global name ``name`` until :meth:`take_name` is called; report ``namespace``, if given, as its namespace."""
         self._name = name
+        self._namespace = namespace
 
     def resolve(self, name: str, caller_id: str | None = None) -> str:
         """Return the global name of ``name``, resolved relative to this node or the node ``caller_id``."""
@@ -81,23 +110,25 @@ class Identity:
             return self.resolve(name)
         if names.is_private(name):
             raise ValueError("~name topics cannot be created before init_node() has been called")
-        return names.resolve(name, self.name, self.arguments.resolved_remappings(self.name))
+        return names.resolve(name, self.name, self.resolved_mappings(self.name))
 
     def remap(self, name: str, caller_id: str | None = None) -> str:
         """Return the command line's remapping of ``name`` as written there, or ``name`` itself if there is none."""
-        mapped = self.arguments.remappings.get(name)
+        mapped = self.mappings.get(name)
         return name if mapped is None else names.resolve(mapped, caller_id or self.name)
 
     def reload_arguments(self, argv: Sequence[str]) -> None:
         """Use ``argv`` as the command line."""
         self._arguments = names.parse_arguments(argv)
+        self._mappings = None
 
     def take_name(self, name: str, argv: Sequence[str], anonymous: bool) -> None:
         """Read the environment, and become the node ``name`` with the command line ``argv``.
 
         Raise ROSInitException if the environment or the command line is invalid.
         """
-        arguments = self._arguments = names.parse_arguments(argv)
+        self.reload_arguments(argv)
+        arguments = self.arguments
         self._is_named = True
         try:
             self._environment = _read_environment()
@@ -107,8 +138,8 @@ class Identity:
             name = arguments.special["__name"]
         elif anonymous:
             name = f"{name}_{os.getpid()}_{time.time_ns() // 1_000_000}"
-        self._name = names.resolve(name, names.join(self.environment.namespace, _UNNAMED))
-        self.remappings = arguments.resolved_remappings(self._name)
+        self.be_called(names.resolve(name, names.join(self.environment.namespace, _UNNAMED)))
+        self.remappings = self.resolved_mappings(self.name)
 
 
 def private_parameters(arguments: names.Arguments) -> dict[str, object]:

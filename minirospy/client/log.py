@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from minirospy.base import times
 from minirospy.base.log_levels import DEBUG, ERROR, FATAL, INFO, SEVERITIES, WARN
+from minirospy.client.log_handlers import check_message
 from minirospy.client.session import current_session
 
 if TYPE_CHECKING:
@@ -121,6 +122,9 @@ def write(
         stack = "Stack (most recent call last):\n" + "".join(traceback.format_stack(at)).rstrip("\n")
     place = at.f_code.co_filename, at.f_lineno
     record = logger.makeRecord(logger.name, level, *place, msg, args, error, function, extra, stack)
+    if args or not isinstance(msg, str):
+        # A faulty log line must not end the node, whichever handlers the program has added.
+        check_message(record)
     with current_session().lifecycle.deferral:
         logger.handle(record)
 

@@ -19,7 +19,7 @@ from minirospy.base.clock import SimulatedClock
 from minirospy.base.log_levels import SEVERITIES, ros_level
 from minirospy.client.session import current_session
 
-__all__ = ["DeferringHandler", "RosOutHandler", "RosStreamHandler"]
+__all__ = ["DeferringHandler", "RosOutHandler", "RosStreamHandler", "check_message"]
 
 _COLOUR = {
     logging.DEBUG: "\033[32m",
@@ -57,7 +57,7 @@ class RosStreamHandler(DeferringHandler):
         self._stderr = stderr
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write one line. Raise TypeError if a message does not match its arguments, as in rospy."""
+        """Write one line."""
         line = _line(record)
         is_fine = record.levelno < logging.WARNING
         stream = (self._stdout or sys.stdout) if is_fine else (self._stderr or sys.stderr)
@@ -123,8 +123,19 @@ class RosOutHandler(DeferringHandler):
             self._busy.yes = False
 
 
+def check_message(record: logging.LogRecord) -> str:
+    """Return the record's text. If its arguments do not fit the message, replace the text by one that names the fault."""
+    try:
+        return record.getMessage()
+    except Exception as error:  # noqa: BLE001 - also what a program's own __str__() raises
+        text = record.msg if isinstance(record.msg, str) else f"<{type(record.msg).__name__}>"
+        record.msg = f"{text} (at {record.pathname}:{record.lineno}: the arguments do not fit: {error})"
+        record.args = ()
+        return record.msg
+
+
 def _message(record: logging.LogRecord) -> str:
-    text = record.getMessage()
+    text = check_message(record)
     if record.exc_info and not record.exc_text:
         record.exc_text = _text.formatException(record.exc_info)
     return f"{text}\n{record.exc_text}" if record.exc_text else text

@@ -131,7 +131,7 @@ def search_param(param_name: str) -> str | None:
 
     Raise ROSException if the master fails, or the name is private.
     """
-    name = current_session().identity.arguments.remappings.get(param_name, param_name)
+    name = current_session().identity.mappings.get(param_name, param_name)
     check_sendable(name)
     try:
         return str(_ask("search", name, lambda: current_session().master.call("searchParam", name)))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from minirospy.base.clock import Clock, WallClock, wait_for_event
 from minirospy.base.errors import ROSInitException
+from minirospy.client.callback_errors import CallbackErrors
 from minirospy.client.identity import Identity
 from minirospy.client.lifecycle import Lifecycle
 from minirospy.client.signals import SignalWatchdog
@@ -50,6 +51,8 @@ class Session:
         self.lifecycle = Lifecycle(self._leave)
         self.signals = SignalWatchdog(self.lifecycle, self._stop_leaving, self._is_sending)
 
+        self.callback_errors = CallbackErrors()
+        self.lifecycle.late_hooks.append(self.callback_errors.close)
         self.lock = threading.RLock()  # orders registrations, and guards the tables
         self.clock: Clock = previous.clock if previous else WallClock()
         # Notified whenever the simulated time changes
@@ -274,6 +277,9 @@ class Session:
                 "shutdown request" + (f": {request[1]}" if (request := _REQUEST.match(reason)) else ""),
                 flush=True,
             )
+        if not self.lifecycle.is_shutdown_requested:
+            # Called after the hooks, when is_shutdown() has become true.
+            self.lifecycle.interrupts.append(self.signals.interrupt_later)
         self.lifecycle.signal_shutdown(reason)
 
     def _on_parameter(self, key: str, value: object) -> None:

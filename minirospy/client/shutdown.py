@@ -13,6 +13,10 @@ __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 # seconds for the main thread to start the hooks, and again to see that is_shutdown() is true
 _GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
+# For the main thread to end by itself after a request from another process. No user waits at the terminal, so the times are
+# longer than after a signal. A main thread that polls is_shutdown() may be in a long iteration of its loop.
+_REQUEST_GRACE_SECONDS = 2.0
+_REQUEST_GRACE_OF_POLLS_SECONDS = 5.0
 
 
 class Phase(enum.IntEnum):
@@ -58,7 +62,7 @@ class ShutdownMachine:
     """The rules that decide which actions follow a signal, and when.
 
     Time is the value that the caller passes as ``now``, in seconds. One thread calls :meth:`signal` and :meth:`tick`; any
-    thread may set :attr:`phase` and the awareness of :attr:`main`.
+    thread may set :attr:`phase`, :attr:`is_requested` and the awareness of :attr:`main`.
     """
 
     def __init__(self) -> None:
@@ -67,6 +71,7 @@ class ShutdownMachine:
         self.runs_in_main = False  # True if the main thread itself runs the hooks and unregisters the node
         self.phase = Phase.RUNNING
         self.signals = 0
+        self.is_requested = False  # another process requested the shutdown that is in progress
         self._signalled = 0.0
         # The earliest time at which the main thread could see that is_shutdown() is true
         self._free: float | None = None
@@ -89,18 +94,18 @@ class ShutdownMachine:
         return [Action.STOP_LEAVING, Action.KEYBOARD_INTERRUPT] if is_leaving else [Action.KEYBOARD_INTERRUPT]
 
     def tick(self, now: float) -> list[Action]:
-        """Return the actions that are due after a signal. Each action is returned once."""
-        if not self.signals:
+        """Return the actions that are due after a signal or a request. Each action is returned once."""
+        if not self.signals and not self.is_requested:
             return []
         if self._free is None and self.phase >= (Phase.LEFT if self.runs_in_main else Phase.DOWN):
             self._free = now
 
         due = []
-        if self.phase is Phase.RUNNING and now >= self._signalled + _GRACE_SECONDS:
+        if self.signals and self.phase is Phase.RUNNING and now >= self._signalled + _GRACE_SECONDS:
             due.append(Action.RUN_HOOKS)
-        if self._free is not None and now >= self._free + _GRACE_SECONDS and not self.main_ends_by_itself:
+        if self._free is not None and now >= self._free + self._grace and not self.main_ends_by_itself:
             due.append(Action.INTERRUPT)
-        if now >= self._signalled + _REPORT_SECONDS:
+        if self.signals and now >= self._signalled + _REPORT_SECONDS:
             due.append(Action.REPORT)
         due = [action for action in due if action not in self._done]
         self._done.update(due)
@@ -109,4 +114,13 @@ class ShutdownMachine:
     @property
     def main_ends_by_itself(self) -> bool:
         """Return whether the main thread needs no exception, because it has exited or has been notified of the shutdown."""
-        return self.main_has_ended or self.main.awareness > Awareness.NONE
+        # Trust a main thread that polls to end, except after a request: nobody presses Ctrl-C a second time then.
+        trusted = Awareness.NOTIFIED if self.is_requested else Awareness.POLLS
+        return self.main_has_ended or self.main.awareness >= trusted
+
+    @property
+    def _grace(self) -> float:
+        """Return how long the main thread may run until it is interrupted, in seconds."""
+        if self.main.awareness > Awareness.NONE:
+            return _REQUEST_GRACE_OF_POLLS_SECONDS
+        return _GRACE_SECONDS if self.signals else _REQUEST_GRACE_SECONDS

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from types import FrameType
 
 from minirospy.base.signal_dispatch import dispatching_signal
-from minirospy.client.exit_messages import report_waiting
+from minirospy.client.exit_messages import report_interrupt, report_waiting
 from minirospy.client.lifecycle import Lifecycle
 from minirospy.client.shutdown import Action, Phase
 
@@ -73,9 +73,9 @@ class SignalWatchdog:
             number = getattr(signal, name)
             handler = signal.getsignal(number)
             # If nohup has set SIGHUP to be ignored, leave it ignored.
-            if handler != self._on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
+            if handler != self.on_signal and (name, handler) != ("SIGHUP", signal.SIG_IGN):
                 self._previous[number] = handler
-                signal.signal(number, self._on_signal)
+                signal.signal(number, self.on_signal)
 
         if self._sending is None:
             receiving, self._sending = socket.socketpair()
@@ -108,9 +108,19 @@ class SignalWatchdog:
                 for number in self._previous:
                     signal.signal(number, signal.SIG_DFL)
 
+    def interrupt_later(self) -> None:
+        """Interrupt a main thread that does not end by itself: another process has shut the node down.
+
+        Has no effect if the program handles the signals itself.
+        """
+        if self._sending is not None:
+            self._machine.is_requested = True
+            with contextlib.suppress(OSError):
+                self._sending.send(b"\0")
+
     # --- the main thread
 
-    def _on_signal(self, number: int, _: FrameType | None) -> None:
+    def on_signal(self, number: int, _: FrameType | None) -> None:
         self._number = number
         self._deferral.pending = True
         self._handled += 1
@@ -149,7 +159,9 @@ class SignalWatchdog:
             while True:
                 started = time.monotonic()
                 was_pending = deferral.pending
-                receiving.settimeout(_TICK_SECONDS if machine.signals or was_pending else None)
+                receiving.settimeout(
+                    _TICK_SECONDS if machine.signals or machine.is_requested or was_pending else None
+                )
                 with contextlib.suppress(TimeoutError):
                     if not (numbers := receiving.recv(64)):
                         return
@@ -168,7 +180,7 @@ class SignalWatchdog:
                     self._nudge()
 
     def _is_handled(self, number: int) -> bool:
-        return number in self._previous and signal.getsignal(number) == self._on_signal
+        return number in self._previous and signal.getsignal(number) == self.on_signal
 
     def _new_signals(self) -> int:
         """Return the number of signals from the user that the machine has not counted yet.
@@ -184,6 +196,8 @@ class SignalWatchdog:
                     _start(
                         self._lifecycle.signal_shutdown, f"signal-{self._number}", name="minirospy-shutdown"
                     )
+                case Action.INTERRUPT if not self._machine.signals:
+                    self._interrupt_after_request()
                 case Action.INTERRUPT | Action.KEYBOARD_INTERRUPT:
                     self._interrupt = action
                     self._nudge()
@@ -194,6 +208,22 @@ class SignalWatchdog:
                 case Action.EXIT:
                     os._exit(_EXIT_STATUS)
 
+    def _interrupt_after_request(self) -> None:
+        """Interrupt the main thread as Ctrl-C does, and print the reason."""
+        self._number = int(signal.SIGINT)
+        handler = signal.getsignal(self._number)
+        if hasattr(sys, "ps1") or not callable(handler):
+            # An interactive session keeps its variables, and a signal that is ignored, or would end the process, is not sent.
+            return
+
+        report_interrupt(str(self._lifecycle.reason))
+        if handler == self.on_signal:
+            self._interrupt = Action.INTERRUPT
+            self._nudge()
+        else:
+            # The program, or a library such as IPython, has replaced the handler, and decides about Ctrl-C itself.
+            _send_to_main(self._number)
+
     def _nudge(self) -> None:
         """Run the handler in the main thread, interrupting its system call, if any."""
         with self._nudging:
@@ -203,11 +233,15 @@ class SignalWatchdog:
                 return
             self._nudges += 1
             self._is_nudge = True
-            if sys.platform == "win32":
-                # On Windows, only this signal interrupts time.sleep().
-                signal.raise_signal(signal.SIGINT)
-            else:
-                signal.pthread_kill(threading.main_thread().ident or 0, self._number)
+            _send_to_main(self._number)
+
+
+def _send_to_main(number: int) -> None:
+    if sys.platform == "win32":
+        # On Windows, only this signal interrupts time.sleep().
+        signal.raise_signal(signal.SIGINT)
+    else:
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
 
 
 def _start(target: Callable[..., object], argument: object, name: str) -> None:

@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 
 from minirospy.base import names
-from minirospy.base.clock import SimulatedClock, wait_for_event
+from minirospy.base.clock import SILENT_CLOCK, SimulatedClock, wait_for_event
 from minirospy.base.environment import wrong_address
 from minirospy.base.errors import MasterUnreachableError, ROSException, ROSInitException, RpcError, RpcFault
 from minirospy.client import log_setup
@@ -89,7 +89,9 @@ def start_clock() -> None:
     except RpcError as error:
         raise ROSInitException(f"the master does not return /use_sim_time: {error}") from error
     if is_simulated:
-        clock = session.clock = SimulatedClock(changed=session.time_changed)
+        clock = session.clock = SimulatedClock(
+            changed=session.time_changed, on_silence=lambda: _log.warning("%s", SILENT_CLOCK)
+        )
         session.when_ready(lambda: _follow_clock_topic(clock))
 
 

@@ -6,7 +6,6 @@ Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 from __future__ import annotations
 
 import logging
-import traceback
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
@@ -358,5 +357,6 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
         if is_callers_thread and not isinstance(error, Exception):
             raise
         # Ignore the callback's errors while a shutdown hook releases resources that the callback uses.
-        if not current_session().lifecycle.is_shutdown_requested:
-            _log.error("bad callback: %s\n%s", callback.function, traceback.format_exc())
+        session = current_session()
+        if not session.lifecycle.is_shutdown_requested:
+            session.callback_errors.log(callback.function, error)

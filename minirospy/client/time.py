@@ -183,9 +183,9 @@ class TimerEvent:
 class Timer(threading.Thread):
     """Calls ``callback(TimerEvent)`` every ``period`` (a Duration), or once with ``oneshot``, in its own thread.
 
-    ``reset``: start again if simulated time jumps back; otherwise the timer then stops with
-    ROSTimeMovedBackwardsException. An exception in the callback stops the timer too; so does ``sys.exit()``, which is
-    logged.
+    If simulated time jumps back, the period starts again, and the callback is called; without ``reset`` this is logged.
+    An exception in the callback is logged, and the timer continues. ``sys.exit()`` in the callback stops the timer, and is
+    logged too.
     """
 
     def __init__(
@@ -220,15 +220,25 @@ class Timer(threading.Thread):
 
     def run(self) -> None:
         """Call the callback every period, in the timer's thread."""
+        session = current_session()
         rate = Rate(1.0 / self._period.to_sec(), reset=self._reset)
         expected: times.Time = rate.last_time + self._period
         last_expected: times.Time | None = None
         last_real: Time | None = None
         last_duration: float | None = None
 
-        with current_session().lifecycle.interrupting(self._ended.set):
+        with session.lifecycle.interrupting(self._ended.set):
             while not self._is_over():
-                rate._sleep(self._ended)
+                try:
+                    rate._sleep(self._ended)
+                except ROSTimeMovedBackwardsException as error:
+                    _log.warning(
+                        "simulated time jumped back by %.3f s: the Timer of %s starts its period again",
+                        error.time,
+                        self._callback,
+                    )
+                    rate.last_time = get_rostime()
+                    expected = rate.last_time
                 if self._is_over():
                     return
 
@@ -240,6 +250,11 @@ class Timer(threading.Thread):
                     # threading reports all other exceptions in a thread; rospy's timer stops without a message.
                     _log.error("Timer ends: its callback %s called sys.exit(%s)", self._callback, error)
                     return
+                except BaseException as error:
+                    # Without a function there is nothing to call again. After a shutdown the callback's errors mean nothing.
+                    if not callable(self._callback) or session.lifecycle.is_shutdown_requested:
+                        raise
+                    session.callback_errors.log(self._callback, error)
                 if self._oneshot:
                     return
 

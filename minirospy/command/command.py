@@ -94,7 +94,7 @@ Wording = Mapping[str, RosText]
 message.
 """
 
-NO_MASTER = RosText("ERROR: Unable to communicate with master!")
+NO_MASTER = RosText(f"ERROR: {MasterUnreachableError.ros_text}")
 
 
 def ros_words(error: Exception, wording: Wording) -> RosText:
@@ -291,12 +291,25 @@ def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool =
 
 
 def complain(name: str, error: Exception, status: int = 1, ros_text: str = "") -> int:
-    """Print an error on stderr after flushing stdout: first ROS's message, then minirospy's. Return ``status``."""
+    """Print an error on stderr after flushing stdout: first ROS's message, then minirospy's. Return ``status``.
+
+    Without a master, minirospy's message is printed only on a terminal: scripts compare the last line with ROS's.
+    """
     _flush()
     if ros_text:
         print(escaped(ros_text, "\n\t"), file=sys.stderr)
+        if _is_without_master(error) and not _has_terminal():
+            return status
     print(escaped(f"{name}: ERROR: {error}", "\n"), file=sys.stderr)
     return status
+
+
+def _is_without_master(error: Exception) -> bool:
+    return isinstance(error.__cause__ if isinstance(error, WordedError) else error, MasterUnreachableError)
+
+
+def _has_terminal() -> bool:
+    return sys.stderr.isatty()
 
 
 def _flush() -> None:

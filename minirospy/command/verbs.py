@@ -55,8 +55,8 @@ class Command(NamedTuple):
 class Verb(NamedTuple):
     """A verb in a family: its name, one line of help, its parser, and the function that is called with the parsed arguments.
 
-    In a family that is a node, the function also takes ``arguments``, the remapping arguments. ``wording`` contains ROS's
-    messages for this verb's errors.
+    Without a line of help, the family's help does not list the verb. In a family that is a node, the function also takes
+    ``arguments``, the remapping arguments. ``wording`` contains ROS's messages for this verb's errors.
     """
 
     name: str
@@ -137,7 +137,9 @@ class Family(NamedTuple):
         """Return the output of `-h`."""
         lines = [self.headline, ""] if self.headline else []
         lines.append("Commands:")
-        lines += [f"\t{self.name} {self.verb_name(verb)}\t{verb.summary}" for verb in self.verbs]
+        lines += [
+            f"\t{self.name} {self.verb_name(verb)}\t{verb.summary}" for verb in self.verbs if verb.summary
+        ]
         return "\n".join([*lines, "", *([self.footer, ""] if self.footer else [])])
 
     def _dispatch(self, words: list[str]) -> int | None:

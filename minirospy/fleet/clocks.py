@@ -1,4 +1,4 @@
-"""Estimate a peer's clock offset from its replies, and measure message delays. Pure. Times are in nanoseconds."""
+"""Estimates a peer's clock offset from its replies, and measures message delays. Pure. Times are in nanoseconds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ class Ping(NamedTuple):
 
 
 class ClockOffset(NamedTuple):
-    """Subtract ``offset`` from the peer's times to get local times. The offset is accurate to half the round trip."""
+    """The difference between a peer's clock and the local one. Subtract ``offset`` from the peer's times to get local times.
+
+    The offset is accurate to half the round trip.
+    """
 
     offset: int
     round_trip: int
@@ -35,7 +38,7 @@ class Delay:
     count: int = 0
 
     def add(self, delay: int) -> None:
-        """Record a message's delay. A negative delay, which results from an inexact offset, counts as 0."""
+        """Record a message's delay. A negative delay, which may result from an inexact offset, counts as 0."""
         delay = max(0, delay)
         self.mean = delay if not self.count else self.mean + _SHARE * (delay - self.mean)
         self.longest = max(self.longest, delay)

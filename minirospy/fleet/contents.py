@@ -1,7 +1,7 @@
-"""The contents of the fleet, from its liveliness tokens: robots, their gateways, topics and services. Pure.
+"""The contents of the fleet as announced by liveliness tokens: robots, their gateways, topics and services. Pure.
 
-Tokens arrive and disappear one by one and in any order; a robot's other tokens may arrive before its claim. Tokens that
-exceed the limits, or do not match the formats in :mod:`minirospy.fleet.keys`, are ignored and counted.
+Tokens arrive and disappear one by one and in any order, so a robot's other tokens may arrive before its claim. Tokens
+that exceed the limits, or do not match the formats in :mod:`minirospy.fleet.keys`, are ignored and counted.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ _Token = TypeVar("_Token", TopicToken, ServiceToken)
 __all__ = ["MAX_GATEWAYS", "MAX_NAMES", "MAX_TOKENS", "FleetContents", "Refused", "Robot"]
 
 MAX_GATEWAYS = 5_000
-MAX_NAMES = 2_000  # topics that one gateway may announce; services have the same limit
-MAX_TOKENS = 200_000  # limit for topics and services of all gateways together: some 100 MiB
+MAX_NAMES = 2_000  # maximum number of topics that a gateway may announce, and also of services
+# maximum number of topics and services of all gateways together, which take some 100 MiB
+MAX_TOKENS = 200_000
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot that is visible to other gateways. ``duplicates``: other claims to its name, which are ignored."""
+    """A robot that is visible to other gateways. ``duplicates`` are other claims to its name, which are ignored."""
 
     claim: Claim
     topics: dict[str, TopicToken]
@@ -35,7 +36,7 @@ class Robot:
 
 
 class Refused(NamedTuple):
-    """A gateway that is not shown. ``holder``: the claim that holds the name, or held it until recently."""
+    """A gateway that is not shown. ``holder`` is the claim that holds the name, or held it until recently."""
 
     claim: Claim
     holder: Claim | None
@@ -44,7 +45,7 @@ class Refused(NamedTuple):
 @dataclass(eq=False)
 class _Gateway:
     claim: Claim | None = None
-    order: int = 0  # order in which claims were seen: later ones have larger numbers
+    order: int = 0  # order in which claims were seen; later claims have larger numbers
     topics: dict[str, TopicToken] = field(default_factory=dict)
     services: dict[str, ServiceToken] = field(default_factory=dict)
 
@@ -54,15 +55,18 @@ class _Gateway:
 
 
 class FleetContents:
-    """Records the tokens that exist now."""
+    """The tokens that currently exist."""
 
     def __init__(self, allows: Callable[[str], bool], clock: Callable[[], float] = time.monotonic) -> None:
-        """``allows(robot)`` returns whether a robot is of interest. ``clock`` returns monotonic seconds."""
+        """Create an empty record.
+
+        ``allows(robot)`` returns whether a robot is of interest; ``clock`` returns monotonic seconds.
+        """
         self.holders = Holders(clock)
         self.waiting: tuple[Refused, ...] = ()
         """The gateways that :meth:`robots` left out because another one holds their name."""
-        self.refused = 0  # tokens that were ignored
-        self.refusal = ""  # reason for the last ignored token
+        self.refused = 0  # number of ignored tokens
+        self.refusal = ""  # reason why the last ignored token was ignored
         self._count = 0
         self._allows = allows
         self._orders = itertools.count()
@@ -83,7 +87,7 @@ class FleetContents:
         gateway = self._gateways.get(at) or _Gateway()
         if isinstance(token, Claim):
             if gateway.claim not in (None, token):
-                # A gateway declares one claim while it runs: a second, different claim comes from another peer.
+                # A gateway declares only one claim while it runs, so a second, different claim is from another peer.
                 return self._refuse(f"robot [{name}]: two tokens claim to be its gateway {token.gateway}")
             changed = gateway.claim is None
             if changed:
@@ -92,7 +96,7 @@ class FleetContents:
             changed = self._put(gateway.topics, token.topic, token)
         else:
             changed = self._put(gateway.services, token.service, token)
-        # Do not store a gateway whose only name was refused: nothing would remove it.
+        # Do not store a gateway whose only name was rejected, because nothing would remove the gateway.
         if not gateway.is_empty:
             self._gateways[at] = gateway
         return changed
@@ -107,7 +111,7 @@ class FleetContents:
         if gateway is None:
             return False
 
-        # If a topic's flags change, its new token arrives before the old one is removed.
+        # If a topic's flags change, the new token arrives before the old one is removed.
         if isinstance(token, Claim):
             if gateway.claim != token:
                 return False
@@ -132,7 +136,7 @@ class FleetContents:
         return {gateway for _, gateway in self._gateways}
 
     def robots(self, lost: Collection[str] = ()) -> dict[str, Robot]:
-        """Return the robots by name, each as the gateway that holds its name announces it; ignore ``lost`` gateways."""
+        """Return the robots by name, each as announced by the gateway that holds its name. Ignore ``lost`` gateways."""
         there = [
             (gateway.order, gateway.claim)
             for gateway in self._gateways.values()

@@ -1,6 +1,6 @@
-"""Full definitions of message types, from packages, publishers and peers.
+"""The full definitions of message types, obtained from packages, publishers and peers.
 
-A peer's definition is checked against its md5sum.
+Definitions from peers are checked against their md5sums.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 __all__ = ["Definitions", "checked_specs"]
 
 _MOST = 5_000
-_SECONDS = 10.0
+ANSWER_SECONDS = 10.0
 MAX_CHARACTERS = 64 << 20  # in all cached definitions; ROS's own packages define 3 million characters
-MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4  # concurrent; an unanswered query times out after _SECONDS
+MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4  # concurrent; an unanswered query times out after ANSWER_SECONDS
 _NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
 
 
@@ -39,7 +39,7 @@ def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
 
 
 class Definitions:
-    """The types that this gateway knows. Generates no message classes, because messages stay serialized."""
+    """The types that this gateway knows. No message classes are generated, because messages stay serialized."""
 
     def __init__(self, node: Node, network: FleetNetwork) -> None:
         self.texts = TypeTexts(node)
@@ -69,7 +69,7 @@ class Definitions:
             self._known_characters += len(text)
 
     async def md5sum(self, name: str) -> str:
-        """Return the md5sum of an installed type, "" if it is not installed."""
+        """Return the md5sum of an installed type, or "" if the type is not installed."""
         found = await self.texts.installed(name)
         return found.md5sum if found else ""
 
@@ -89,7 +89,7 @@ class Definitions:
         """
         text = await self.text(name, md5sum)
         if not text and gateway and md5sum != _NO_FIELDS:
-            # Each gateway is queried separately, so one that does not respond delays only its own topics.
+            # Query each gateway separately, so that one that does not respond delays only its own topics.
             key = name, md5sum, gateway
             task = self._finding.get(key)
             if task is None:
@@ -99,7 +99,7 @@ class Definitions:
         return InterfaceType(name, md5sum, text)
 
     async def rewriter(self, name: str, md5sum: str) -> FrameRewriter | None:
-        """Return the rewriter for a type's frame ids; None if the type has none, or its definition is not known."""
+        """Return the rewriter for a type's frame ids, or None if the type has none or its definition is not known."""
         key = name, md5sum
         if key not in self._rewriters:
             text = await self.text(name, md5sum)
@@ -119,12 +119,14 @@ class Definitions:
         if share is None:
             share = self._shares[gateway] = asyncio.Semaphore(MAX_QUERIES_OF_GATEWAY)
         try:
-            # Acquire the gateway's own share first, so that a gateway that does not respond cannot use up all query
+            # Acquire the gateway's own share first, so that a gateway that does not respond cannot occupy all query
             # slots.
             async with share, self._querying:
                 if (name, md5sum) in self._known:
                     return self._known[name, md5sum]
-                answer = await self._network.query(definition_key(gateway, name, md5sum), seconds=_SECONDS)
+                answer = await self._network.query(
+                    definition_key(gateway, name, md5sum), seconds=ANSWER_SECONDS
+                )
                 text = answer.decode()
                 loop = asyncio.get_running_loop()
                 await loop.run_in_executor(None, checked_specs, name, text, md5sum)

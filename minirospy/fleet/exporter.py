@@ -1,4 +1,7 @@
-"""The robot half of a gateway: announces the robot's graph, sends topics that have readers, and delivers messages and calls."""
+"""The robot half of a gateway.
+
+It announces the robot's graph, sends topics that have readers, and delivers messages and calls.
+"""
 
 from __future__ import annotations
 
@@ -38,8 +41,8 @@ __all__ = ["Exporter"]
 
 _log = logging.getLogger(__name__)
 _MAX_IN_FLOWS = 1_000
-_MAX_WANTED, _MAX_READERS = 10_000, 1_000
-"""Topics that readers may request, and readers per topic: limited because peers choose both."""
+MAX_WANTED, MAX_READERS = 10_000, 1_000
+"""Maximum number of topics that readers may request, and of readers per topic, because peers choose both."""
 
 
 class Exporter:
@@ -57,7 +60,7 @@ class Exporter:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """``hidden``: names of other robots whose topics are imported here, and which are not announced again."""
+        """Create the exporter. ``hidden`` contains the names of other robots, whose imported topics are not announced again."""
         self.claim = claim
         self.duplicates: tuple[Claim, ...] = ()
         self.graph = RobotGraph(node, definitions, claim, rules, hidden)
@@ -71,7 +74,7 @@ class Exporter:
         self._rules = rules
         self._spawn = spawn
         self._tokens: dict[str, Deferred] = {}
-        self._readers: dict[str, set[str]] = {}
+        self.readers: dict[str, set[str]] = {}
         self._claims = {claim}
         self._rivals = RateLimitedLogger(_log)
         self._flows = Receiver.flows(_MAX_IN_FLOWS)
@@ -90,7 +93,7 @@ class Exporter:
             network.subscribe(f"{ROOT}/in/{ends}/**", self._arrived),
             network.answer(f"{ROOT}/call/{ends}/**", self._call),
             network.answer(f"{ROOT}/param/{ends}", self._parameter),
-            network.watch_tokens(f"{ROOT}/want/{ends}/**", self._want_changed),
+            network.watch_tokens(f"{ROOT}/want/{ends}/**", self.want_changed),
             network.watch_tokens(f"{ROOT}/offer/{ends}/**", self._offer_changed),
             network.watch_tokens(f"{ROOT}/robot/{self.claim.name}/**", self._claim_changed),
             network.declare_token(claim_key(self.claim)),
@@ -130,7 +133,7 @@ class Exporter:
     def _announce(self) -> None:
         keys = {topic_key(each) for each in self.graph.topics.values()}
         keys |= {service_key(each) for each in self.graph.services.values()}
-        # Declare new tokens before old ones are removed: a topic whose flags have changed always has a token.
+        # Declare new tokens before removing old ones, so that a topic whose flags have changed always has a token.
         for key in keys - self._tokens.keys():
             self._tokens[key] = self._network.declare_token(key)
         for key in self._tokens.keys() - keys:
@@ -138,14 +141,14 @@ class Exporter:
 
     # --- what others want, and offer
 
-    def _want_changed(self, key: str, is_there: bool) -> None:
+    def want_changed(self, key: str, is_there: bool) -> None:
         want = parse_want(key)
         if want is None:
             return
-        if is_there and want.topic not in self._readers and len(self._readers) >= _MAX_WANTED:
+        if is_there and want.topic not in self.readers and len(self.readers) >= MAX_WANTED:
             return
-        readers = self._readers.setdefault(want.topic, set())
-        if is_there and len(readers) < _MAX_READERS:
+        readers = self.readers.setdefault(want.topic, set())
+        if is_there and len(readers) < MAX_READERS:
             readers.add(want.reader)
             outbound = self.outbound.get(want.topic)
             if outbound:
@@ -154,7 +157,7 @@ class Exporter:
         else:
             readers.discard(want.reader)
         if not readers:
-            del self._readers[want.topic]
+            del self.readers[want.topic]
         self._spawn(self._adjust())
 
     def _offer_changed(self, key: str, is_there: bool) -> None:
@@ -188,16 +191,16 @@ class Exporter:
 
     async def _adjust(self) -> None:
         """Open and close outbound and inbound topics to match the graph and the readers' requests."""
-        # Closing awaits the master: meanwhile, other calls of this method change both tables.
+        # Closing awaits the master, and other calls of this method may change both tables in the meantime.
         for topic, outbound in list(self.outbound.items()):
             token = self.graph.topics.get(topic)
             if self.outbound.get(topic) is outbound and (
-                token is None or not token.has_same_messages(outbound.token) or topic not in self._readers
+                token is None or not token.has_same_messages(outbound.token) or topic not in self.readers
             ):
                 del self.outbound[topic]
                 await outbound.close()
 
-        for topic in list(self._readers):
+        for topic in list(self.readers):
             token = self.graph.topics.get(topic)
             if token and token.is_published and topic not in self.outbound:
                 priority = self._rules.priority(topic, token.type)
@@ -207,7 +210,7 @@ class Exporter:
                     self._sender.flow(priority, self._rules.rate(topic)),
                     await self._definitions.rewriter(token.type, token.md5sum) if token.has_frames else None,
                 )
-                if topic in self._readers and topic not in self.outbound:
+                if topic in self.readers and topic not in self.outbound:
                     self.outbound[topic] = outbound
                     outbound.open()
         for topic, inbound in list(self.inbound.items()):
@@ -221,7 +224,7 @@ class Exporter:
     # --- messages, calls and questions of others
 
     def _inbound_of(self, topic: str) -> InboundTopic | None:
-        """Return the publisher for messages that arrive on a topic; the topic must have subscribers here."""
+        """Return the publisher for messages that arrive on a topic, which must have subscribers here."""
         inbound = self.inbound.get(topic)
         token = self.graph.topics.get(topic)
         if inbound is None and token is not None and token.is_subscribed:

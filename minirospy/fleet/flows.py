@@ -1,7 +1,7 @@
-"""Fair queues for messages to send or deliver; a full flow drops its oldest messages. Pure.
+"""Fair queues for messages to be sent or delivered. A full flow drops its oldest messages. Pure.
 
-A flow contains one topic's messages at the sender, or one robot's topic's messages at the receiver. Each flow keeps its
-newest messages, and flows are served round-robin, so that a flooding flow loses only its own messages.
+At the sender, a flow contains the messages on a topic; at the receiver, those on one topic of one robot. Each flow keeps
+its newest messages, and flows are served round-robin, so that a flooding flow loses only its own messages.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _T = TypeVar("_T")
 
 @dataclass(eq=False)
 class Flow(Generic[_T]):
-    """The queued messages of one flow: at most ``most`` messages and ``most_bytes`` bytes; a single message may be larger."""
+    """The queued messages of one flow: at most ``most`` messages and ``most_bytes`` bytes. A single message may be larger."""
 
     most: int
     most_bytes: int
@@ -52,7 +52,7 @@ class FlowQueue(Generic[_T]):
         return dropped
 
     def pop(self) -> tuple[Flow[_T], _T] | None:
-        """Return the next message and its flow, round-robin; None if the queue is empty."""
+        """Return the next message and its flow, round-robin, or None if the queue is empty."""
         while self._ready:
             flow, _ = self._ready.popitem(last=False)
             if not flow.waiting:

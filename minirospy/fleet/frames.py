@@ -1,7 +1,7 @@
-"""Add and remove a robot's prefix in the frame ids of serialized messages: ``base_link`` <-> ``robot1/base_link``. Pure.
+"""Adds or removes a robot's prefix in the frame ids of serialized messages, as in ``robot1/base_link``. Pure.
 
-Frame ids are the ``frame_id`` of each std_msgs/Header, and each string field ``child_frame_id``. The bytes after the last of
-them are copied unchanged, so an image costs one copy.
+Frame ids are the ``frame_id`` of each std_msgs/Header, and each string field ``child_frame_id``. The bytes after the last
+frame id are copied unchanged, so that an image costs one copy.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ class _Skip(NamedTuple):
 
 
 class _Text(NamedTuple):
-    """A string field; ``is_frame``: it is a frame id."""
+    """A string field; ``is_frame`` is True if it is a frame id."""
 
     is_frame: bool
 
 
 class _Array(NamedTuple):
-    """An array: ``steps`` for each element; ``length`` is None if the message itself contains the length."""
+    """An array with ``steps`` for each element; ``length`` is None if the message itself contains the length."""
 
     length: int | None
     steps: tuple[_Step, ...]
@@ -46,7 +46,7 @@ class FrameRewriter:
     """Rewrites the frame ids in messages of one type."""
 
     def __init__(self, spec: MessageSpec, lookup: Lookup) -> None:
-        """Raise DefinitionError if the spec is invalid, or an error from ``lookup``."""
+        """Create a rewriter for a type. Raise DefinitionError if the spec is invalid, or any error from ``lookup``."""
         self._steps = _trimmed(_steps(spec, lookup))
 
     @property
@@ -62,7 +62,7 @@ class FrameRewriter:
         pieces: list[bytes] = []
         try:
             copied, _ = _run(self._steps, data, 0, 0, change, pieces)
-        except (struct.error, OverflowError) as error:  # OverflowError: an offset that exceeds 32 bits
+        except (struct.error, OverflowError) as error:  # OverflowError: the offset exceeds 32 bits
             raise DeserializationError("the message ends too early") from error
         pieces.append(data[copied:])
         return b"".join(pieces)
@@ -146,7 +146,7 @@ def _run(
     change: Callable[[bytes], bytes],
     pieces: list[bytes],
 ) -> tuple[int, int]:
-    """Process ``data`` from ``at``; return the offset up to which ``pieces`` has a copy, and the offset after the steps."""
+    """Process ``data`` from ``at``. Return the offset up to which ``pieces`` contains a copy, and the offset after the steps."""
     for step in steps:
         if isinstance(step, _Skip):
             at += step.size
@@ -168,7 +168,7 @@ def _run(
                 case ():
                     pass
                 case inner:
-                    # Each element has a length prefix of four bytes, so it takes at least four bytes.
+                    # Each element is at least four bytes long, because it starts with a length of four bytes.
                     if count * 4 > len(data) - at or count > _MAX_ELEMENTS:
                         raise DeserializationError(f"an array of {count} elements is longer than the message")
                     for _ in range(count):

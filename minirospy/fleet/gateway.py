@@ -1,4 +1,4 @@
-"""A gateway: one Zenoh session with a robot half, a control room half, or both."""
+"""A gateway, which consists of one Zenoh session with a robot half, a control room half, or both."""
 
 from __future__ import annotations
 
@@ -32,16 +32,19 @@ if TYPE_CHECKING:
 __all__ = ["REGISTRATION_FAULT_LINES", "Gateway", "GatewayOptions"]
 
 REGISTRATION_FAULT_LINES = 1
-"""Log lines in ten seconds of a gateway's node: a master that does not register the topics of 1,000 robots is one line."""
+"""Maximum number of log lines in ten seconds from a gateway's node, so that a master that rejects the topics of 1,000 robots
+causes one line.
+"""
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class GatewayOptions:
-    """``name``: the robot's name, "" if it is only a control room. ``imports``: whether to show the fleet's robots here.
+    """A gateway's settings.
 
-    ``ros1_namespace``: the namespace of zenoh-bridge-ros1's keys to pass as well, "" for none. ``clock`` returns the time
-    in ns, ``host`` identifies the machine ("" for the default); tests replace both.
+    ``name`` is the robot's name, or "" for a gateway that is only a control room. With ``imports``, the fleet's robots
+    are shown here. ``ros1_namespace`` is the namespace of zenoh-bridge-ros1's keys to pass as well, or "" for none.
+    ``clock`` returns the time in ns, ``host`` identifies the machine ("" for the default); tests replace both.
     """
 
     name: str = ""
@@ -57,7 +60,7 @@ class Gateway:
     """Passes topics and services between a master and the fleet. Runs on the node's loop."""
 
     def __init__(self, node: Node, options: GatewayOptions) -> None:
-        """Raise BridgeError if the name is not legal for a robot."""
+        """Create the gateway. Raise BridgeError if the name is not legal for a robot."""
         if options.name and not is_robot_name(options.name):
             raise BridgeError(
                 f"[{options.name}] cannot be a robot's name: letters, digits and underscores, a letter first"
@@ -81,7 +84,7 @@ class Gateway:
         self._failures = RateLimitedLogger(_log)
 
     async def connect(self) -> None:
-        """Open the session; wait for the router if one is configured. The node need not be started.
+        """Open the session; wait for the router if one is configured. The node need not have been started.
 
         Raise BridgeError if the configuration is invalid.
         """
@@ -280,7 +283,7 @@ class Gateway:
         task = asyncio.ensure_future(guarded())
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # A task that is cancelled before its first step has not started the coroutine, so close the coroutine.
+        # If the task is cancelled before its first step, the coroutine has not started and must be closed.
         task.add_done_callback(lambda _: work.close())
         return task
 

@@ -1,4 +1,4 @@
-"""Choose the gateway that represents a robot if several claim its name: the first one seen, or the operator's choice. Pure.
+"""Selects the gateway that represents a robot if several claim its name: the first one seen, or the operator's choice. Pure.
 
 Peers' clocks do not affect the choice. A machine that holds a name keeps the name until it has been absent for
 :data:`HOLD_SECONDS`, so that another machine cannot claim the name during a short loss of the link. A gateway on the same
@@ -14,8 +14,8 @@ from minirospy.fleet.keys import Claim, is_machine
 
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
-HOLD_SECONDS = 10.0  # Zenoh's default lease: a link that is silent for longer is closed
-# names of robots that have left, remembered for HOLD_SECONDS; limited because peers choose names
+HOLD_SECONDS = 10.0  # Zenoh's default lease, after which a silent link is closed
+# maximum number of names to remember for HOLD_SECONDS after the robots have left, because peers choose names
 MAX_HOLDS = 5_000
 
 
@@ -23,22 +23,22 @@ MAX_HOLDS = 5_000
 class _Hold:
     claim: Claim
     left: float | None = None
-    """Time when the gateway left, in seconds of the clock; None while the gateway is present."""
+    """The time at which the gateway left, in seconds of the clock, or None while the gateway is present."""
 
 
 class Holders:
-    """Chooses among the claims to each name, and remembers the choices."""
+    """Selects among the claims to each name, and remembers the selection."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """``clock`` returns monotonic seconds."""
+        """Create an empty record. ``clock`` returns monotonic seconds."""
         self.machines: Mapping[str, str] = {}
-        """The machine that the operator has chosen for each robot, by the robot's name."""
+        """The machine that the operator has chosen for each robot, by robot name."""
         self._clock = clock
         self._holds: dict[str, _Hold] = {}
         self._given_up: set[Claim] = set()
 
     def give_up(self, claim: Claim) -> None:
-        """Release a claim, whose gateway does not respond, to other gateways on its machine.
+        """Release a claim whose gateway does not respond, so that another gateway on its machine may take the name.
 
         The gateway's token may still exist.
         """
@@ -50,7 +50,7 @@ class Holders:
         return hold.claim if hold else None
 
     def choose(self, name: str, claims: Sequence[Claim]) -> Claim | None:
-        """Return the claim to use from those present, in the order in which they were seen; None if no claim is allowed."""
+        """Return the claim to use from those present, given in the order in which they were seen; None if no claim is allowed."""
         present = [claim for claim in claims if claim not in self._given_up] or list(claims)
         machine = self.machines.get(name)
         if machine:
@@ -73,7 +73,10 @@ class Holders:
         return self._hold(name, present)
 
     def forget(self, present: Collection[str]) -> None:
-        """Forget the names whose holders left more than HOLD_SECONDS ago; ``present``: names that are still claimed."""
+        """Forget the names whose holders left more than HOLD_SECONDS ago.
+
+        ``present`` contains the names that are still claimed.
+        """
         now = self._clock()
         for name in self._holds.keys() - present:
             hold = self._holds[name]
@@ -87,7 +90,7 @@ class Holders:
             self._given_up = {claim for claim in self._given_up if claim.name in present}
 
     def pause(self, names: Collection[str]) -> float | None:
-        """Return the seconds until the first of these names becomes free; None if no holder has left."""
+        """Return the seconds until the first of these names becomes free, or None if no holder has left."""
         ends = [
             hold.left + HOLD_SECONDS
             for name in names

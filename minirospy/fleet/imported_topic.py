@@ -1,6 +1,6 @@
 """A robot's topic in the local graph.
 
-It is published here while it has subscribers here, and offered to the robot while it has publishers here.
+It is published here while it has local subscribers, and offered to the robot while it has local publishers.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _QUEUE = 100
 _FRAME_TOPICS = ("/tf", "/tf_static")
 _MAX_MESSAGE = 256 << 20
 _MAX_OFFERS = 10
-# topics registered concurrently: each makes a call to the master on its own connection
+# maximum number of topics to register concurrently, because each calls the master on its own connection
 MAX_REGISTERING = 50
 
 
@@ -78,7 +78,7 @@ class ImportedTopic:
     """One topic of one robot. Runs on the loop, except for message handling."""
 
     def __init__(self, shared: Shared, token: TopicToken, offset: Callable[[], ClockOffset | None]) -> None:
-        """``offset()`` returns the offset of the robot's clock, or None before it has been measured."""
+        """Create the topic. ``offset()`` returns the offset of the robot's clock, or None before it has been measured."""
         self.token = token
         is_global = token.has_frames and token.topic in _FRAME_TOPICS
         self.name = token.topic if is_global else f"/{token.robot}{token.topic}"
@@ -107,15 +107,15 @@ class ImportedTopic:
 
     @property
     def needs_snapshot(self) -> bool:
-        """Return whether only the local graph shows the topic's other publishers.
+        """Return whether the topic's other publishers can be seen only in the local graph.
 
-        This is so if this gateway publishes the topic itself.
+        This is the case if this gateway publishes the topic itself.
         """
         return self.token.is_subscribed and self.token.is_published and not self._is_global
 
     @property
     def dropped(self) -> int:
-        """Return how many of the robot's messages were dropped here because the local subscribers were slower."""
+        """Return how many of the robot's messages were dropped here because local subscribers were too slow."""
         return self._flow.dropped
 
     @property
@@ -179,7 +179,7 @@ class ImportedTopic:
                 self._advertise(interface)
             elif token.is_subscribed:
                 self._subscribe()
-            # Limited, because the master handles the 8,000 calls for a thousand robots one by one.
+            # Limit the concurrent calls, because the master handles the 8,000 calls for a thousand robots one by one.
             handle = self._publisher or self._subscription
             if handle is not None:
                 await handle.wait_until_registered()
@@ -239,7 +239,7 @@ class ImportedTopic:
             declared.undeclare()
         self._numbers.clear()
         if wanted and self._publisher and not self._is_global:
-            # The robot sends its latched message again to the next subscriber; by then the copy here may be outdated.
+            # The robot sends its latched message again to the next subscriber; the copy here may be outdated by then.
             self._publisher.forget_latched()
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
@@ -263,7 +263,7 @@ class ImportedTopic:
         if stamp:
             before = self._numbers.get("out")
             self._numbers["out"] = stamp.number
-            # The numbers restart after the robot has reopened the topic: do not count that as lost messages.
+            # The numbers restart after the robot has reopened the topic, so do not count that as lost messages.
             if before is not None and before < stamp.number <= before + 1_000_000:
                 self.lost += stamp.number - before - 1
             offset = self._offset()
@@ -298,7 +298,8 @@ class ImportedTopic:
         )
 
     async def _unsubscribe(self) -> None:
-        # Clear all attributes before the await: meanwhile the topic may be subscribed to again, with another outflow.
+        # Clear all attributes before the await, because the topic may be subscribed to again meanwhile, with another
+        # outflow.
         subscription, self._subscription = self._subscription, None
         offers, self._offers = self._offers, {}
         outflow, self._outflow = self._outflow, None

@@ -1,4 +1,4 @@
-"""The control room half of a gateway: shows the fleet's robots in the local graph, each in a namespace with its name."""
+"""The control room half of a gateway. It shows the fleet's robots in the local graph, each in a namespace with its name."""
 
 from __future__ import annotations
 
@@ -33,28 +33,31 @@ if TYPE_CHECKING:
 __all__ = ["MACHINES", "ImportedRobot", "Importer"]
 
 MACHINES = "/fleet/machines"
-"""The parameter with the operator's choice of machine per robot name; `minirospy fleet takeover` sets it."""
+"""The parameter that contains the machine selected by the operator for each robot; `minirospy fleet takeover` sets it."""
 
 _log = logging.getLogger(__name__)
 _SETTLE_SECONDS = 0.1
-_LOOK_SECONDS = 1.0
-_AGAIN_SECONDS = 5.0  # before adding a robot again after a failure
+LOOK_SECONDS = 1.0
+AGAIN_SECONDS = 5.0  # before adding a robot again after a failure
 _CLOCK_SECONDS = 30.0
 _PINGS = 5
-_PING_SECONDS = 5.0
-_MAX_PING = 64  # bytes in a reply to a ping, which normally has 8
+PING_SECONDS = 5.0
+_MAX_PING = 64  # maximum size in bytes of a reply to a ping, which normally has 8
 _CALL_SECONDS = 3600.0
-# for a gateway to reply after another gateway on the same machine has claimed its name
-_CHALLENGE_SECONDS = 2.0
-# names removed (some 4 MB) before memory is returned, and the delay before that, as links linger
+# seconds for a name's holder to reply after another gateway on the same machine has claimed the name
+CHALLENGE_SECONDS = 2.0
+# number of removed names (some 4 MB) after which memory is returned, and the seconds to wait before that, as links
+# linger
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
-MAX_ROBOT_NAMES = 2_000  # of _MAX_IMPORTED names that one robot may use
-MAX_CONCURRENT_NAMES = 100  # names of a robot closed concurrently: each needs a task and a call to the master
-MAX_LISTED = 5  # robots named in one log line
-LINES = 5  # log lines of one kind per ten seconds
+MAX_ROBOT_NAMES = 2_000  # maximum number of names, of _MAX_IMPORTED, that one robot may use
+# maximum number of a robot's names to close concurrently, because each needs a task and a call to the master
+MAX_CONCURRENT_NAMES = 100
+MAX_LISTED = 5  # maximum number of robots named in one log line
+LINES = 5  # maximum number of log lines of one kind in ten seconds
 _WARN_OFFSET = 100_000_000
-_MAX_CONCURRENT_ROBOTS = 20  # robots removed concurrently
-_MAX_IMPORTED = 9_000  # names that the importer registers: the master accepts at most 10,000 per node
+_MAX_CONCURRENT_ROBOTS = 20  # maximum number of robots to remove concurrently
+# maximum number of names to register, because the master accepts at most 10,000 per node
+_MAX_IMPORTED = 9_000
 
 
 class ImportedRobot:
@@ -86,7 +89,10 @@ class Importer:
         spawn: Callable[[Coroutine[object, object, None]], object],
         clock: Callable[[], int],
     ) -> None:
-        """``gateway``: the id of this gateway. ``own_name``: the name of the robot that this gateway exports, "" for none."""
+        """Create the importer.
+
+        ``gateway`` is the id of this gateway; ``own_name`` is the name of the robot that it exports, or "" if there is none.
+        """
         self.robots: dict[str, ImportedRobot] = {}
         self.contents = FleetContents(lambda name: name != own_name and rules.robots(name))
         self._node = node
@@ -116,11 +122,11 @@ class Importer:
         self._comings = RateLimitedLogger(_log, LINES)
         self._rivals = RateLimitedLogger(_log, LINES)
         self._waiting: tuple[Refused, ...] = ()
-        """The gateways that were refused at the last refresh, so that each is logged once."""
+        """The gateways that were rejected at the last refresh; stored so that each is logged once."""
         self._removed = 0  # names removed since memory was last returned to the system
         self._trimming: asyncio.TimerHandle | None = None
         self._machines: dict[str, str] = {}
-        """Each robot's machine when the robot was last shown."""
+        """The machine that each robot was on when it was last shown."""
         self._challenging: set[str] = set()
         self._is_closed = False
         self._reporter = ErrorReporter(_log, "showing the fleet's robots")
@@ -141,7 +147,7 @@ class Importer:
         await self._node.parameters.add(MACHINES)
         await self._read_machines()
         self._declared = [
-            self._network.watch_tokens(f"{ROOT}/{kind}/**", self._changed)
+            self._network.watch_tokens(f"{ROOT}/{kind}/**", self.changed)
             for kind in ("robot", "topic", "service")
         ]
         self._watching = [
@@ -167,7 +173,7 @@ class Importer:
         robots, self.robots = self.robots, {}
         await asyncio.gather(*(self._remove(robot) for robot in robots.values()))
 
-    def _changed(self, key: str, is_there: bool) -> None:
+    def changed(self, key: str, is_there: bool) -> None:
         refused = self.contents.refused
         changed = self.contents.add(key) if is_there else self.contents.remove(key)
         if self.contents.refused != refused:
@@ -219,7 +225,7 @@ class Importer:
             self._is_reconciling = False
         seconds = time.monotonic() - started
         if seconds > _SETTLE_SECONDS:
-            # While a thousand robots join, leave the loop time for other tasks.
+            # While a thousand robots join, leave time on the loop for other tasks.
             self._not_before = asyncio.get_running_loop().time() + 2 * seconds
             if self._reconciling is not None:
                 self._reconciling.cancel()
@@ -238,7 +244,7 @@ class Importer:
                 left.append(name)
         self._report_names(left, "left")
         for first in range(0, len(gone), _MAX_CONCURRENT_ROBOTS):
-            # With return_exceptions, one failure does not affect the other robots.
+            # With return_exceptions, a failure does not affect the other robots.
             for error in await asyncio.gather(
                 *map(self._remove, gone[first : first + _MAX_CONCURRENT_ROBOTS]), return_exceptions=True
             ):
@@ -262,7 +268,7 @@ class Importer:
                 await self._update(known)
             except Exception as error:  # noqa: BLE001 - of one robot: the others are shown
                 self._reporter.report(error)
-                self._soon(_AGAIN_SECONDS)
+                self._soon(AGAIN_SECONDS)
 
     def _report_names(self, names: list[str], what: str) -> None:
         """Log the robots that have joined or left, in one line."""
@@ -324,7 +330,7 @@ class Importer:
                 )
 
     def _challenge(self, refused: Refused) -> None:
-        """Ping the holder of a name: its gateway may have been restarted on the same machine."""
+        """Ping the holder of a name, because its gateway may have been restarted on the same machine."""
         name = refused.claim.name
         if name not in self._challenging:
             self._challenging.add(name)
@@ -334,7 +340,7 @@ class Importer:
         claim, holder = refused
         assert holder
         try:
-            await self._network.query(f"{ROOT}/ping/{holder.gateway}", seconds=_CHALLENGE_SECONDS)
+            await self._network.query(f"{ROOT}/ping/{holder.gateway}", seconds=CHALLENGE_SECONDS)
         except QueryFailed:
             self.contents.holders.give_up(holder)
             self._soon(0.0)
@@ -421,8 +427,8 @@ class Importer:
             answering = asyncio.ensure_future(self._network.query(key, request, seconds=_CALL_SECONDS))
             leaving = asyncio.ensure_future(left.wait())
             try:
-                # Zenoh ends a query when the robot's token disappears, which may take minutes: stop waiting as soon
-                # as the robot has left.
+                # Stop waiting as soon as the robot has left: Zenoh ends a query when the robot's token disappears,
+                # which may take minutes.
                 await asyncio.wait((answering, leaving), return_when=asyncio.FIRST_COMPLETED)
                 if not answering.done():
                     raise ServiceException(f"robot [{token.robot}] has left during the call")
@@ -436,7 +442,7 @@ class Importer:
         return RawService(self._node, name, InterfaceType(token.type, token.md5sum), call)
 
     async def _watch(self) -> None:
-        pause = _LOOK_SECONDS
+        pause = LOOK_SECONDS
         while True:
             await asyncio.sleep(pause)
             started = time.monotonic()
@@ -444,7 +450,7 @@ class Importer:
                 self._look(await self._snapshot())
             except (MasterUnreachableError, RpcError) as error:
                 _log.debug("the graph cannot be read: %s", error)
-            pause = max(_LOOK_SECONDS, 20 * (time.monotonic() - started))
+            pause = max(LOOK_SECONDS, 20 * (time.monotonic() - started))
             for shown in list(self.robots.values()):
                 is_used = any(topic.is_open for topic in shown.topics.values())
                 if not shown.measured or (is_used and started - shown.measured > _CLOCK_SECONDS):
@@ -452,7 +458,7 @@ class Importer:
                     self._spawn(self._measure(shown))
 
     async def _snapshot(self) -> Snapshot | None:
-        """Return the local graph if it is needed because some robot both publishes and subscribes to a topic."""
+        """Return the local graph if a robot both publishes and subscribes to a topic, so that the graph is needed; else None."""
         if any(topic.needs_snapshot for shown in self.robots.values() for topic in shown.topics.values()):
             return await fetch(self._node.call_master)
         return None
@@ -466,7 +472,7 @@ class Importer:
         """Query all gateways in the fleet; return those that respond, or None if the query cannot be sent."""
         start = f"{ROOT}/ping/"
         try:
-            answers = await self._network.queries(f"{start}*", seconds=_PING_SECONDS, size=_MAX_PING)
+            answers = await self._network.queries(f"{start}*", seconds=PING_SECONDS, size=_MAX_PING)
         except QueryFailed as error:
             _log.debug("the fleet cannot be queried: %s", error)
             return None
@@ -478,7 +484,7 @@ class Importer:
         try:
             for _ in range(_PINGS):
                 sent = self._clock()
-                answer = await self._network.query(key, seconds=_PING_SECONDS)
+                answer = await self._network.query(key, seconds=PING_SECONDS)
                 if len(answer) == 8:
                     pings.append(Ping(sent, int.from_bytes(answer, "little", signed=True), self._clock()))
         except QueryFailed as error:

@@ -1,4 +1,4 @@
-"""A topic that a robot subscribes to and other gateways offer: published here while at least one offers it."""
+"""A topic that a robot subscribes to and other gateways offer. It is published here while at least one of them offers it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes
 def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
     """Run a coroutine on a node's loop and wait until it is done.
 
-    If the loop is slower, messages therefore queue in the receiver.
+    If the loop is slow, messages are therefore queued in the receiver.
     """
     done = node.run_threadsafe(work)
     with contextlib.suppress(Exception):
@@ -52,7 +52,7 @@ def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
 
 
 class InboundTopic:
-    """Publishes messages from writers; buffers them until the robot's subscribers are connected."""
+    """Publishes messages from writers, buffering them until the robot's subscribers are connected."""
 
     def __init__(
         self,
@@ -66,7 +66,9 @@ class InboundTopic:
         on_change: Callable[[], object] | None = None,
         stop_seconds: float = STOP_SECONDS,
     ) -> None:
-        """``headers``: extra fields for the connection header. ``on_change``: passed to :meth:`Node.advertise`.
+        """Create the topic.
+
+        ``headers`` contains extra fields for the connection header; ``on_change`` is passed to :meth:`Node.advertise`.
 
         A zero velocity is published if a stream of velocities stops for ``stop_seconds``; 0 disables this.
         """
@@ -103,7 +105,7 @@ class InboundTopic:
         return self._publisher is not None and any(peer != own for peer in self._publisher.subscribers)
 
     def offer_changed(self, offer: Offer, is_there: bool) -> None:
-        """Record an offer or its withdrawal; publish the topic while a writer offers it."""
+        """Record an offer or its withdrawal. Publish the topic while a writer offers it."""
         self._last = time.monotonic()
         if not is_there:
             self._offers.discard(offer)
@@ -143,7 +145,7 @@ class InboundTopic:
             await publisher.close()
 
     def _prepare(self, md5sum: str, writer: str) -> None:
-        # A topic has one type: that of the first writer, unless the type is already known here.
+        # A topic has only one type: the one known here, or otherwise that of the first writer.
         if self._md5sum or self.token.md5sum not in (UNKNOWN_MD5, md5sum):
             return
         self._md5sum = md5sum
@@ -175,7 +177,7 @@ class InboundTopic:
             )
         self._publisher = publisher
         await publisher.wait_for_expected()
-        # Publish buffered messages first: until then the receiver's thread passes new messages to `keep`, which runs
+        # Publish buffered messages first. Until then, the receiver's thread passes new messages to `keep`, which runs
         # on this loop.
         for body in self._held:
             self._put(publisher, body)

@@ -1,4 +1,4 @@
-"""Query the fleet from a command, without a master: for its robots, their status, and their parameters."""
+"""Queries the fleet from a command, without a master, for its robots, their status, and their parameters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAX_CONCURRENT = 16
 
 
 def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitable[_T]]) -> _T:
-    """Open a session, run ``question`` and return its result. Raise BridgeError if no gateway or router is reached."""
+    """Open a session, run ``question``, and return its result. Raise BridgeError if no gateway or router is reached."""
 
     async def asking() -> _T:
         network = await FleetNetwork.open(options, waits=False)
@@ -59,7 +59,7 @@ async def fleet_status(network: FleetNetwork, seconds: float) -> tuple[list[Answ
 
 
 async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds: float) -> object:
-    """Return a robot's parameter, or the dict of a namespace. Raise BridgeError if the robot does not provide it."""
+    """Return a robot's parameter, or the dict for a namespace. Raise BridgeError if the robot does not provide it."""
     claim = await _shown_claim(network, robot, seconds)
     if claim is None:
         raise BridgeError(
@@ -86,7 +86,7 @@ async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Cla
     if len(claims) > 1:
         _, controls = await fleet_status(network, seconds)
         shown = [claim for claim in claims if is_shown(claim, controls)]
-        # Use each machine's newest claim, because the token of the machine's previous gateway may still exist.
+        # Use the newest claim from each machine, because the token of the machine's previous gateway may still exist.
         claims = (
             [max(shown, key=lambda claim: claim.start)] if len({each.host for each in shown}) == 1 else shown
         )

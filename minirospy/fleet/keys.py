@@ -1,4 +1,4 @@
-"""The Zenoh keys of a fleet: what is announced, sent and queried under each key. Pure.
+"""The Zenoh keys that a fleet uses for announcements, messages and queries. Pure.
 
 Below the root, which other programs' wildcards do not match, each key names the robot and the gateway that represents it::
 
@@ -69,7 +69,7 @@ ROOT = "@minirospy/1"
 """The first chunk starts with ``@``, so that ``**`` does not match it. The second is the version of this key scheme."""
 
 UNKNOWN_MD5 = "-"
-"""The md5sum of a topic without publishers whose type is not installed."""
+"""Replaces the md5sum of a topic that has no publishers and whose type is not installed."""
 
 _MAX_NAME = 256
 _ROBOT = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}", re.ASCII)
@@ -82,7 +82,7 @@ _STAMP = struct.Struct("<Iq")
 
 
 class Claim(NamedTuple):
-    """A gateway's claim to represent a robot since ``start`` (ns, the gateway's clock), on the machine ``host``.
+    """A gateway's claim to represent a robot since ``start`` (in ns of the gateway's clock), on the machine ``host``.
 
     Neither field is verified; no decision depends on ``start``.
     """
@@ -94,7 +94,7 @@ class Claim(NamedTuple):
 
 
 class TopicToken(NamedTuple):
-    """A robot's topic. ``has_frames``: its frame ids get the robot's prefix."""
+    """A robot's topic. With ``has_frames``, its frame ids get the robot's prefix."""
 
     robot: str
     gateway: str
@@ -123,14 +123,14 @@ class ServiceToken(NamedTuple):
 
 
 class Want(NamedTuple):
-    """A request from a reader that has subscribers to a topic."""
+    """A reader's request for a topic to which it has subscribers."""
 
     topic: str
     reader: str
 
 
 class Offer(NamedTuple):
-    """An offer from a writer that has publishers on a topic to which the robot subscribes."""
+    """A writer's offer of a topic that it publishes and to which the robot subscribes."""
 
     topic: str
     writer: str
@@ -140,19 +140,19 @@ class Offer(NamedTuple):
 
 
 class Stamp(NamedTuple):
-    """A message's attachment: its sequence number on the topic, and its send time in ns of the sender's clock."""
+    """A message's attachment: its sequence number on the topic, and the time when it was sent, in ns of the sender's clock."""
 
     number: int
     nanoseconds: int
 
 
 def is_robot_name(name: str) -> bool:
-    """Return whether a name is legal for a robot: it becomes a ROS namespace."""
+    """Return whether a name is legal for a robot, because it becomes a ROS namespace."""
     return bool(_ROBOT.fullmatch(name))
 
 
 def is_machine(value: object) -> bool:
-    """Return whether a value is a valid machine id, the last part of a robot's token."""
+    """Return whether a value is a valid machine id, which is the last part of a robot's token."""
     return isinstance(value, str) and bool(_GATEWAY.fullmatch(value))
 
 
@@ -162,12 +162,12 @@ def is_md5(text: str) -> bool:
 
 
 def mangled(name: str) -> str:
-    """Return a name or type as one chunk of a key: ``/arm/state`` -> ``%arm%state``."""
+    """Convert a name or type to one chunk of a key: ``/arm/state`` becomes ``%arm%state``."""
     return name.replace("/", "%")
 
 
 def unmangled(chunk: str) -> str | None:
-    """Return a chunk's global graph resource name, or None if the chunk is not legal."""
+    """Convert a chunk to a global graph resource name; return None if the chunk is not legal."""
     name = chunk.replace("%", "/")
     return name if is_global_name(name) else None
 
@@ -187,7 +187,7 @@ def is_global_name(name: str) -> bool:
 
 
 def claim_key(claim: Claim, kind: str = "robot") -> str:
-    """Return the key of the token of a robot or, with ``kind`` "control", of a control room, whose name may be ``-``."""
+    """Return the key of a robot's token, or with ``kind`` "control" of a control room's, whose name may be ``-``."""
     return f"{ROOT}/{kind}/{claim.name}/{claim.gateway}/{claim.start:x}/{claim.host}"
 
 
@@ -305,7 +305,7 @@ def out_key(robot: str, gateway: str, md5sum: str, topic: str) -> str:
 
 
 def replay_key(robot: str, gateway: str, md5sum: str, topic: str, reader: str) -> str:
-    """Return the key for a topic's latched messages to one reader."""
+    """Return the key for a topic's latched messages that are sent to one reader."""
     return f"{ROOT}/replay/{robot}/{gateway}/{md5sum}/{mangled(topic)}/{reader}"
 
 
@@ -364,7 +364,7 @@ def parse_stamp(data: bytes) -> Stamp | None:
 
 
 def _chunks(key: str, kind: str) -> list[str]:
-    """Return the chunks of a key that follow its kind; an empty list if the key has another kind."""
+    """Return the chunks that follow the kind in a key, or an empty list if the key is of another kind."""
     start = f"{ROOT}/{kind}/"
     return key[len(start) :].split("/") if key.startswith(start) else []
 

@@ -1,4 +1,4 @@
-"""The only module that calls Zenoh: a gateway's session, its tokens, messages and queries.
+"""A gateway's Zenoh session, with its tokens, messages and queries. No other module calls Zenoh.
 
 Zenoh calls back in its own threads. This module calls its handlers on the event loop, except for messages, which are
 queued first. Calls to Zenoh may block, so all of them run in order in one thread, or in the thread for a priority
@@ -60,26 +60,30 @@ __all__ = [
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
 
-MAX_TEXT = 16 << 20  # bytes read from a query or a reply: a service's response or a definition
-MAX_REPLIES = 10_000  # accepted for one query: peers choose the number; a fleet has at most 5,000 gateways
-EARLY_SHARE = 0.9  # of the timeout: a query that ends before this without replies has lost its link
-_RETRY_SECONDS = 1.0
-_LINGER_SECONDS = 2.0
-_QUERIES = 200
-"""Service calls and parameter queries handled concurrently; further ones are refused."""
-_CONTROL_QUERIES = 50
-"""Concurrently handled pings and queries for status or definitions; their separate limit prevents delays by blocked calls."""
+# maximum number of bytes in a query or a reply, such as a service's response or a definition
+MAX_TEXT = 16 << 20
+# maximum number of replies to a query, because peers choose the number; a fleet has at most 5,000 gateways
+MAX_REPLIES = 10_000
+EARLY_SHARE = 0.9  # share of the timeout; a query that ends earlier without replies has lost its link
+RETRY_SECONDS = 1.0
+LINGER_SECONDS = 2.0
+MAX_QUERIES = 200
+"""Maximum number of service calls and parameter queries handled concurrently; further ones are rejected."""
+MAX_CONTROL_QUERIES = 50
+"""Maximum number of pings, status and definition queries handled concurrently; with a separate limit, blocked calls do not
+delay them.
+"""
 
 
 # --- the network
 
 
 async def _remove_linger() -> None:
-    """Remove SO_LINGER from all Zenoh links periodically, well within their lease of 10 s."""
+    """Periodically remove SO_LINGER from all Zenoh links, well within their lease of 10 s."""
     remover = LingerRemover()
     while True:
         remover.look()
-        await asyncio.sleep(_LINGER_SECONDS)
+        await asyncio.sleep(LINGER_SECONDS)
 
 
 class QueryFailed(MinirospyError):
@@ -95,11 +99,11 @@ class FleetNetwork:
         self._session = session
         self._loop = loop
         self._zenoh = importlib.import_module("zenoh")
-        # One thread preserves the order: peers see declarations in the order in which they were made.
+        # A single thread preserves the order, so that peers see declarations in the order in which they were made.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
-        self._calls = _Share(_QUERIES)
-        self._control = _Share(_CONTROL_QUERIES)
+        self._calls = _Share(MAX_QUERIES)
+        self._control = _Share(MAX_CONTROL_QUERIES)
         self._is_closed = False
         self._reporter = ErrorReporter(_log, "taking a message or query of the fleet")
         reporter = ErrorReporter(_log, "the search for links of Zenoh")
@@ -137,7 +141,7 @@ class FleetNetwork:
             if not is_reported:
                 _log.warning("nothing of the fleet answers at %s yet%s. Will keep trying.", endpoints, why)
                 is_reported = True
-            await asyncio.sleep(_RETRY_SECONDS)
+            await asyncio.sleep(RETRY_SECONDS)
 
     @property
     def peers(self) -> int:
@@ -155,7 +159,7 @@ class FleetNetwork:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # If the link is broken, undeclaring fails; the peer detects the loss itself.
+        # If the link is broken, undeclaring fails, but the peer detects the loss itself.
         with contextlib.suppress(self._zenoh.ZError):
             await self._loop.run_in_executor(self._caller, self._session.close)
         self._caller.shutdown(wait=False)
@@ -200,7 +204,7 @@ class FleetNetwork:
     ) -> Deferred:
         """Call ``deliver(key, message, attachment)`` for each message, in one of Zenoh's threads; ``deliver`` must not block.
 
-        ``from_others``: ignore messages from this session.
+        With ``from_others``, ignore messages from this session.
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
 
@@ -232,7 +236,7 @@ class FleetNetwork:
         return self._declare(declare)
 
     def beacon(self, key: str) -> Beacon:
-        """Return a lowest-priority publisher of empty messages to other sessions."""
+        """Return a publisher that sends empty messages to other sessions, with the lowest priority."""
         zenoh = self._zenoh
         return Beacon(
             self._caller,
@@ -251,13 +255,13 @@ class FleetNetwork:
         return {"allowed_destination": self._zenoh.Locality.REMOTE}
 
     def outlet_to_others(self, key: str, priority: Priority) -> Outlet:
-        """Return a publisher like :meth:`outlet`, except that this session itself does not receive its messages."""
+        """Return a publisher like :meth:`outlet`, except that this session does not receive its own messages."""
         return self.outlet(key, priority, **self._to_others)
 
     def outlet(self, key: str, priority: Priority, **options: object) -> Outlet:
         """Return a publisher with Zenoh's ``options``.
 
-        This method and the publisher's ``put`` may block: call both in a priority's thread.
+        This method and the publisher's ``put`` may block, so call both in a priority's thread.
         """
         zenoh = self._zenoh
         priorities = {
@@ -285,12 +289,12 @@ class FleetNetwork:
     ) -> Deferred:
         """Answer queries: ``handler(key, request)`` returns the reply, or raises MinirospyError with the reason for a refusal.
 
-        ``is_control``: these are the fleet's own queries, and the handler never waits for user nodes. ``from_others``:
+        Set ``is_control`` for the fleet's own queries, whose handlers never wait for user nodes. With ``from_others``,
         ignore queries from this session.
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
-        # Each peer replies to a query with wildcards under its own key.
+        # Each peer replies to a query with wildcards under the peer's own key.
         key = "" if "*" in pattern else pattern
 
         def arrived(query: Query) -> None:
@@ -305,7 +309,7 @@ class FleetNetwork:
     ) -> bytes:
         """Return the first reply. Raise QueryFailed if there is none, or the reply is an error.
 
-        ``of_others``: query only other sessions; if several match, the best match.
+        With ``of_others``, query only other sessions; if several match, query the best match.
         """
         options = {"target": self._zenoh.QueryTarget.BEST_MATCHING, **self._to_others} if of_others else {}
         started = self._loop.time()
@@ -330,7 +334,7 @@ class FleetNetwork:
         size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return the replies by key, at most ``most``, each of at most ``size`` bytes; Zenoh's ``options`` override defaults.
+        """Return at most ``most`` replies by key, each of at most ``size`` bytes; Zenoh's ``options`` override the defaults.
 
         Return as soon as ``most`` replies have arrived, without waiting for more.
         """
@@ -375,7 +379,7 @@ class FleetNetwork:
     # --- within
 
     async def _collected(self, start: Callable[[object], object], arrived: Callable[[Reply], bool]) -> None:
-        """Start a query; return after its last reply, or as soon as ``arrived`` returns True."""
+        """Start a query. Return after its last reply, or as soon as ``arrived`` returns True."""
         if self._is_closed:
             raise QueryFailed("the gateway is closed")
         ended = asyncio.Event()
@@ -395,13 +399,13 @@ class FleetNetwork:
         return Deferred(self._caller, declare, self._zenoh.ZError)
 
     def _direct(self, function: Callable[..., object]) -> object:
-        """Return a handler that Zenoh calls in Zenoh's own thread; by default Zenoh starts a thread for each handler."""
+        """Return a handler that Zenoh calls in its own thread. By default, Zenoh starts a thread for each handler."""
         return self._zenoh.handlers.Callback(function, indirect=False)
 
     def _start_answer(
         self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share, key: str = ""
     ) -> None:
-        # Check the limit here, because in a burst all tasks are created before the first of them runs.
+        # Check the limit here, because in a burst, all tasks are created before the first of them runs.
         is_full = len(share.tasks) >= share.limit
         refusal = f"the gateway is answering {share.limit} other queries" if is_full else ""
         task = asyncio.ensure_future(self._answer(query, handler, key, refusal))
@@ -448,14 +452,14 @@ class FleetNetwork:
 
 @dataclass(eq=False)
 class _Share:
-    """Tracks the concurrently handled queries of one kind, and their limit."""
+    """The queries of one kind that are handled concurrently, and their limit."""
 
     limit: int
     tasks: set[asyncio.Task[None]] = field(default_factory=set)
 
 
 class Deferred:
-    """A Zenoh declaration that is declared, and later undeclared, in the background."""
+    """A Zenoh declaration that is declared in the background, and later undeclared."""
 
     def __init__(
         self, caller: concurrent.futures.Executor, declare: Callable[[], Declared], fault: type[Exception]
@@ -514,7 +518,7 @@ class Beacon:
         self._declared = Deferred(caller, opened, fault)
 
     def put(self) -> None:
-        """Put an empty message in the background; skip it while the previous one is pending."""
+        """Send an empty message in the background; skip it while the previous one is pending."""
         if not self._is_waiting:
             self._is_waiting = True
             with contextlib.suppress(RuntimeError):

@@ -1,4 +1,4 @@
-"""Subscribes to a robot's topic that has readers in the fleet, and sends its messages to the fleet."""
+"""Subscribes to a robot's topic that has readers in the fleet, and sends its messages to them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MAX_LATCHED = 100
 
 
 class OutboundTopic:
-    """Sends a topic's messages to the fleet, and its latched messages again to each reader that arrives later."""
+    """Sends a topic's messages to the fleet, and sends the latched ones again to each reader that arrives later."""
 
     def __init__(
         self,
@@ -38,7 +38,9 @@ class OutboundTopic:
         key: str = "",
         is_left_out: Callable[[Header], bool] = lambda _: False,
     ) -> None:
-        """``key``: the key for the messages, "" for the fleet's own key; with a key, the topic may have no publisher yet.
+        """Create the topic.
+
+        ``key`` is the key for the messages, or "" for the fleet's own key; with a key, the topic may have no publisher yet.
 
         ``is_left_out(header)`` returns whether to ignore a publisher's messages.
         """

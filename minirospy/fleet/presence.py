@@ -1,4 +1,4 @@
-"""Find gateways that no longer respond, because the Zenoh tokens of robots that are lost together may remain for minutes.
+"""Finds gateways that no longer respond, because the Zenoh tokens of robots that are lost together may remain for minutes.
 
 All gateways are queried at regular intervals, and shortly after a robot has left. A gateway that has responded before and
 then misses two queries is lost until it responds again. A gateway that has never responded, for example because its
@@ -12,11 +12,11 @@ from collections.abc import Awaitable, Callable, Collection
 
 __all__ = ["Presence"]
 
-_REGULAR_SECONDS, _LOST_SECONDS = 60.0, 10.0
-"""Interval between checks, and the shorter interval while a gateway is lost, because it may have returned."""
+REGULAR_SECONDS, LOST_SECONDS = 60.0, 10.0
+"""Seconds between checks, normally and while a gateway is lost, because that gateway may have returned."""
 _SETTLE_SECONDS = 2.0
-"""Delay after a robot has left, because robots that are lost together disappear one by one."""
-_ROUNDS, _ROUND_SECONDS = 2, 5.0
+"""Seconds to wait after a robot has left, because robots that are lost together disappear one by one."""
+_ROUNDS, ROUND_SECONDS = 2, 5.0
 
 
 class Presence:
@@ -28,7 +28,9 @@ class Presence:
         gateways: Callable[[], Collection[str]],
         changed: Callable[[], object],
     ) -> None:
-        """``query()`` queries all gateways and returns those that responded in time, or None if it could not be sent.
+        """Create the tracker.
+
+        ``query()`` queries all gateways and returns those that responded in time, or None if it could not be sent.
 
         ``gateways()`` returns the gateways that have tokens. ``changed()`` is called when a gateway is lost or has
         returned.
@@ -51,7 +53,7 @@ class Presence:
     async def watch(self) -> None:
         """Check at regular intervals, and soon after :meth:`check_soon`."""
         while True:
-            pause = _LOST_SECONDS if self.lost else _REGULAR_SECONDS
+            pause = LOST_SECONDS if self.lost else REGULAR_SECONDS
             waiting = asyncio.ensure_future(self._soon.wait())
             try:
                 await asyncio.wait([waiting], timeout=pause)
@@ -68,7 +70,7 @@ class Presence:
         missing = set(self._answered)
         for number in range(_ROUNDS if present else 0):
             if number:
-                await asyncio.sleep(_ROUND_SECONDS)
+                await asyncio.sleep(ROUND_SECONDS)
             answers = await self._query()
             if answers is None:
                 return

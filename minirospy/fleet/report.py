@@ -1,4 +1,7 @@
-"""Format the output of `minirospy fleet status` from the gateways' replies. Pure; replies are untrusted and checked."""
+"""Formats the output of `minirospy fleet status` from the gateways' replies.
+
+Pure. Replies are untrusted and therefore checked.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ class Answer:
 
 
 def parse_answer(data: bytes) -> Json:
-    """Return a gateway's status; {} if the data is not valid."""
+    """Return a gateway's status, or {} if the data is invalid."""
     try:
         found = json.loads(data)
     except (ValueError, RecursionError):
@@ -35,14 +38,14 @@ def parse_answer(data: bytes) -> Json:
 
 
 def is_shallow(value: object, levels: int = MAX_LEVELS) -> bool:
-    """Return whether a JSON value is nested at most ``levels`` deep, because the JSON encoder recurses."""
+    """Return whether a JSON value has at most ``levels`` nested levels; the JSON encoder recurses once per level."""
     if isinstance(value, dict):
         value = list(value.values())
     return not isinstance(value, list) or (levels > 0 and all(is_shallow(each, levels - 1) for each in value))
 
 
 def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
-    """Return the human-readable lines: robots, then control rooms with the robots that each receives."""
+    """Return the human-readable lines: the robots, then the control rooms with the robots that each of them receives."""
     robots, controls = list(robots), list(controls)
     found = [
         f"{_count(len({each.claim.name for each in robots}), 'robot')}, {_count(len(controls), 'control room')}"
@@ -79,7 +82,7 @@ def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
 
 
 def is_shown(claim: Claim, controls: Iterable[Answer]) -> bool:
-    """Return whether a control room shows a gateway's robot; True if no control room shows a robot of this name."""
+    """Return whether a control room shows the gateway's robot; True if no control room shows a robot with this name."""
     shown = {
         _text(robot, "gateway")
         for control in controls

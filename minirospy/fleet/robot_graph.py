@@ -1,4 +1,4 @@
-"""The graph of a gateway's master: topics and services that nodes other than gateways use, and their types."""
+"""The graph of a gateway's master: the topics and services that nodes other than gateways use, and their types."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["RobotGraph"]
 _log = logging.getLogger(__name__)
 _MIN_REFRESH_INTERVAL, _MAX_REFRESH_INTERVAL = 0.25, 2.0
 _QUERY_SECONDS = 3.0
-"""Timeout after which the graph is announced without the types that are still unknown."""
+"""Seconds after which the graph is announced without the types that are still unknown."""
 
 
 class RobotGraph:
@@ -41,7 +41,10 @@ class RobotGraph:
         hidden: Callable[[], Collection[str]],
         gateways: Callable[[Snapshot], Collection[str]] | None = None,
     ) -> None:
-        """``hidden``: names of robots whose topics are imported here. ``gateways``: nodes to treat as this gateway."""
+        """Create the graph.
+
+        ``hidden`` contains the names of robots whose topics are imported here, ``gateways`` the nodes to treat like this one.
+        """
         self.is_master_reached = True
         self.topics: dict[str, TopicToken] = {}
         self.services: dict[str, ServiceToken] = {}
@@ -142,7 +145,7 @@ class RobotGraph:
         )
 
     async def _publisher(self, key: tuple[str, str]) -> Header:
-        """Query a publisher for the topic's type, and whether the publisher latches."""
+        """Query a publisher for the topic's type, and for whether it latches."""
         header = await self._definitions.texts.header_of(*key)
         self._definitions.learn(
             header.get("type", ""), header.get("md5sum", ""), header.get("message_definition", "")

@@ -5,7 +5,7 @@ Written from the source of that bridge (github.com/eclipse-zenoh/zenoh-plugin-ro
     HEX/MD5/NAMESPACE/NAME                               messages of a topic; queries of a service
     ros1_discovery_info/*/KIND/HEX/MD5/NAMESPACE/NAME    a beacon: some bridge has such a resource
 
-HEX is the type name, as two hexadecimal digits per byte; NAME has no leading slash; NAMESPACE is ``*``, which matches
+HEX is the type name, with two hexadecimal digits per byte; NAME has no leading slash; NAMESPACE is ``*``, which matches
 every other namespace, unless bridges are separated. KIND is pub, sub or srv; cl would be a service client, which no
 bridge announces. A beacon is empty, and is put every second. A bridge may stop its own beacons while it receives the same
 key from another bridge: a beacon shows that some bridge has the resource, but not which one, nor how many.
@@ -41,12 +41,13 @@ __all__ = [
 EVERY_NAMESPACE = "*"
 PERIOD = 1.0  # seconds between beacons of a resource
 LOST_SECONDS = 5.0
-"""Seconds without a beacon after which a resource is lost.
+"""Seconds without a beacon after which a resource counts as lost.
 
-When a bridge exits, a silent bridge needs up to three periods to resume its beacons. The bridge itself takes 3 to 6 s.
+If a bridge exits, a silent bridge needs up to three periods to resume its beacons. zenoh-bridge-ros1 itself takes 3 to 6
+s to detect the loss.
 """
 MAX_RESOURCES = 9_000
-"""Remote resources to track: the master accepts at most 10,000 names per node."""
+"""Maximum number of remote resources to track, because the master accepts at most 10,000 names per node."""
 
 _ROOT = "ros1_discovery_info"
 _KINDS = ("pub", "sub", "srv", "cl")
@@ -67,9 +68,9 @@ class Resource(NamedTuple):
 
 
 class SharedTopic(NamedTuple):
-    """A topic with one type. ``token``: its local use.
+    """A topic with one type. ``token`` describes its local use.
 
-    ``is_offered``, ``is_wanted``: other bridges publish it, or subscribe to it.
+    ``is_offered`` is True if other bridges publish it, ``is_wanted`` if they subscribe to it.
     """
 
     token: TopicToken
@@ -84,9 +85,9 @@ class SharedTopic(NamedTuple):
 def shared_topics(
     local: Mapping[str, TopicToken], remote: Iterable[Resource]
 ) -> tuple[dict[str, SharedTopic], dict[str, str]]:
-    """Return the local and remote topics by name, and the reasons for ignoring remote topics of another type, by name.
+    """Return the local and remote topics by name, and the reasons why remote topics with another type are ignored, by name.
 
-    The local type takes precedence; if there are only remote types, the first one does.
+    The local type takes precedence. If there are only remote types, the first one does.
     """
     found = {name: SharedTopic(token) for name, token in local.items() if token.md5sum != UNKNOWN_MD5}
     conflicts = {}
@@ -168,7 +169,7 @@ class Beacons:
     """Schedules the beacons of local resources: one per period, but none while other bridges send the same beacon."""
 
     def __init__(self, random: Callable[[], float]) -> None:
-        """``random()`` returns a number in [0, 1)."""
+        """Create an empty schedule. ``random()`` returns a number in [0, 1)."""
         self._random = random
         self._beacons: dict[str, _Beacon] = {}
 
@@ -176,7 +177,7 @@ class Beacons:
         return len(self._beacons)
 
     def update(self, keys: Iterable[str], now: float) -> None:
-        """Set the keys of the local resources; new ones are due immediately."""
+        """Set the keys of the local resources. Beacons for new ones are due immediately."""
         before = self._beacons
         self._beacons = {key: before.get(key) or _Beacon(now) for key in keys}
 
@@ -195,11 +196,11 @@ class Beacons:
             is_received, beacon.is_received = beacon.is_received, False
             beacon.due = now + PERIOD
             if is_received:
-                # Stop at random, so that about half of the bridges that send this beacon continue.
+                # Decide at random whether to stop, so that about half of the bridges that send this beacon continue.
                 beacon.is_silent = beacon.is_silent or self._random() < 0.5
                 beacon.is_resuming = False
             elif beacon.is_silent and not beacon.is_resuming:
-                # Resume after a random delay, so that the silent bridges do not all start together.
+                # Resume after a random delay, so that the silent bridges do not all start at the same time.
                 beacon.is_resuming = True
                 beacon.due = now + self._random() * PERIOD
             else:
@@ -227,7 +228,7 @@ class Sightings:
         return is_new
 
     def extend(self, seconds: float, now: float) -> None:
-        """Extend the life of all resources by ``seconds``, up to a full life from ``now``."""
+        """Extend the life of all resources by ``seconds``, up to a full lifetime from ``now``."""
         self._seen = {resource: min(at + seconds, now) for resource, at in self._seen.items()}
 
     def forget_lost(self, now: float) -> bool:

@@ -1,4 +1,4 @@
-"""The zenoh-bridge-ros1 half of a gateway: robots with that bridge share topics and services with this master.
+"""The zenoh-bridge-ros1 half of a gateway: shares topics and services with robots that use that bridge.
 
 Names are not changed.
 """
@@ -50,7 +50,7 @@ __all__ = ["Ros1Side"]
 
 _log = logging.getLogger(__name__)
 _MARKER = "/minirospy/ros1_keys"
-"""Each gateway that uses these keys subscribes to this topic first, so that gateways on one master detect each other."""
+"""A topic to which each gateway that uses these keys subscribes first, so that gateways on one master detect each other."""
 _MARKER_TYPE = InterfaceType("std_msgs/Empty", "d41d8cd98f00b204e9800998ecf8427e")
 _BRIDGE = "/ros1_to_zenoh_bridge"  # prefix of the default names of zenoh-bridge-ros1's own nodes
 _AGGREGATE = "/rosout_agg"
@@ -79,12 +79,16 @@ class Ros1Side:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """``hidden``: names of robots whose topics are imported here. ``namespace``: the keys' namespace."""
-        # /rosout_agg repeats /rosout: if both were passed, each line would return to the master that logged it.
+        """Create this half.
+
+        ``hidden`` contains the names of robots whose topics are imported here; ``namespace`` is the keys' namespace.
+        """
+        # Exclude /rosout_agg, which repeats /rosout: if both were passed, each line would return to the master that
+        # logged it.
         if rules.topics == NameFilter():
             rules = replace(rules, topics=NameFilter.of(deny=[_AGGREGATE]))
         self.namespace = namespace
-        self.refused = 0  # beacons that were ignored
+        self.refused = 0  # number of ignored beacons
         self.topics: dict[str, Ros1Topic] = {}
         self.services: dict[str, tuple[Resource, RawService]] = {}
         self.graph = RobotGraph(
@@ -96,10 +100,10 @@ class Ros1Side:
         self._shared = Shared(node, network, definitions, sender, receiver, rules, namespace, spawn)
         self._answered: dict[ServiceToken, Deferred] = {}
         self._outlets: dict[str, Beacon] = {}
-        # Beacons arrive in Zenoh's threads.
+        # Guards the beacons, which arrive in Zenoh's threads.
         self._lock = threading.Lock()
         self._beacons = Beacons(random.random)
-        self._sightings = Sightings()
+        self.sightings = Sightings()
         self._has_news = False
         self._conflicts: dict[str, str] = {}
         self._others: set[str] = set()
@@ -159,15 +163,16 @@ class Ros1Side:
         Raise MasterUnreachableError or RpcError if the master's call fails.
         """
         changed = await self.graph.look()
-        # Open topics and services before announcing them: a bridge calls and sends as soon as it receives a beacon.
+        # Open topics and services before announcing them, because a bridge calls and sends as soon as it receives a
+        # beacon.
         await self._adjust()
         self._announce()
         return changed
 
     def status(self) -> dict[str, object]:
-        """Return counters and resources as JSON values."""
+        """Return counters and resources as values that JSON can represent."""
         with self._lock:
-            seen, announced = len(list(self._sightings)), len(self._beacons)
+            seen, announced = len(list(self.sightings)), len(self._beacons)
         return {
             "namespace": self.namespace,
             "announced": announced,
@@ -193,7 +198,7 @@ class Ros1Side:
     # --- what is here
 
     def _gateways(self, snapshot: Snapshot) -> set[str]:
-        """Return this master's other gateways for these keys: their publications and subscriptions are not announced again."""
+        """Return this master's other gateways for these keys. Their publications and subscriptions are not announced again."""
         ends = (snapshot.publishers, snapshot.subscribers, snapshot.services)
         bridges = {
             node for table in ends for nodes in table.values() for node in nodes if node.startswith(_BRIDGE)
@@ -236,9 +241,9 @@ class Ros1Side:
             with self._lock:
                 due = self._beacons.due(now)
                 if late > PERIOD:
-                    # The process was paused, and the beacons from that time have not been delivered yet.
-                    self._sightings.extend(late, now)
-                has_news = self._sightings.forget_lost(now) or self._has_news
+                    # The process was paused, and the beacons sent in that time have not been delivered yet.
+                    self.sightings.extend(late, now)
+                has_news = self.sightings.forget_lost(now) or self._has_news
             for key in due:
                 self._outlets[key].put()
             if has_news:
@@ -254,7 +259,7 @@ class Ros1Side:
             with self._lock:
                 self._beacons.received(key)
                 if resource and self._allows(resource):
-                    self._has_news |= self._sightings.received(resource, time.monotonic())
+                    self._has_news |= self.sightings.received(resource, time.monotonic())
         except BridgeError as error:
             self.refused += 1
             self._left_out.warning("a beacon of zenoh-bridge-ros1 is left out: %s", str(error)[:_MAX_REASON])
@@ -269,7 +274,7 @@ class Ros1Side:
         """Open and close topics and services to match the graph and the beacons."""
         async with self._adjusting:
             with self._lock:
-                remote, self._has_news = list(self._sightings), False
+                remote, self._has_news = list(self.sightings), False
             found, conflicts = shared_topics(self.graph.topics, remote)
             for name in conflicts.keys() - self._conflicts.keys():
                 self._misfits.warning("%s of others is not passed: it is of type %s", name, conflicts[name])
@@ -292,7 +297,7 @@ class Ros1Side:
             key = data_key(token.type, token.md5sum, token.service, self.namespace)
             self._answered[token] = self._network.answer(key, self._answerer(token), from_others=True)
 
-        # A master has one service per name: a service of a local node takes precedence.
+        # A master has one service per name, so a service of a local node takes precedence.
         there = {each.name: each for each in reversed(remote) if each.kind == "srv"}
         for name, (resource, offered) in list(self.services.items()):
             if there.get(name) != resource or name in self.graph.service_names:
@@ -314,7 +319,7 @@ class Ros1Side:
             except QueryFailed as error:
                 raise ServiceException(f"service [{resource.name}] of zenoh-bridge-ros1: {error}") from error
             loop = asyncio.get_running_loop()
-            fault = await loop.run_in_executor(None, _error_in, resource, answer)
+            fault = await loop.run_in_executor(None, error_in, resource, answer)
             if fault:
                 raise ServiceException(f"service [{resource.name}] of zenoh-bridge-ros1: {fault}")
             return answer
@@ -322,8 +327,8 @@ class Ros1Side:
         return RawService(self._node, resource.name, InterfaceType(resource.type, resource.md5sum), call)
 
 
-def _error_in(resource: Resource, answer: bytes) -> str:
-    """Return the error message in a reply to a call, or "" for a response. The bridge sends either, without marking which.
+def error_in(resource: Resource, answer: bytes) -> str:
+    """Return the error message in a reply to a call, or "" if it is a response. The bridge sends both without a distinction.
 
     If the type is installed here, a reply is an error if it is text and is not exactly one serialized response.
     """

@@ -23,13 +23,15 @@ if TYPE_CHECKING:
 __all__ = ["MARK", "Ros1Topic", "Shared"]
 
 MARK = "ros1_keys"
-"""A connection header field of publishers that a gateway creates for these keys.
+"""A connection header field in publishers that a gateway creates for these keys.
 
 No gateway passes these publishers' messages back to the keys.
 """
 
 _REPLAY_SECONDS = 0.5
-"""Delay from a subscriber's first beacon to the latched messages: its bridge may subscribe only after the beacon."""
+"""Seconds from a subscriber's first beacon to sending the latched messages, because its bridge may subscribe only after the
+beacon.
+"""
 _WRITER = ""
 
 
@@ -65,7 +67,7 @@ class Ros1Topic:
         self._is_closed = False
 
     async def update(self, topic: SharedTopic) -> None:
-        """Update from the local and remote use of the topic."""
+        """Update the topic's local and remote use."""
         before, self._topic = self._topic, topic
         self.token = topic.token
         if topic.is_wanted and not before.is_wanted and self.outbound:
@@ -109,7 +111,7 @@ class Ros1Topic:
         if self._is_closed:
             return
         shared, token = self._shared, self.token
-        # Let Zenoh report readers, because a silent bridge sends no beacons, and other programs never do.
+        # Let Zenoh report readers, because silent bridges and other programs send no beacons.
         if token.is_published and self._matching is None:
             self._matching = shared.network.watch_matching(self._key, self._matching_changed)
         elif not token.is_published and self._matching:

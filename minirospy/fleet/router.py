@@ -39,7 +39,7 @@ async def _run(options: NetworkOptions, report: Callable[[str], object]) -> int:
     try:
         network = await FleetNetwork.open(options)
         report(f"router of the fleet at {', '.join(options.listen) or options.config}")
-        # On Windows, Python handles a signal only when the loop next wakes up.
+        # On Windows, Python handles a signal only when the loop wakes up.
         while not ended.is_set():
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(ended.wait(), _TICK_SECONDS)

@@ -32,7 +32,7 @@ _LOGGER_SERVICES = ("/get_loggers", "/set_logger_level")
 class Priority(IntEnum):
     """A sending priority.
 
-    Each has its own queue and thread, so that a slow message does not delay messages with a higher priority.
+    Each priority has its own queue and thread, so that a slow message does not delay those with a higher priority.
     """
 
     TELEOP = 0
@@ -60,13 +60,13 @@ _BULK_TYPES = {
 }
 
 
-# without a command before a zero velocity is published; two commands closer together than this are a stream
+# seconds without a command before a zero velocity is published; two commands at a shorter interval form a stream
 STOP_SECONDS = 0.5
 
 
 @dataclass(frozen=True)
 class GatewayRules:
-    """The topics and services that a gateway may pass, with rates and priorities.
+    """The topics and services that a gateway may forward, with their rates and priorities.
 
     ``rates`` (Hz) and ``priorities`` map patterns of names; the first pattern that matches applies.
     """
@@ -78,11 +78,11 @@ class GatewayRules:
     rates: Sequence[tuple[str, float]] = ()
     priorities: Sequence[tuple[str, Priority]] = ()
     has_frames: bool = False
-    # without a command before a zero velocity is published; 0 disables this
+    # seconds without a command before a zero velocity is published; 0 disables this
     stop_seconds: float = STOP_SECONDS
 
     def rate(self, topic: str) -> float:
-        """Return a topic's maximum rate in Hz; 0 if it is not limited."""
+        """Return a topic's maximum rate in Hz, or 0 if it is not limited."""
         return next((rate for pattern, rate in self.rates if fnmatchcase(topic, pattern)), 0.0)
 
     def priority(self, topic: str, type_: str) -> Priority:
@@ -112,8 +112,8 @@ class Throttle:
         """Return whether a message may pass at ``now``, in monotonic seconds."""
         if now < self._next:
             return False
-        # Add the period to the due time, not to now, so that 30 Hz becomes 10 Hz and not 7.5; after a pause, restart
-        # from now.
+        # Add the period to the due time instead of the current time, so that 30 Hz becomes 10 Hz and not 7.5. After a
+        # pause, restart from the current time.
         self._next = max(self._next + self._period, now)
         if self._next <= now:
             self._next = now + self._period
@@ -157,9 +157,9 @@ def parse_priorities(words: Iterable[str]) -> list[tuple[str, Priority]]:
 def exported_topics(
     snapshot: Snapshot, own: Collection[str], allows: Callable[[str], bool], hidden: Iterable[str] = ()
 ) -> dict[str, Export]:
-    """Return the topics that a robot announces: those of a known type that nodes other than gateways use.
+    """Return the topics that a robot announces, which are those with a known type that nodes other than gateways use.
 
-    ``own``: the nodes of gateways. ``hidden``: namespaces of other robots' topics, which are not announced again.
+    ``own`` contains the nodes of gateways, ``hidden`` the namespaces of other robots' topics, which are not announced again.
     """
     starts = tuple(f"/{name}/" for name in hidden)
     found = {}

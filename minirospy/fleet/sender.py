@@ -1,4 +1,4 @@
-"""Threads with queues that pass messages to and from Zenoh, so that neither direction has to wait for the event loop."""
+"""Threads with queues that pass messages to and from Zenoh, so that neither direction waits for the event loop."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _CLOSE_SECONDS = 2.0
 _MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
 _MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
-_MAX_OUTLETS = 64
-"""Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
+MAX_OUTLETS = 64
+"""Maximum number of Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
 
-The least recently used is dropped.
+The least recently used one is dropped.
 """
 
 
@@ -38,7 +38,7 @@ class _Worker:
         self._is_closed = False
 
     def close(self) -> None:
-        """Stop the thread; if it is blocked in Zenoh, do not wait for it. Idempotent."""
+        """Stop the thread, but do not wait for it if it is blocked in Zenoh. Idempotent."""
         with self._condition:
             self._is_closed = True
             self._condition.notify_all()
@@ -69,12 +69,12 @@ class Outflow:
         self._worker = worker
         self._throttle = Throttle(hertz)
         self._flow: Flow[tuple[str, bytes]] = Flow(_MAX_WAITING[priority], _MAX_BYTES[priority])
-        self._outlets: dict[str, Outlet] = {}
-        self._numbers: dict[str, int] = {}
+        self.outlets: dict[str, Outlet] = {}
+        self.numbers: dict[str, int] = {}
 
     @property
     def sent(self) -> int:
-        """Return how many messages were passed to Zenoh."""
+        """Return the number of messages passed to Zenoh."""
         return self._flow.passed
 
     @property
@@ -84,11 +84,11 @@ class Outflow:
 
     @property
     def dropped(self) -> int:
-        """Return how many messages were dropped in favour of newer ones because the network was slower."""
+        """Return how many messages were dropped in favour of newer ones because the network was too slow."""
         return self._flow.dropped
 
     def send(self, key: str, message: bytes, *, always: bool = False) -> None:
-        """Queue a message; with ``always``, regardless of the rate limit."""
+        """Queue a message; with ``always``, ignore the rate limit."""
         if not always and not self._throttle.allows(time.monotonic()):
             self.throttled += 1
             return
@@ -135,27 +135,27 @@ class _PriorityWorker(_Worker):
                 outflow = self._owners.get(taken[0]) if taken else None
             try:
                 for each in ended:
-                    for outlet in each._outlets.values():
+                    for outlet in each.outlets.values():
                         outlet.undeclare()
                 if taken and outflow:
-                    self._put(outflow, *taken[1])
+                    self.put(outflow, *taken[1])
             except Exception as error:  # noqa: BLE001 - Zenoh's own, of a session that is closed or a link that broke
                 _log.debug("a message was not sent: %s", error)
 
-    def _put(self, outflow: Outflow, key: str, message: bytes) -> None:
-        outlet = outflow._outlets.pop(key, None)
+    def put(self, outflow: Outflow, key: str, message: bytes) -> None:
+        outlet = outflow.outlets.pop(key, None)
         if outlet is None:
-            while len(outflow._outlets) >= _MAX_OUTLETS:
-                oldest = next(iter(outflow._outlets))
-                outflow._numbers.pop(oldest, None)
-                outflow._outlets.pop(oldest).undeclare()
+            while len(outflow.outlets) >= MAX_OUTLETS:
+                oldest = next(iter(outflow.outlets))
+                outflow.numbers.pop(oldest, None)
+                outflow.outlets.pop(oldest).undeclare()
             make = self._network.outlet_to_others if outflow.is_bare else self._network.outlet
             outlet = make(key, self._priority)
-        outflow._outlets[key] = outlet
+        outflow.outlets[key] = outlet
         if outflow.is_bare:
             outlet.put(message)
             return
-        number = outflow._numbers[key] = outflow._numbers.get(key, 0) + 1
+        number = outflow.numbers[key] = outflow.numbers.get(key, 0) + 1
         outlet.put(message, attachment=serialize_stamp(Stamp(number, self._clock())))
 
 
@@ -163,19 +163,19 @@ class Sender:
     """Sends messages, using one thread per priority, so that a large message that takes a second does not delay a command."""
 
     def __init__(self, network: FleetNetwork, clock: Callable[[], int] = time.time_ns) -> None:
-        """``clock`` returns the time in ns that is attached to each message."""
-        self._priorities = {priority: _PriorityWorker(priority, network, clock) for priority in Priority}
+        """Create the queues. ``clock`` returns the time in ns that is attached to each message."""
+        self.priorities = {priority: _PriorityWorker(priority, network, clock) for priority in Priority}
 
     def flow(self, priority: Priority, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
         """Return a flow for a topic, limited to ``hertz`` (0: unlimited).
 
-        ``is_bare``: send messages without stamps, for other programs.
+        With ``is_bare``, send messages without stamps, for other programs.
         """
-        return Outflow(self._priorities[priority], priority, hertz, is_bare)
+        return Outflow(self.priorities[priority], priority, hertz, is_bare)
 
     def close(self) -> None:
         """Stop the threads. Idempotent."""
-        for worker in self._priorities.values():
+        for worker in self.priorities.values():
             worker.close()
 
 
@@ -184,7 +184,7 @@ _Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]
 
 
 class Flows:
-    """A receiver's flows by key, limited in number: the least recently used one is removed. Thread-safe."""
+    """A receiver's flows by key. Their number is limited: the least recently used flow is removed. Thread-safe."""
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -209,7 +209,7 @@ class Flows:
 class Receiver(_Worker):
     """Queues received messages until they are published, round-robin between robots' topics.
 
-    Publishing may block for some milliseconds for a slow subscriber, which would delay all robots in Zenoh's own thread.
+    Publishing to a slow subscriber may block for some milliseconds; in Zenoh's own thread, this would delay all robots.
     """
 
     def __init__(self) -> None:

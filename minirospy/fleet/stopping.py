@@ -1,7 +1,7 @@
-"""Stop robots whose velocity commands stop arriving over the fleet by publishing a zero velocity, as the dashboard does.
+"""Stops a robot, by publishing a zero velocity, when velocity commands no longer arrive over the fleet, as the dashboard does.
 
-Only streams of commands are guarded: a single velocity stays in effect, as within one graph. The guard's thread publishes
-the zero velocity, so that this works even if the event loop is blocked.
+Only streams of commands are guarded; a single velocity stays in effect, as it does within one graph. The guard's thread
+publishes the zero velocity, so that this works even if the event loop is blocked.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ __all__ = ["CommandStream", "at_rest"]
 _log = logging.getLogger(__name__)
 _TWIST = struct.Struct("<6d")
 _HEADER = 16
-"""Bytes in a header with an empty frame id: seq, stamp and the length of the frame id."""
+"""Size in bytes of a header with an empty frame id: seq, stamp and the length of the frame id."""
 
 
 def at_rest(type_: str, body: bytes) -> bytes | None:
-    """Return the zero message for a command, or None if the body is zero already, is not a command, or is invalid."""
+    """Return the zero message for a command, or None if the body is zero already, or is not a valid command."""
     find = _FIELDS.get(type_)
     if find is None:
         return None
@@ -48,7 +48,7 @@ def at_rest(type_: str, body: bytes) -> bytes | None:
     return bytes(rest) if moves else None
 
 
-_Part = tuple[int, int, str]  # start and end offset of the numbers in a message, and their struct format
+_Part = tuple[int, int, str]  # start and end offsets of the numbers in a message, and their struct format
 
 
 def _twist(_: bytes) -> list[_Part]:
@@ -99,7 +99,7 @@ class CommandStream:
         self._publish = publish
         self._seconds = seconds
         self._clock = clock
-        self._guard = StopGuard(clock)
+        self.guard = StopGuard(clock)
         self._logger = RateLimitedLogger(_log)
         self._lock = threading.Lock()
         self._rest: bytes | None = None
@@ -121,19 +121,19 @@ class CommandStream:
             self._deadline = now + self._seconds if rest is not None and is_stream else math.inf
             if self._deadline < math.inf:
                 # Arm the guard before publishing, so that no command is sent that could not be stopped.
-                self._guard.arm(self._silent, self._deadline)
+                self.guard.arm(self._silent, self._deadline)
             else:
-                self._guard.disarm(self._silent)
+                self.guard.disarm(self._silent)
             self._publish(body)
 
     def close(self) -> None:
         """Publish a zero velocity if a stream is active. Idempotent."""
-        self._guard.disarm(self._silent)
+        self.guard.disarm(self._silent)
         with self._lock:
             self._stop()
 
     def _silent(self) -> None:
-        """Publish a zero velocity if the stream has stopped. Runs in the guard's thread."""
+        """Publish a zero velocity if commands have stopped arriving. Runs in the guard's thread."""
         with self._lock:
             if self._clock() < self._deadline:
                 return  # another command has just arrived

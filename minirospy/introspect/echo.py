@@ -16,7 +16,7 @@ from minirospy.introspect.plot import plot_header, plot_row
 
 if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Message
-    from minirospy.introspect.streams import Received
+    from minirospy.introspect.messages import Received
     from minirospy.introspect.topics import TopicField
 
 __all__ = ["Echo", "Filter", "elided", "fill_message"]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from io import BytesIO
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from minirospy.base.errors import MessageException, NotFoundError
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from minirospy.core.idl.protocols import Message
-    from minirospy.introspect.streams import Received
+    from minirospy.core.wire.header import Header
 
-__all__ = ["MessageClasses", "check", "fill", "serialize", "words_of"]
+__all__ = ["MessageClasses", "Received", "check", "fill", "serialize", "words_of"]
 
 _MAX_CLASSES = 256
 _M = TypeVar("_M", bound="Message")
@@ -28,6 +28,19 @@ _HINTS = {
     "an ascii string": ", a text that could be a number, a date or a list needs its own quotes: \"'5'\"",
     "must be float type": ", numbers like 1.0e-3, .inf and .nan with their dot",
 }
+
+
+class Received(NamedTuple):
+    """A received message: its bytes, its publisher's connection header, and the receive time (since the epoch)."""
+
+    body: bytes
+    header: Header
+    nanoseconds: int
+
+    @property
+    def time(self) -> float:
+        """Return the receive time in seconds since the epoch."""
+        return self.nanoseconds / 1e9
 
 
 class MessageClasses:

@@ -17,9 +17,9 @@ MAX_CONCURRENT = 64
 
 _MAX_CONCURRENT_RETRIES = 32
 """Maximum number of concurrent retries; limited separately, so that retries do not delay first queries."""
-_QUERY_SECONDS = 5.0
-_AGAIN_SECONDS = 10.0  # seconds before a node that did not respond is queried again
-_REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
+QUERY_SECONDS = 5.0
+AGAIN_SECONDS = 10.0  # before a node that did not respond is queried again
+REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
 """Seconds to pause after a refused query: base, and increment per failed query.
 
 A refused query is cheap, and a killed server may be restarted soon, so refused queries are retried sooner than others. With
@@ -49,8 +49,8 @@ class NodeQueries(Generic[_Key, _Found]):
         self._reporter = reporter
         self._arrived_late = arrived_late
         self._present: set[_Key] = set()
-        self._tasks: dict[_Key, asyncio.Task[None]] = {}
-        self._not_before: dict[_Key, float] = {}
+        self.tasks: dict[_Key, asyncio.Task[None]] = {}
+        self.not_before: dict[_Key, float] = {}
         self._first = asyncio.Semaphore(MAX_CONCURRENT)
         self._again = asyncio.Semaphore(_MAX_CONCURRENT_RETRIES)
 
@@ -58,7 +58,7 @@ class NodeQueries(Generic[_Key, _Found]):
         """Query new keys and forget absent ones; return when all new keys have results, or after ``seconds``."""
         kept = self._present = set(present)
         self.found = {key: found for key, found in self.found.items() if key in kept}
-        self._not_before = {key: until for key, until in self._not_before.items() if key in kept}
+        self.not_before = {key: until for key, until in self.not_before.items() if key in kept}
         is_late = False
 
         async def query(key: _Key, turns: asyncio.Semaphore) -> None:
@@ -69,11 +69,11 @@ class NodeQueries(Generic[_Key, _Found]):
         new = []
         now = asyncio.get_running_loop().time()
         for key in present:
-            if key in self.found or key in self._tasks or now < self._not_before.get(key, 0.0):
+            if key in self.found or key in self.tasks or now < self.not_before.get(key, 0.0):
                 continue
-            has_failed = key in self._not_before
+            has_failed = key in self.not_before
             task = asyncio.ensure_future(query(key, self._again if has_failed else self._first))
-            self._tasks[key] = task
+            self.tasks[key] = task
             task.add_done_callback(partial(self._ended, key))
             if not has_failed:
                 new.append(task)
@@ -85,20 +85,20 @@ class NodeQueries(Generic[_Key, _Found]):
 
     async def close(self) -> None:
         """Cancel the queries. Idempotent."""
-        tasks = list(self._tasks.values())
+        tasks = list(self.tasks.values())
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         # Clear the tasks here, because done callbacks of tasks that have just finished run only after this.
-        self._tasks.clear()
+        self.tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:
         """Query once; return True if there is a result and its key is still present."""
         started = asyncio.get_running_loop().time()
         try:
-            found = await asyncio.wait_for(self._query(key), _QUERY_SECONDS)
+            found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)
         except (MinirospyError, ServiceException, OSError, asyncio.TimeoutError, ValueError):
-            is_quick = asyncio.get_running_loop().time() - started < _REFUSED_SECONDS
+            is_quick = asyncio.get_running_loop().time() - started < REFUSED_SECONDS
             self._failed(key, is_quick=is_quick)
         except Exception as error:  # noqa: BLE001 - of one node: it is tried again, as those that do not answer
             self._reporter.report(error)
@@ -111,10 +111,10 @@ class NodeQueries(Generic[_Key, _Found]):
         return False
 
     def _ended(self, key: _Key, _: object) -> None:
-        self._tasks.pop(key, None)
+        self.tasks.pop(key, None)
 
     def _failed(self, key: _Key, *, is_quick: bool = False) -> None:
         if key in self._present:
-            refused = max(_REFUSED_SECONDS, _REFUSED_EACH * len(self._not_before))
-            pause = min(refused, _AGAIN_SECONDS) if is_quick else _AGAIN_SECONDS
-            self._not_before[key] = asyncio.get_running_loop().time() + pause
+            refused = max(REFUSED_SECONDS, _REFUSED_EACH * len(self.not_before))
+            pause = min(refused, AGAIN_SECONDS) if is_quick else AGAIN_SECONDS
+            self.not_before[key] = asyncio.get_running_loop().time() + pause

@@ -51,7 +51,7 @@ __all__ = [
 ]
 
 
-_SHUTDOWN_SECONDS = 10.0
+SHUTDOWN_SECONDS = 10.0
 """Seconds, long enough for a node to run its shutdown hooks before it responds."""
 
 
@@ -172,7 +172,7 @@ def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> 
 
     Raise NodeUnreachableError if the node does not respond in time.
     """
-    with contextlib.closing(_slave(graph, node, _SHUTDOWN_SECONDS)) as slave:
+    with contextlib.closing(_slave(graph, node, SHUTDOWN_SECONDS)) as slave:
         try:
             slave.shutdown(reason)
         except RpcUnreachable as error:

@@ -23,11 +23,11 @@ class ProcessLoads:
     """Measures the CPU and memory use of processes between calls."""
 
     def __init__(self) -> None:
-        self._known: dict[int, psutil.Process] = {}
+        self.known: dict[int, psutil.Process] = {}
 
     def look(self, pids: Iterable[int]) -> dict[int, ProcessLoad]:
         """Return the loads by process id, omitting processes that have exited or that this user may not inspect."""
-        before, self._known = self._known, {}
+        before, self.known = self.known, {}
         found = {}
         for pid in set(pids):
             with contextlib.suppress(psutil.Error, ValueError):
@@ -41,6 +41,6 @@ class ProcessLoads:
                     load = ProcessLoad(
                         None if is_new else cpu, process.memory_info().rss, process.num_threads()
                     )
-                self._known[pid] = process
+                self.known[pid] = process
                 found[pid] = load
         return found

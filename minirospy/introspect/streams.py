@@ -11,7 +11,7 @@ import queue
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from minirospy.base.clock import Clock, SimulatedClock, WallClock, time_of_clock_message
 from minirospy.base.errors import MessageException, MinirospyError, RpcRefused
@@ -19,7 +19,7 @@ from minirospy.core.idl.protocols import is_stamped
 from minirospy.core.wire.framing import Frame, serialize_frame
 from minirospy.core.wire.header import Header
 from minirospy.core.wire.tcpros import ANY, InterfaceType
-from minirospy.introspect.messages import MessageClasses, serialize
+from minirospy.introspect.messages import MessageClasses, Received, serialize
 from minirospy.introspect.topics import TopicField, find_topic
 from minirospy.runtime.node.node import Node
 from minirospy.runtime.node.topics import Publication
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Message
     from minirospy.introspect.graph import Graph
 
-__all__ = ["Inbox", "Received", "ToolNode", "TopicPublisher", "wait_for_topic"]
+__all__ = ["Inbox", "ToolNode", "TopicPublisher", "wait_for_topic"]
 
 _POLL_SECONDS = 0.1
 _WAITING = 64  # maximum number of messages queued for the reading thread
@@ -44,19 +44,6 @@ _SLICE = 0.05 if sys.platform == "win32" else 3600.0
 
 On Windows Ctrl-C does not interrupt a wait, so waits there are split into short slices.
 """
-
-
-class Received(NamedTuple):
-    """A received message: its bytes, its publisher's connection header, and the receive time (since the epoch)."""
-
-    body: bytes
-    header: Header
-    nanoseconds: int
-
-    @property
-    def time(self) -> float:
-        """Return the receive time in seconds since the epoch."""
-        return self.nanoseconds / 1e9
 
 
 class ToolNode:

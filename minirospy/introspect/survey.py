@@ -64,7 +64,7 @@ def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
         place = MasterLocation(host, port, [])
     counts: dict[tuple[int, object, Edge], Counts] = {}
     for answer in answers.values():
-        counts.update(_counts(answer))
+        counts.update(interface_counts(answer))
     return Survey(
         time.monotonic(), state, answers, place, counts, _loads(answers, processes) if processes else {}
     )
@@ -149,7 +149,7 @@ def _topics(
     return [[topic, types.get(topic, "")] for topic in sorted(table) if answer.node.name in table[topic]]
 
 
-def _counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
+def interface_counts(answer: NodeAnswer) -> dict[tuple[int, object, Edge], Counts]:
     """Return a node's counters for each outbound connection, or {} if the rows are not in the documented format."""
     receivers = {
         (link.topic, str(link.id)): link.destination for link in answer.links if "o" in link.direction

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ServiceInfo", "TypeTexts", "described", "installed_type", "type_of_text"]
 
-_MAX_NAMES = 2_000
+MAX_NAMES = 2_000
 """Maximum number of cached types, including types that are not installed: a peer may send any number of names."""
 _MAX_CONCURRENT = 32  # maximum number of publishers queried concurrently
 
@@ -85,7 +85,7 @@ class TypeTexts:
 
         loop = asyncio.get_running_loop()
         found = await loop.run_in_executor(None, installed_type, name)
-        while len(self._installed) >= _MAX_NAMES:
+        while len(self._installed) >= MAX_NAMES:
             # Remove the oldest entry: dictionaries preserve insertion order.
             del self._installed[next(iter(self._installed))]
         self._installed[name] = found

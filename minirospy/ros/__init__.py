@@ -1,1 +1,1 @@
-"""ROS packages, one folder each; `overlay_modules.py` offers their Python modules under ROS's names."""
+"""ROS packages, one folder each. `overlay_modules.py` re-exports their Python modules under ROS's names."""

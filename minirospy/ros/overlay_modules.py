@@ -1,7 +1,10 @@
-"""Write `overlay/`: the modules that programs import (`rospy`, `rosbag`, `RPi`, ...), from the modules of the same names here.
+"""Writes `overlay/`, the modules that programs import (`rospy`, `rosbag`, `RPi`, ...).
+
+They re-export names from the modules of the same names here.
 
 The names that `import rosgraph.masterapi` provides are in `ros/rosgraph/rosgraph/masterapi.py`; the module in `overlay/`
-re-exports the names in `__all__`, and those that the module imports in the form `from x import y as y`. The build writes
+re-exports the names in `__all__`, and those that the module imports in the form `from x import y as y`. It finds the names that
+a star brings in real ROS from elsewhere (`os`, `rospy`: passed_on.py) when a program first uses them. The build writes
 `overlay/` (hatch_build.py), and `python -m minirospy.ros.overlay_modules` writes it again. This module reads the sources
 without importing them.
 """
@@ -16,19 +19,21 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from minirospy.core.idl.own_packages import own_definitions
+from minirospy.ros.passed_on import PASSED_ON
 from minirospy.workspace.elsewhere import IMPORTED, SUBMODULES
 
-__all__ = ["Origin", "exported", "modules", "overlay_files", "write_overlay"]
+__all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "write_overlay"]
 
 PACKAGE = Path(__file__).parents[1]
 _ALSO = {"RPi": PACKAGE / "board" / "pins"}
-"""Python modules of no ROS package -> the folder that has them."""
+"""Python modules that belong to no ROS package, and the folders that contain them."""
 _NAMED_OTHERWISE = {
     "camera_info_manager_py": ("camera_info_manager",),
     "python_orocos_kdl": ("PyKDL",),
     "urdfdom_py": ("urdf_parser_py",),
 }
-"""ROS package -> the Python modules that have another name."""
+"""ROS packages whose Python modules have another name than the package."""
 _INTERNAL = {
     "PyKDL": "frames functions vectors",
     "actionlib": "aio client goal_id handle machine server simple_client simple_server spec states statuses waiting",
@@ -49,18 +54,21 @@ _INTERNAL = {
     "topic_tools": "expressions",
     "urdf_parser_py": "joints links",
 }
-"""Python module -> its modules that ROS's does not have. Put a new one next to the folder of the module instead."""
-_GENERATED = "generated from minirospy/"  # in the docstring of each module
-_METADATA = "rospy-1.17.0.egg-info"  # programs ask importlib.metadata for rospy's version
+"""Modules that ROS's Python modules do not have. Do not add entries: put a new module next to the Python module's folder."""
+_GENERATED = "generated from minirospy/"  # marks generated modules, in their docstrings
+_METADATA = "rospy-1.17.0.egg-info"  # programs query rospy's version through importlib.metadata
 _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: rospy as minirospy has it\n"
-_WIDTH = 118  # characters in a line
+_WIDTH = 118  # maximum line length in characters
+
+_DEFINED = {"msg": ("msg", "action"), "srv": ("srv",)}
+"""Module of generated classes -> the folders of the definitions."""
 
 _HOOKS = {"__getattr__", "__dir__"}
-"""Functions by which a module answers for names that it does not have (PEP 562)."""
+"""Module functions that provide names that are not defined in the module (PEP 562)."""
 
 
 class Origin(NamedTuple):
-    """The place a name is imported from: ``from module import name``, or ``import module`` if ``name`` is empty."""
+    """The place from which a name is imported: ``from module import name``, or ``import module`` if ``name`` is empty."""
 
     module: str
     name: str
@@ -72,15 +80,15 @@ class _Source(NamedTuple):
     public: tuple[str, ...] | None
     """``__all__``, or None if the module has none."""
     imported: dict[str, Origin]
-    """Names that an import binds, including those in blocks for type checkers."""
+    """Names bound by imports, including imports for type checkers only."""
     passed_on: frozenset[str]
-    """Names that an import binds in the form ``x as x``, and a module's ``__getattr__`` and ``__dir__``."""
+    """Names that an import binds in the form ``x as x``, and the functions ``__getattr__`` and ``__dir__``."""
 
 
 def write_overlay(folder: Path) -> list[str]:
-    """Write the modules below a folder and return their paths in it.
+    """Write the modules below a folder; return their paths relative to it.
 
-    Remove modules from an earlier build that are not written.
+    Remove modules from an earlier build that are no longer written.
     """
     from minirospy.core.idl.load import write_if_changed
 
@@ -95,7 +103,7 @@ def write_overlay(folder: Path) -> list[str]:
 
 
 def overlay_files() -> dict[str, str]:
-    """Return the files in `overlay/`, except message modules: path -> text."""
+    """Return the files in `overlay/`, except message modules, as a dict from path to text."""
     files = {_METADATA: _METADATA_TEXT}
     for name, source in modules().items():
         path = name.replace(".", "/")
@@ -110,7 +118,7 @@ def overlay_files() -> dict[str, str]:
 
 @functools.cache
 def modules() -> dict[str, Path]:
-    """Return the modules that programs import, and the file that defines each one's names: ``rosgraph.names`` -> its path."""
+    """Return a dict from each module that programs import, such as ``rosgraph.names``, to the file that defines its names."""
     roots = dict(_ALSO)
     for folder in sorted((PACKAGE / "ros").iterdir()):
         if folder.is_dir():
@@ -127,7 +135,7 @@ def modules() -> dict[str, Path]:
 
 
 def _python_modules(package: Path) -> Iterator[str]:
-    """Yield a ROS package's Python modules: its folders that contain an ``__init__.py`` and are named as the module."""
+    """Yield a ROS package's Python modules, which are its folders that contain an ``__init__.py`` and have a module's name."""
     named = {package.name, *_NAMED_OTHERWISE.get(package.name, ())}
     for folder in package.iterdir():
         if folder.name in named and (folder / "__init__.py").exists():
@@ -135,14 +143,14 @@ def _python_modules(package: Path) -> Iterator[str]:
 
 
 def exported(source: Path) -> dict[str, Origin]:
-    """Return the names that the module in `overlay/` re-exports: name -> where it is imported from."""
+    """Return the names that the module in `overlay/` re-exports, with the place from which each is imported."""
     read = _read(source)
     names = dict.fromkeys([*(read.public or ()), *sorted(read.passed_on)])
     return {name: _origin(Origin(_dotted(source), name)) for name in names}
 
 
 def _origin(asked: Origin) -> Origin:
-    """Follow a name through modules that only re-export it."""
+    """Return the place that defines a name, following modules that only re-export it."""
     source = _source_of(asked.module)
     if source is None:
         return asked
@@ -151,8 +159,8 @@ def _origin(asked: Origin) -> Origin:
         return asked
     module = _by_source().get(f"{inner.module}.{inner.name}")
     if module is not None:
-        # If the name is a module that has the same name in the overlay, use the overlay's, so that `rosgraph.names`
-        # is the module that `import rosgraph.names` returns.
+        # If the name is a module that the overlay also has, use the overlay's module, so that `rosgraph.names` is the
+        # module that `import rosgraph.names` returns.
         parent, _, name = module[0].rpartition(".")
         is_kept = asked.name == name or asked.module == inner.module
         return Origin(parent or name, name if parent else "") if is_kept else inner
@@ -163,18 +171,90 @@ def _text(name: str, source: Path) -> str:
     where = source.relative_to(PACKAGE).as_posix()
     lines = [f'"""{name}, provided by minirospy: {_GENERATED}{where}."""', ""]
     by_module: dict[str, list[str]] = {}
-    for bound, (module, imported) in exported(source).items():
+    names_here = exported(source)
+    public = _read(source).public
+    passed_on = _passed_on(name, listed(source))
+    is_package = source.name == "__init__.py" and name not in _ALSO
+    later = {**(_submodules(name) if is_package else {}), **passed_on}
+    hook = names_here.pop("__getattr__", None) if later else None
+    if hook:
+        names_here["_find_more"] = hook
+    for bound, (module, imported) in names_here.items():
         if imported:
             by_module.setdefault(module, []).append(f"{imported} as {bound}")
         else:
             lines.append(f"import {module} as {bound}")
     for module, names in by_module.items():
         lines += [f"from {module} import (", *_wrapped(names), ")"]
-    public = _read(source).public
     if public is not None:
-        listed = [f'"{each}"' for each in sorted(public) if not each.startswith("_")]
-        lines += ["", "__all__ = [", *_wrapped(listed), "]"]
+        lines += ["", "__all__ = [", *_wrapped(f'"{each}"' for each in listed(source)), "]"]
+    if is_package and "." not in name:
+        lines += [
+            "",
+            "from minirospy.ros.submodules import offer_standard_library as _offer_standard_library",
+            "",
+            "_offer_standard_library()",
+        ]
+    if passed_on:
+        lines += [
+            "",
+            f"__all__ {'=' if public is None else '+='} [",
+            *_wrapped(f'"{each}"' for each in passed_on),
+            "]",
+        ]
+    later = {each: place for each, place in later.items() if each not in names_here}
+    if later:
+        lines += _text_of_later(name, later, has_hook=hook is not None)
     return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def listed(source: Path) -> list[str]:
+    """Return the public names in the ``__all__`` of the module in a file."""
+    return sorted(name for name in _read(source).public or () if not name.startswith("_"))
+
+
+def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
+    """Return the names that a module's star brings from elsewhere, without its own: name -> `MODULE` or `MODULE:NAME`."""
+    found = {}
+    for place, names in PASSED_ON.get(module, {}).items():
+        for each in names.split():
+            name, _, there = each.partition("=")
+            found[name] = ":".join(filter(None, (place, there or name)))
+    return {name: found[name] for name in sorted(found.keys() - set(own))}
+
+
+def _submodules(package: str) -> dict[str, str]:
+    """Return a package's submodules: name -> module."""
+    depth = package.count(".") + 1
+    names = [
+        each.rpartition(".")[2]
+        for each in modules()
+        if each.startswith(f"{package}.") and each.count(".") == depth
+    ]
+    definitions = own_definitions() / package
+    names += [kind for kind, of in _DEFINED.items() if any((definitions / each).is_dir() for each in of)]
+    return {name: f"{package}.{name}" for name in sorted(names)}
+
+
+def _text_of_later(module: str, names: dict[str, str], *, has_hook: bool) -> list[str]:
+    """Return the lines that find these names at first use; type checkers and editors do not see them."""
+    missing = f"raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")"
+    return [
+        "",
+        "import typing as _typing",
+        "",
+        "if not _typing.TYPE_CHECKING:",
+        "    from minirospy.ros.submodules import import_passed_on as _import_passed_on",
+        "",
+        "    _LATER = {",
+        *(f"    {line}" for line in _wrapped(f'"{name}": "{place}"' for name, place in names.items())),
+        "    }",
+        "",
+        "    def __getattr__(name):",
+        "        if name in _LATER:",
+        "            return _import_passed_on(globals(), name, _LATER[name])",
+        f"        {'return _find_more(name)' if has_hook else missing}",
+    ]
 
 
 def _wrapped(words: Iterable[str]) -> list[str]:
@@ -203,7 +283,7 @@ def _dotted(source: Path) -> str:
 
 @functools.cache
 def _by_source() -> dict[str, tuple[str, Path]]:
-    """Map each module that the overlay offers, by its dotted name here, to its name in the overlay and its file."""
+    """Return a dict from the dotted name here of each module in the overlay to its name in the overlay and its file."""
     return {_dotted(source): (name, source) for name, source in modules().items()}
 
 

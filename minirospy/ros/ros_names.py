@@ -1,6 +1,6 @@
 """Functions shared by rosgraph.names and rospy.names.
 
-Source: http://wiki.ros.org/Names and the behaviour of rosgraph.names, also for None and other types.
+Source: http://wiki.ros.org/Names, and the behaviour of rosgraph.names, also for None and values of other types.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def load_mappings(argv: Sequence[str]) -> dict[str, str]:
 
 
 def get_ros_namespace(env: Mapping[str, str] | None = None, argv: Sequence[str] | None = None) -> str:
-    """Return the namespace from the command line (``__ns:=``), or from the environment, with slashes at both ends."""
+    """Return the namespace from the command line (``__ns:=``) or from the environment, with slashes at both ends."""
     named = names.parse_arguments(sys.argv if argv is None else argv).special.get("__ns")
     return make_global_ns(named or (os.environ if env is None else env).get("ROS_NAMESPACE") or GLOBALNS)
 

@@ -1,4 +1,4 @@
-"""Select the actions to bridge from snapshots of both graphs. Pure."""
+"""Selects the actions to bridge from snapshots of both graphs. Pure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _GOAL_TYPE = "ActionGoal"
 
 @dataclass(frozen=True)
 class ActionLink:
-    """An action that one side offers and the other side uses. ``direction``: the direction in which goals are sent."""
+    """An action that one side offers and the other side uses. ``direction`` is the direction in which goals are sent."""
 
     action: str
     direction: Direction
@@ -37,9 +37,9 @@ def send_goal_service(action: str) -> str:
 def action_links(
     ros1: Snapshot, ros2_services: Mapping[str, str], partner: Callable[[str, Direction], str]
 ) -> list[ActionLink]:
-    """Return the actions to bridge: those that only one side offers, ignoring bridges.
+    """Return the actions to bridge, which are those that only one side offers, ignoring bridges.
 
-    ``ros2_services``: services and their types. ``partner(type, direction)`` returns the type on the goals' sending side.
+    ``ros2_services`` maps services to their types. ``partner(type, direction)`` returns the type on the side that sends goals.
     """
     here = dict(_of_ros1(ros1))
     there = {

@@ -1,4 +1,4 @@
-"""Serialize and parse an action's ROS 1 messages; the goals, feedback and results in them stay serialized. Pure.
+"""Serializes and parses an action's ROS 1 messages. The goals, feedback and results in them stay serialized. Pure.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription, and the definitions of actionlib_msgs.
 """
@@ -150,5 +150,5 @@ def _parse_text(data: bytes, start: int) -> tuple[str, int]:
 def _unpacked(struct_: struct.Struct, data: bytes, start: int) -> tuple[int, ...]:
     try:
         return struct_.unpack_from(data, start)
-    except (struct.error, OverflowError) as error:  # OverflowError: an offset that exceeds 32 bits
+    except (struct.error, OverflowError) as error:  # OverflowError: the offset exceeds 32 bits
         raise DeserializationError("the message ends too early") from error

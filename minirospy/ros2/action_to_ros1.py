@@ -1,4 +1,4 @@
-"""A ROS 1 action that the bridge offers in ROS 2: goals are sent to ROS 1, feedback and results are sent back."""
+"""A ROS 1 action that the bridge offers in ROS 2: sends goals to ROS 1, and feedback and results to ROS 2."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from minirospy.ros2.action_messages import (
     parse_status_and_body,
     parse_statuses,
 )
-from minirospy.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED, GoalOfRos1
+from minirospy.ros2.rclpy_actions import ABORTED, CANCELED, SUCCEEDED
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
 if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.aio.topics import Publisher
     from minirospy.core.idl.protocols import Message
+    from minirospy.ros2.action_codecs import ActionCodec
     from minirospy.ros2.action_links import ActionLink
-    from minirospy.ros2.actions import ActionCodec
-    from minirospy.ros2.interface import Ros2Handle, Ros2Side
+    from minirospy.ros2.interface import GoalOfRos1, Ros2Handle, Ros2Side
 
 __all__ = ["MAX_GOALS", "GoalsToRos1"]
 
-_SERVER_SECONDS = 5.0
-"""Timeout for a ROS 1 server to connect, and to include a new goal in its statuses."""
+SERVER_SECONDS = 5.0
+"""Timeout in seconds for a ROS 1 server to connect, and to include a new goal in its statuses."""
 MAX_GOALS = 1_000
-"""Goals that are passed on concurrently; further ones are refused."""
+"""Maximum number of goals passed on concurrently; further goals are rejected."""
 _PENDING_SECONDS = 0.5
-"""Time after which a pending goal counts as accepted, because ROS 2 has no such state."""
+"""Seconds after which a pending goal counts as accepted, because ROS 2 has no pending state."""
 _ENDS = {
     GoalState.SUCCEEDED: SUCCEEDED,
     GoalState.PREEMPTED: CANCELED,
@@ -49,7 +49,7 @@ _REFUSED = {GoalState.REJECTED, GoalState.RECALLED}
 
 
 class _Goal:
-    """A ROS 2 client's goal on a ROS 1 server."""
+    """A ROS 2 client's goal at a ROS 1 server."""
 
     def __init__(
         self, id: GoalId, feedback: Callable[[bytes], None], cancel: Callable[[_Goal], None]
@@ -62,7 +62,7 @@ class _Goal:
         self._cancel = cancel
 
     def cancel(self) -> None:
-        """Request the server to cancel the goal. May be called from any thread."""
+        """Send the server a cancel request. May be called from any thread."""
         self._cancel(self)
 
     def accept(self, is_accepted: bool) -> None:
@@ -110,8 +110,8 @@ class GoalsToRos1:
         self._server = self._side.action_server(self._link.action, self._link.ros2_type, self._accept)
 
     async def close(self) -> None:
-        """Close the action: abort running goals; goals whose result has arrived receive that result."""
-        # A result that has arrived is processed in the next loop iteration.
+        """Close the action. Running goals are aborted; goals whose result has already arrived receive that result."""
+        # A result that has already arrived is processed in the next loop iteration.
         await asyncio.sleep(0)
         self._is_closed = True
         for goal in list(self._goals.values()):
@@ -144,7 +144,7 @@ class GoalsToRos1:
         task = asyncio.ensure_future(self._send(data, feedback, accepted))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
-        # Also needed if the task is cancelled, even before its first step.
+        # Cancel the future even if the task is cancelled before its first step.
         task.add_done_callback(lambda _: accepted.cancel())
 
     async def _send(
@@ -153,7 +153,7 @@ class GoalsToRos1:
         try:
             accepted.set_result(await self._sent(data, feedback))
         except asyncio.TimeoutError:
-            accepted.set_exception(BridgeError(f"its server has not answered within {_SERVER_SECONDS:g} s"))
+            accepted.set_exception(BridgeError(f"its server has not answered within {SERVER_SECONDS:g} s"))
         except (DeserializationError, ROSException) as error:
             accepted.set_exception(BridgeError(str(error)))
         except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
@@ -162,14 +162,14 @@ class GoalsToRos1:
 
     async def _sent(self, data: bytes, feedback: Callable[[bytes], None]) -> GoalOfRos1 | None:
         body = self._codec.goal.to_ros1(data)
-        await asyncio.wait_for(self._connected(), _SERVER_SECONDS)
+        await asyncio.wait_for(self._connected(), SERVER_SECONDS)
         now = self._node.now()
         self._number += 1
         id = GoalId(f"{self._node.name}-{self._number}-{now.secs}.{now.nsecs}", now.secs, now.nsecs)
         goal = self._goals[id.id] = _Goal(id, feedback, self._cancel_goal)
         self._goal.publish_raw(goal_message(id, body))
         try:
-            is_accepted = await asyncio.wait_for(asyncio.shield(goal.accepted), _SERVER_SECONDS)
+            is_accepted = await asyncio.wait_for(asyncio.shield(goal.accepted), SERVER_SECONDS)
         except asyncio.TimeoutError:
             self._goals.pop(id.id, None)
             self._cancel.publish_raw(cancel_message(id))
@@ -231,7 +231,7 @@ class GoalsToRos1:
         goal = self._goals.get(status.goal.id)
         if not goal:
             return
-        # Feedback has a separate connection: first process feedback that has already arrived.
+        # Feedback arrives on a separate connection, so first process the feedback that has already arrived.
         self._loop.call_soon(self._take_end, goal, status.state, body)
 
     def _take_end(self, goal: _Goal, state: int, body: bytes) -> None:

@@ -1,4 +1,4 @@
-"""A ROS 2 action that the bridge offers in ROS 1: goals are sent to ROS 2, feedback and results are sent back."""
+"""A ROS 2 action that the bridge offers in ROS 1: sends goals to ROS 2, and feedback and results to ROS 1."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from minirospy.ros2.action_messages import (
     status_and_body,
     statuses_message,
 )
-from minirospy.ros2.rclpy_actions import CANCELED, SUCCEEDED, Ros2Goal
+from minirospy.ros2.rclpy_actions import CANCELED, SUCCEEDED
 from minirospy.ros2.reach import Reach
 from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from minirospy.aio.node import Node
     from minirospy.aio.topics import Publisher
     from minirospy.core.idl.protocols import Message
+    from minirospy.ros2.action_codecs import ActionCodec
     from minirospy.ros2.action_links import ActionLink
-    from minirospy.ros2.actions import ActionCodec
-    from minirospy.ros2.interface import Ros2Side
+    from minirospy.ros2.interface import Ros2Goal, Ros2Side
 
 __all__ = ["MAX_GOALS", "GoalsToRos2"]
 
@@ -40,16 +40,16 @@ _STATUS_SECONDS = 0.2
 _KEPT_SECONDS = 5.0
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
-_REACH_SECONDS = 2.0
-"""Maximum time that opening this link delays other links while it waits for the server."""
-_ACCEPT_SECONDS = 10.0
+REACH_SECONDS = 2.0
+"""Maximum number of seconds by which opening this link delays other links while it waits for the server."""
+ACCEPT_SECONDS = 10.0
 _ACK_SECONDS = 1e-3
-"""Delay before a response, because Python's actionlib drops responses that arrive before its send_goal has returned."""
+"""Seconds to delay a response, because Python's actionlib drops responses that arrive before its send_goal has returned."""
 _QUEUE = 50
 _MAX_SENT = 4
-"""Goals that are sent and not yet accepted: a server's queue has 10 places, and further goals would be lost."""
+"""Maximum number of goals sent but not yet accepted: a server's queue has 10 places, and further goals would be lost."""
 MAX_GOALS = 1_000
-"""Stored goals, including recently ended ones; further goals are refused."""
+"""Maximum number of stored goals, including recently ended ones; further goals are rejected."""
 _EVENTS = {SUCCEEDED: GoalEvent.SUCCEED, CANCELED: GoalEvent.CANCEL}
 
 
@@ -109,7 +109,7 @@ class GoalsToRos2:
     async def open(self) -> None:
         """Wait for the ROS 2 server, then register the topics at the master."""
         self._reach.start()
-        await self._reach.wait(_REACH_SECONDS)
+        await self._reach.wait(REACH_SECONDS)
         for end in (self._status, self._result, self._feedback, *self._subscriptions):
             await end
 
@@ -181,7 +181,7 @@ class GoalsToRos2:
             await self._reach.wait()
             async with self._turns:
                 sending = self._client.send(request, lambda data: self._pass_feedback(goal, data))
-                goal.there = await asyncio.wait_for(self._watched(sending), _ACCEPT_SECONDS)
+                goal.there = await asyncio.wait_for(self._watched(sending), ACCEPT_SECONDS)
             if goal.there is None:
                 goal.step(GoalEvent.REJECT, "the server in ROS 2 refuses this goal")
             else:
@@ -193,7 +193,7 @@ class GoalsToRos2:
                 body = self._codec.result.to_ros1(data)
                 goal.step(_EVENTS.get(status, GoalEvent.ABORT))
         except asyncio.TimeoutError:
-            goal.step(GoalEvent.REJECT, f"the server in ROS 2 has not answered within {_ACCEPT_SECONDS:g} s")
+            goal.step(GoalEvent.REJECT, f"the server in ROS 2 has not answered within {ACCEPT_SECONDS:g} s")
         except (BridgeError, DeserializationError) as error:
             goal.fail(" ".join(str(error).split()))
         except Exception as error:  # noqa: BLE001 - the client waits for the goal's end, whatever happened here

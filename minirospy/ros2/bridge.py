@@ -1,4 +1,4 @@
-"""The whole bridge: polls both graphs, and opens and closes links to match their endpoints."""
+"""The whole bridge, which polls both graphs, and opens and closes links to match their endpoints."""
 
 from __future__ import annotations
 
@@ -51,21 +51,22 @@ __all__ = ["Ros2Bridge", "Ros2Options"]
 _ORIGIN = "ros2_domain"
 """Connection header field that marks publishers of ROS 2 data, so that no bridge to the same domain sends the data back."""
 _MIN_REFRESH_INTERVAL = 0.25
-_QUERY_SECONDS = 3.0
-"""Timeout, after which topics are bridged even if publishers have not responded."""
-_JOIN_SECONDS = 2.0
+QUERY_SECONDS = 3.0
+"""Timeout in seconds, after which topics are bridged even if publishers have not responded."""
+JOIN_SECONDS = 2.0
 _JOIN_LOOK = 0.02
 _DEPTH = 1000
 _DEPTH_OF_LARGE = 20
 _ROS1_QUEUE = 1000
-"""Queued messages: enough to bridge a pause on a busy machine, except for images."""
+"""Queue size in messages, enough to survive a pause on a busy machine, except for images."""
 
 
 @dataclass(frozen=True)
 class Ros2Options:
-    """``topics``, ``services``, ``actions``: filters that select what to bridge. ``call_seconds``: timeout of service calls.
+    """The bridge's settings.
 
-    ``max_refresh_interval``: seconds between polls while the graphs do not change.
+    ``topics``, ``services`` and ``actions`` are filters that select what to bridge. ``call_seconds`` is the timeout for
+    service calls, ``max_refresh_interval`` the number of seconds between polls while the graphs do not change.
     """
 
     topics: NameFilter = field(default_factory=NameFilter)
@@ -77,7 +78,7 @@ class Ros2Options:
 
 
 class _Types:
-    """Specs, interface types and transcoders, by the types on both sides."""
+    """The specs, interface types and transcoders, by the types on both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -126,14 +127,14 @@ class _Types:
 class Ros2Bridge:
     """Bridges topics with endpoints on both sides, services and actions that one side offers, and parameters.
 
-    Runs on the node's loop; ROS 2 messages are passed in its executor's thread.
+    Runs on the node's loop, but ROS 2 messages are passed on in the thread of ROS 2's executor.
     """
 
     def __init__(self, node: Node, side: Ros2Side, options: Ros2Options, catalogue: Catalogue) -> None:
         self.node = node
         self.side = side
         self.options = options
-        self.topics: LinkTable[Link, _ToRos1 | _ToRos2] = LinkTable(node.log, self._make)
+        self.topics: LinkTable[Link, _ToRos1 | PassingToRos2] = LinkTable(node.log, self._make)
         self.header = marker("")
         self.services = ServiceBridge(
             node, side, options.services, options.rules, catalogue, options.call_seconds
@@ -171,9 +172,9 @@ class Ros2Bridge:
         await asyncio.get_running_loop().run_in_executor(None, self.side.close)
 
     async def pairs(self) -> list[Pair]:
-        """Return the links to bridge, and the reasons for those that are not; open none of them.
+        """Return the links to bridge without opening them, with the reason for each that cannot be bridged.
 
-        Raise the errors of :meth:`look`.
+        Raise the same errors as :meth:`look`.
         """
         snapshot = await self._snapshot()
         topics = pairs(await self._wanted(snapshot), self._converter)
@@ -200,7 +201,8 @@ class Ros2Bridge:
     async def _watch(self) -> None:
         pause = _MIN_REFRESH_INTERVAL
         is_reported = False
-        # Check the flag, because wait_for in Python 3.11, which the called methods use, may swallow a cancellation.
+        # Check the flag, because wait_for in Python 3.11, used by the methods called here, may swallow a
+        # cancellation.
         while not self._is_closed:
             await asyncio.sleep(pause)
             changed = False
@@ -233,7 +235,7 @@ class Ros2Bridge:
         return links(snapshot, ros2, self._is_latched, self.options.rules.ros1_message)
 
     async def _look_at_publishers(self, snapshot: Snapshot, ros2: Mapping[str, Ros2Topic]) -> None:
-        """Query new ROS 1 publishers, on topics with ROS 2 subscribers, for their definitions and whether they latch."""
+        """Query new ROS 1 publishers on topics with ROS 2 subscribers for their definitions, and for whether they latch."""
         present = [
             (topic, node)
             for topic, ends in ros2.items()
@@ -241,7 +243,7 @@ class Ros2Bridge:
             for node in snapshot.publishers.get(topic, ())
             if not is_bridge(node)
         ]
-        await self._headers.look(present, _QUERY_SECONDS)
+        await self._headers.look(present, QUERY_SECONDS)
 
     async def _header(self, key: tuple[str, str]) -> Header:
         return await self._texts.header_of(*key)
@@ -263,16 +265,16 @@ class Ros2Bridge:
             spec, lookup = self._types.installed(link.ros1_type)
         return self._types.transcoder(spec, lookup, link.ros2_type), spec, lookup
 
-    def _make(self, link: Link) -> _ToRos1 | _ToRos2:
+    def _make(self, link: Link) -> _ToRos1 | PassingToRos2:
         made, spec, lookup = self._converter(link)
         depth = _DEPTH_OF_LARGE if keeps_buffer(spec, lookup) else _DEPTH
         if link.direction is Direction.TO_ROS2:
-            return _ToRos2(self, link, made, depth)
+            return PassingToRos2(self, link, made, depth)
         return _ToRos1(self, link, made, depth, self._types.interface(spec, lookup))
 
 
-class _Passing:
-    """An open link; ``passed`` is the number of messages passed."""
+class TopicPassing:
+    """An open link; ``passed`` counts the messages that were passed on."""
 
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder) -> None:
         self.link = link
@@ -284,7 +286,7 @@ class _Passing:
         self._statics = StaticTransforms() if is_static else None
 
     def _with_statics(self, message: Frame) -> Frame:
-        """Return a message; on a static transform topic, merge it with all known static transforms."""
+        """Return a message. On a static transform topic, merge it with all known static transforms."""
         if self._statics is None:
             return message
         left_out = self._statics.left_out
@@ -303,7 +305,7 @@ class _Passing:
         self._misfits.error("a message on %s (%s): %s", self.link.topic, self.link.direction.value, error)
 
 
-class _ToRos2(_Passing):
+class PassingToRos2(TopicPassing):
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder, depth: int) -> None:
         super().__init__(bridge, link, made)
         self._publisher: Ros2Publisher = bridge.side.publisher(
@@ -321,9 +323,9 @@ class _ToRos2(_Passing):
         self._publisher.close()
 
     async def _wait_for_subscribers(self) -> None:
-        """Wait until the existing subscribers are connected, because they would miss messages published before that."""
+        """Wait until the existing subscribers are connected, because they would miss messages published earlier."""
         loop = asyncio.get_running_loop()
-        end = loop.time() + _JOIN_SECONDS
+        end = loop.time() + JOIN_SECONDS
         while not self._publisher.subscribers and loop.time() < end:
             await asyncio.sleep(_JOIN_LOOK)
 
@@ -340,7 +342,7 @@ class _ToRos2(_Passing):
             self.passed += 1
 
 
-class _ToRos1(_Passing):
+class _ToRos1(TopicPassing):
     def __init__(
         self, bridge: Ros2Bridge, link: Link, made: Transcoder, depth: int, interface: InterfaceType
     ) -> None:
@@ -374,7 +376,7 @@ class _ToRos1(_Passing):
     def _deliver(self, data: bytes) -> None:
         """Pass a message to ROS 1. Runs in the executor's thread, which writes to the ROS 1 sockets itself."""
         if data[2:4] == self._bridge.header[2:4]:
-            return  # a bridge to the same ROS 1 graph sent this message
+            return  # the message was sent by another bridge to the same ROS 1 graph
         try:
             self._publisher.publish_raw(bytes(self._with_statics(self._made.to_ros1(data))))
         except DeserializationError as error:

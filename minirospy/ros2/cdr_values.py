@@ -1,4 +1,4 @@
-"""Encode and decode, by their types' fields, the ROS 2 messages that the bridge itself uses, in CDR. Pure.
+"""Encodes and decodes the ROS 2 messages that the bridge itself uses, in CDR, by their types' fields. Pure.
 
 Messages that are only passed on are converted by ``core/idl/cdr.py``, which is faster. Numbers become int, float or bool,
 byte arrays bytes, other arrays lists, and messages dicts.

@@ -1,7 +1,7 @@
-"""Derive ROS 2 type definitions from ROS 1 definitions and the rules, for use without an installed ROS 2. Pure.
+"""Derives ROS 2 type definitions from ROS 1 definitions and the rules, for use without an installed ROS 2. Pure.
 
-The results (fields and their types) replace the information from rclpy's classes and determine the CDR layout. Whether
-they match the other side's definitions is verified by the type hash, which is part of each key of rmw_zenoh.
+The results (fields and their types) replace the information from rclpy's classes and determine the CDR layout. The type
+hash, which is part of each key of rmw_zenoh, verifies that they match the other side's definitions.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from minirospy.ros2.rules import Rules, snake_case
 
 __all__ = ["NO_HASH", "Definitions"]
 
-NO_HASH = "TypeHashNotSupported"  # in ROS 2 Humble's keys, which have no hashes
+NO_HASH = "TypeHashNotSupported"  # used in ROS 2 Humble's keys, which have no hashes
 
 _TIME = {"sec": "int32", "nanosec": "uint32"}
 _STAMP = "builtin_interfaces/Time"
@@ -112,7 +112,7 @@ _ADDED: dict[tuple[str, str], Fields] = {
     },
     ("visualization_msgs/Marker", "mesh_resource"): {"mesh_file": "visualization_msgs/MeshFile"},
 }
-"""ROS 2's additional fields, by the ROS 1 field that they follow."""
+"""ROS 2's additional fields, by the type and the ROS 1 field that they follow."""
 _ADDED_AFTER_HUMBLE = {("sensor_msgs/Range", "range")}
 _BOUNDED = {("shape_msgs/SolidPrimitive", "dimensions"): "sequence<double, 3>"}
 _BASES = {"char": "uint8", "time": _STAMP, "duration": "builtin_interfaces/Duration"}
@@ -131,19 +131,19 @@ class Definitions:
         self._hashes: dict[str, str] = {}
 
     def message(self, name: str, *, is_humble: bool = False) -> Fields:
-        """Return the fields of a message; ``is_humble``: as in ROS 2 Humble."""
+        """Return the fields of a message, with ``is_humble`` as defined in ROS 2 Humble."""
         key = (name, is_humble)
         if key not in self._found:
             self._found[key] = _ONLY_IN_ROS2.get(name) or self._of_ros1(name, is_humble)
         return self._found[key]
 
     def service(self, name: str) -> tuple[Fields, Fields]:
-        """Return the fields of a service's request and response; ``name``: ``pkg/Name``."""
+        """Return the fields of a service's request and response. ``name`` is ``pkg/Name``."""
         whole = name.replace("/", "/srv/")
         return self.fields(f"{whole}_Request"), self.fields(f"{whole}_Response")
 
     def action(self, name: str) -> tuple[Fields, Fields, Fields]:
-        """Return the fields of an action's goal, result and feedback; ``name``: ``pkg/Name``."""
+        """Return the fields of an action's goal, result and feedback. ``name`` is ``pkg/Name``."""
         whole = name.replace("/", "/action/")
         return (
             self.fields(f"{whole}_Goal"),
@@ -163,7 +163,8 @@ class Definitions:
     def fields(self, name: str) -> Fields:
         """Return the fields of a message, or of a type that ROS 2 generates for services and actions.
 
-        These are ``pkg/srv/Name``, ``pkg/action/Name_SendGoal``, ``pkg/action/Name_FeedbackMessage``, and their parts.
+        The generated types are ``pkg/srv/Name``, ``pkg/action/Name_SendGoal``, ``pkg/action/Name_FeedbackMessage``, and
+        their parts.
         """
         if name.count("/") == 1:
             return self.message(name)
@@ -237,7 +238,7 @@ class Definitions:
 
     def _fields(self, spec: MessageSpec, ros1: str, name: str, is_humble: bool) -> Fields:
         rule = self._rules.message(ros1)
-        # Newer ROS 1 definitions also have a battery's temperature.
+        # In newer ROS 1 definitions, BatteryState also has the temperature, so add it only if it is missing.
         has = {field.name for field in spec.fields}
         found: dict[str, str] = {}
         for field in spec.fields:

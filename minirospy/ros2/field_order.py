@@ -1,4 +1,4 @@
-"""Reorder the bytes of ROS 1 messages whose fields are in a different order than in ROS 2. Pure.
+"""Reorders the bytes of ROS 1 messages whose fields are in a different order than in ROS 2. Pure.
 
 ROS 1 messages have no padding, so a field's bytes do not depend on its position. The generated functions of
 :mod:`minirospy.core.idl.cdr` then convert a message whose fields are in ROS 2's order.
@@ -16,12 +16,13 @@ from minirospy.base.errors import DeserializationError
 __all__ = ["Array", "Fixed", "Node", "Reordered", "Text", "inverse", "reorder"]
 
 _COUNT = struct.Struct("<I")
-_SPARE = 10_000  # empty elements that a message may have in addition to one per byte, as in core/idl/cdr.py
+# number of zero-size elements allowed in addition to one element per message byte, as in core/idl/cdr.py
+_SPARE = 10_000
 
 
 @dataclass(frozen=True)
 class Fixed:
-    """A field of ``size`` bytes."""
+    """A field with a fixed size of ``size`` bytes."""
 
     size: int
 
@@ -68,7 +69,7 @@ def reorder(node: Node, data: bytes | memoryview) -> bytes:
         end = _write(node, view, 0, parts)
     except struct.error as error:
         raise DeserializationError("the message ends too early") from error
-    parts.append(view[end:])  # the conversion rejects trailing data
+    parts.append(view[end:])  # keep trailing data, which the conversion then rejects
     return b"".join(parts)
 
 

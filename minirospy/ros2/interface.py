@@ -1,4 +1,4 @@
-"""The bridge's interface to ROS 2: implemented with rclpy in ``side.py``, with Zenoh in ``zenoh_side.py``, and by tests.
+"""The bridge's interface to ROS 2, implemented with rclpy in ``side.py``, with Zenoh in ``zenoh_side.py``, and in tests.
 
 ROS 2 calls back in its own threads. Types are ``pkg/Name``; messages are CDR.
 """
@@ -12,15 +12,17 @@ from typing import TYPE_CHECKING, Protocol
 
 from minirospy.ros2.links import Ros2Topic
 from minirospy.ros2.parameter_values import Value
-from minirospy.ros2.reach import Reachable
 
 if TYPE_CHECKING:
-    from minirospy.ros2.rclpy_actions import Accept, Ros2Goal
     from minirospy.ros2.rclpy_parameters import ParameterStore
 
 __all__ = [
+    "Accept",
+    "GoalOfRos1",
+    "Reachable",
     "Ros2ActionClient",
     "Ros2Client",
+    "Ros2Goal",
     "Ros2Handle",
     "Ros2Parameters",
     "Ros2Probe",
@@ -48,32 +50,56 @@ class Ros2Handle(Protocol):
 
 
 class Ros2Probe(Protocol):
-    """Sends requests that have no effect to a client's servers. Methods may be called from any thread."""
+    """Sends no-op requests to a client's servers. Methods may be called from any thread."""
 
     @property
     def is_ready(self) -> bool:
         """Return whether the servers are connected."""
 
     def reach(self) -> Future[None]:
-        """Send a request and return the future of its response. After that response, no response to the client is lost."""
+        """Send a request and return a future for its response. After that response, no response to the client is lost."""
 
     def close(self) -> None: ...
+
+
+class Reachable(Protocol):
+    """A client of a service or an action. Methods may be called from any thread."""
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether a server is connected."""
+
+    @property
+    def servers(self) -> frozenset[bytes] | None:
+        """Return the ids of the existing servers, or None if no response can be lost."""
+
+    def probe(self) -> Ros2Probe | None:
+        """Return a probe of the servers, or None if no no-op request exists for them."""
 
 
 class Ros2Client(Reachable, Protocol):
     """A client of a service. Methods may be called from any thread."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return the future of the response, both as CDR. The future fails with BridgeError."""
+        """Send a request and return a future for the response, both as CDR. The future fails with BridgeError."""
 
     def close(self) -> None: ...
+
+
+class Ros2Goal(Protocol):
+    """A goal that a ROS 2 server has accepted. Methods may be called from any thread."""
+
+    def cancel(self) -> None: ...
+
+    def result(self) -> Future[tuple[int, bytes]]:
+        """Return a future for the status (see action_msgs/GoalStatus) and the result."""
 
 
 class Ros2ActionClient(Reachable, Protocol):
     """A client of an action. Methods may be called from any thread."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the future of the accepted goal, which is None if the goal is refused.
+        """Send a goal; return a future for the accepted goal, or for None if the goal is rejected.
 
         The future fails with BridgeError.
         """
@@ -81,8 +107,25 @@ class Ros2ActionClient(Reachable, Protocol):
     def close(self) -> None: ...
 
 
+class GoalOfRos1(Protocol):
+    """A goal that a ROS 1 server has accepted."""
+
+    @property
+    def ended(self) -> Future[tuple[int, bytes | None]]:
+        """Return the future of the final status (see action_msgs/GoalStatus) and the result, which is None if it is empty."""
+
+    def cancel(self) -> None:
+        """Send the server a cancel request. May be called from any thread."""
+
+
+Accept = Callable[[bytes, Callable[[bytes], None]], Future[GoalOfRos1 | None]]
+"""Accepts a goal, given the goal and a function for its feedback; returns a future for the accepted goal, or for None if the
+goal is rejected.
+"""
+
+
 class Ros2Parameters(Protocol):
-    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread.
+    """Parameters of other ROS 2 nodes. All methods block, so call them in a worker thread.
 
     All raise BridgeError if the call fails.
     """
@@ -134,9 +177,9 @@ class Ros2Side(Protocol):
     def client(self, service: str, type_: str) -> Ros2Client: ...
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
-        """Offer a service: call ``answer`` with a request's CDR, in a thread.
+        """Offer a service. ``answer`` is called in a thread, with a request's CDR, and returns a future for the response.
 
-        A MinirospyError from its future fails the call.
+        The call fails if the future raises MinirospyError.
         """
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
@@ -145,7 +188,7 @@ class Ros2Side(Protocol):
     def action_client(self, action: str, type_: str) -> Ros2ActionClient: ...
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
-        """Offer an action: call ``accept``, in a thread, with a goal and the function that sends the goal's feedback."""
+        """Offer an action. ``accept`` is called in a thread, with a goal and the function that sends the goal's feedback."""
 
     def serve_parameters(self, store: ParameterStore, loop: asyncio.AbstractEventLoop) -> Ros2Handle:
         """Offer the ROS 1 parameters as this node's parameters."""

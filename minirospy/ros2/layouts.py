@@ -1,4 +1,4 @@
-"""Compute the common layout of a message from its ROS 1 and ROS 2 specs and the rules, or the reason why none exists. Pure.
+"""Computes the common layout of a message from its ROS 1 and ROS 2 specs and the rules, or the reason why there is none. Pure.
 
 A ROS 2 spec is written as a ROS 1 spec: numeric types have their ROS 1 names, and times are ``builtin_interfaces/Time``.
 """
@@ -31,7 +31,7 @@ __all__ = ["TypesDiffer", "layout_of", "ros2_field_type", "ros2_spec", "transcod
 
 
 class TypesDiffer(BridgeError):
-    """Raised, with the reason, if a ROS 1 type cannot be converted to a ROS 2 type."""
+    """A ROS 1 type cannot be converted to a ROS 2 type, for the reason in the message."""
 
 
 _WIDTHS = {
@@ -139,7 +139,7 @@ class _Pairing:
         for skipped in ros2.fields[place:]:
             items += self._alone(skipped.type, Side.ROS2, around)
         if not ros2.fields:
-            # CDR has no empty structs: rosidl adds a member.
+            # CDR has no empty structs, so rosidl adds a member.
             items.append(Fixed(1, side=Side.ROS2))
         self._items += len(items)
         return tuple(items)
@@ -196,7 +196,7 @@ class _Ordering:
         self._is_changed = False
 
     def message(self, ros1: MessageSpec, ros2: MessageSpec) -> Reordered | None:
-        """Return the reordering from ROS 1's to ROS 2's order; None if the orders are equal."""
+        """Return the reordering from ROS 1's to ROS 2's order, or None if the orders are equal."""
         found = self._message(ros1, ros2)
         return found if self._is_changed else None
 
@@ -243,7 +243,7 @@ def _in_order(made: Transcoder, order: Reordered) -> Transcoder:
 
 
 def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, ...]:
-    """Return ROS 1's fields; the field that the rule inlines is replaced by its own fields."""
+    """Return ROS 1's fields, in which the fields of the inlined field replace that field."""
     found: list[Field] = []
     for each in spec.fields:
         if each.name != rule.inlined:
@@ -256,7 +256,7 @@ def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, 
 
 
 def _order(fields: tuple[Field, ...], pairs: dict[str, Field], ros2: MessageSpec) -> tuple[int, ...]:
-    """Return the indices of ROS 1's fields in ROS 2's order; a field that ROS 2 lacks stays after the field before it."""
+    """Return the indices of ROS 1's fields in ROS 2's order. A field that ROS 2 lacks stays after the field before it."""
     places = {each.name: number for number, each in enumerate(ros2.fields)}
     keys = []
     place = -1
@@ -312,7 +312,7 @@ def _spellings(name: str) -> Iterator[str]:
 
 # --- rosgraph_msgs/Log
 
-_LEVEL = 12  # offset of the level in a log message's CDR, after the CDR header and the time
+_LEVEL = 12  # offset of the level in a log message's CDR: after the CDR header and the time
 _LEVELS_OF_ROS2 = {1: 10, 2: 20, 4: 30, 8: 40, 16: 50}
 _LEVELS_OF_ROS1 = {level: ros1 for ros1, level in _LEVELS_OF_ROS2.items()}
 

@@ -1,4 +1,4 @@
-"""The links of one kind (topics, services or actions): opened if both sides want them, closed when one no longer does."""
+"""The links of one kind (topics, services or actions). They are opened if both sides want them, and otherwise closed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _O = TypeVar("_O", bound="OpenLink")
 
 
 class OpenLink(Protocol):
-    """A link that passes messages, calls or goals from :meth:`open` to :meth:`close`; ``close`` is always called."""
+    """A link that passes on messages, calls or goals from :meth:`open` to :meth:`close`. ``close`` is always called."""
 
     async def open(self) -> None: ...
 
@@ -31,14 +31,14 @@ class OpenLink(Protocol):
 
 @dataclass(frozen=True)
 class Pair:
-    """A link, and the reason why it is not open, or "" if it is open."""
+    """A link, with the reason why it is not open, or "" if it is open."""
 
     link: Link | ServiceLink | ActionLink
     reason: str = ""
 
 
 def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
-    """Return the links, with the reasons why some cannot be opened; ``check(link)`` raises TypesDiffer with the reason."""
+    """Return the links, with the reasons why some cannot be opened, which ``check(link)`` raises as TypesDiffer."""
     found = []
     for link in wanted:
         try:
@@ -77,7 +77,7 @@ class LinkTable(Generic[_L, _O]):
             except (TypesDiffer, ROSException, ValueError) as error:
                 self._refuse(link, str(error))
             except MinirospyError:
-                raise  # the master reported an error: the caller retries
+                raise  # the master returned an error, so the caller retries
             except Exception as error:  # noqa: BLE001 - whatever rclpy raises: the other links are opened
                 self._refuse(link, f"{type(error).__name__}: {' '.join(str(error).split())}")
         return bool(gone or new)

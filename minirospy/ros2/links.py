@@ -1,4 +1,4 @@
-"""Select the topics to bridge, and their settings, from snapshots of both graphs. Pure."""
+"""Selects the topics to bridge, and their settings, from snapshots of both graphs. Pure."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ __all__ = [
 ]  # fmt: skip
 
 BRIDGE_PREFIX = "minirospy_ros2_bridge"
-"""Prefix of all bridges' node names on both sides: bridges' endpoints are ignored."""
+"""Prefix of the node names of all bridges, on both sides. Bridges' endpoints are ignored."""
 
 
 def parse_domain(text: str) -> str:
-    """Return the ROS 2 domain from ``ROS_DOMAIN_ID``: 0 if it is empty. Raise BridgeError if it is invalid."""
+    """Return the ROS 2 domain from the value of ``ROS_DOMAIN_ID``, or 0 if it is empty. Raise BridgeError if it is invalid."""
     if not re.fullmatch(r"[0-9]{0,9}", text):
         raise BridgeError(f"ROS_DOMAIN_ID is [{escaped(text)}]: it must be a number, such as 0")
     return str(int(text or "0"))
@@ -55,7 +55,8 @@ class Ros2Topic:
 class Link:
     """A topic that is bridged in one direction.
 
-    ``is_latched``: later subscribers receive the last message. ``is_reliable``: the reliability of the ROS 2 subscription.
+    With ``is_latched``, later subscribers receive the last message. ``is_reliable`` is the reliability of the ROS 2
+    subscription.
     """
 
     topic: str
@@ -82,7 +83,7 @@ def links(
     is_latched: Callable[[str, str], bool],
     ros1_type: Callable[[str], str],
 ) -> list[Link]:
-    """Return the topics to bridge: those with endpoints on both sides, not counting bridges' endpoints.
+    """Return the topics to bridge, which are those with endpoints on both sides, not counting bridges' endpoints.
 
     ``is_latched(topic, node)`` returns whether a ROS 1 publisher latches. ``ros1_type(ros2_type)`` returns the ROS 1 type for
     a ROS 1 subscriber to any type, such as `rostopic echo`.
@@ -117,7 +118,7 @@ def links(
 
 
 def _type_of(ends: list[Ros2End], ros1_type: str) -> str:
-    """Return one type for endpoints whose types may differ: ROS 1's type name if an endpoint has it, else the first by name."""
+    """Return one type for endpoints whose types may differ: ROS 1's type name if an endpoint uses it, else the first by name."""
     types = sorted({end.type for end in ends})
     return ros1_type if ros1_type in types else types[0]
 
@@ -125,8 +126,9 @@ def _type_of(ends: list[Ros2End], ros1_type: str) -> str:
 def marker(graph: str) -> bytes:
     """Return the CDR header for messages from a ROS 1 graph; ``graph`` is its run_id.
 
-    Readers ignore the options in its last two bytes; the bridge uses them to recognize messages that it must not send
-    back. The two lowest bits, which XCDR version 2 uses, stay zero, and no other publisher uses the same options.
+    Readers ignore the options in the header's last two bytes. The bridge uses these bytes to recognize messages that it
+    must not send back. The two lowest bits, which XCDR version 2 uses, stay zero; other publishers do not use the other
+    bits.
     """
     import zlib
 

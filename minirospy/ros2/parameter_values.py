@@ -1,4 +1,4 @@
-"""Convert parameters between ROS 1 and a ROS 2 node: names, types and values. Pure.
+"""Converts parameters between ROS 1 and a ROS 2 node: their names, types and values. Pure.
 
 Sources: http://wiki.ros.org/Parameter%20Server; rcl_interfaces/msg/ParameterType and ParameterValue.
 """
@@ -87,7 +87,7 @@ def leaves(value: object, name: str = "") -> Iterator[str]:
 
 
 def ros2_value(value: object) -> Value:
-    """Convert a ROS 1 value to ROS 2, or to a string with JSON if ROS 2 has no such type."""
+    """Convert a ROS 1 value to ROS 2. If ROS 2 has no such type, return a string that contains JSON."""
     if isinstance(value, Binary):
         value = value.data
     if isinstance(value, bytes | bytearray):
@@ -125,7 +125,7 @@ def _checked(value: object) -> object:
 
 
 def listed(names: Sequence[str], prefixes: Sequence[str], depth: int) -> tuple[list[str], list[str]]:
-    """Return the names and prefixes that a list request selects. ``depth``: levels below a prefix, 0 for all."""
+    """Return the names and prefixes that a list request selects. ``depth`` is the number of levels below a prefix, 0 for all."""
     found = []
     for name in names:
         rests = [name] if not prefixes else []

@@ -1,4 +1,4 @@
-"""Bridge parameters: ROS 1's as parameters of the bridge's ROS 2 node, and ROS 2 nodes' through ROS 1 services."""
+"""Bridges parameters: offers ROS 1's as parameters of the bridge's ROS 2 node, and ROS 2 nodes' through ROS 1 services."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Ros1Parameters:
         return [ros2_name(name) for name in leaves(await self._node.get_param("/", {}))]
 
     async def get(self, names: Sequence[str]) -> list[Value]:
-        """Return the values; the type is 0 if a parameter is not set, or the name is a namespace."""
+        """Return the values. The type is 0 if a parameter is not set, or the name is a namespace."""
         found = []
         for name in names:
             value = await self._node.get_param(ros1_name(name), None)
@@ -50,9 +50,9 @@ class Ros1Parameters:
         return found
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return an error for each, "" for success.
+        """Set or delete parameters; return an error message for each, which is "" for success.
 
-        ``atomically``: change none if any is refused.
+        With ``atomically``, change none if any of them is rejected.
         """
         reasons = [_refusal(name, value) for name, value in values]
         if atomically and any(reasons):

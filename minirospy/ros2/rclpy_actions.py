@@ -1,4 +1,4 @@
-"""Clients and servers of ROS 2 actions with rclpy's own classes; goals, results and feedback are CDR.
+"""Clients and servers of ROS 2 actions, with rclpy's own classes. Goals, results and feedback are CDR.
 
 Everything runs in the executor's thread, except for methods whose docstrings say otherwise.
 """
@@ -18,20 +18,20 @@ from minirospy.base.errors import BridgeError, MinirospyError
 from minirospy.ros2.action_links import send_goal_service
 from minirospy.ros2.rclpy_calls import Calls, Message, MessageClass, RclpyFuture
 
-__all__ = ["ActionClass", "ActionClient", "ActionServer", "Feedback", "GoalOfRos1", "GoalOfRos2", "Ros2Goal"]
+__all__ = ["ActionClass", "ActionClient", "ActionServer", "Feedback", "GoalOfRos2"]
 
 if TYPE_CHECKING:
-    from minirospy.ros2.interface import Ros2Probe
+    from minirospy.ros2.interface import Accept, GoalOfRos1, Ros2Goal, Ros2Probe
 
 _T = TypeVar("_T")
 
 CANCELED = 5
-"""Final goal statuses: action_msgs/GoalStatus."""
+"""Goal statuses after the end of a goal, from action_msgs/GoalStatus."""
 SUCCEEDED = 4
 ABORTED = 6
 
 _FEEDBACK_DEPTH = 100
-_CLOSE_SECONDS = 1.0
+CLOSE_SECONDS = 1.0
 _HEADER = 4
 _ID = 16
 
@@ -44,7 +44,7 @@ class _Impl(Protocol):
 
 
 class ActionClass(Protocol):
-    """A ROS 2 action's class."""
+    """The interface of a generated ROS 2 action class."""
 
     Impl: _Impl
 
@@ -82,15 +82,6 @@ class _RclpyActionClient(Protocol):
     def destroy(self) -> None: ...
 
 
-class Ros2Goal(Protocol):
-    """A goal that a ROS 2 server has accepted. Methods may be called from any thread."""
-
-    def cancel(self) -> None: ...
-
-    def result(self) -> Future[tuple[int, bytes]]:
-        """Return the future of the status (see action_msgs/GoalStatus) and the result."""
-
-
 class _Closable(Protocol):
     def destroy(self) -> None: ...
 
@@ -107,11 +98,11 @@ class GoalOfRos2:
         self._on_end = on_end
 
     def cancel(self) -> None:
-        """Request the server to cancel the goal."""
+        """Send the server a cancel request."""
         self._calls.executor.create_task(self._handle.cancel_goal_async)
 
     def result(self) -> Future[tuple[int, bytes]]:
-        """Return the future of the status and the result."""
+        """Return a future for the status and the result."""
         ended: Future[tuple[int, bytes]] = Future()
 
         def arrived(done: RclpyFuture) -> None:
@@ -136,7 +127,7 @@ class GoalOfRos2:
 class ActionClient:
     """A client of an action.
 
-    It subscribes to feedback itself: rclpy's client drops feedback that has not been read when the result arrives.
+    It subscribes to feedback itself, because rclpy's client drops feedback that has not been read when the result arrives.
     """
 
     def __init__(self, calls: Calls, name: str, class_: ActionClass) -> None:
@@ -145,8 +136,8 @@ class ActionClient:
         self._callbacks: dict[bytes, Callable[[bytes], None]] = {}
         self._class = class_
         self._feedback_class = class_.Impl.FeedbackMessage
-        # Create the feedback subscription before the client: a server that has discovered the client's last endpoint
-        # has then discovered this one, too.
+        # Create the feedback subscription before the client, so that a server that has discovered the client's last
+        # endpoint has also discovered this one.
         self._feedback = calls.node.create_subscription(
             self._feedback_class, f"{name}/_action/feedback", self._take_feedback, _FEEDBACK_DEPTH, raw=True
         )
@@ -175,7 +166,7 @@ class ActionClient:
         return _CancelProbe(self)
 
     def reach(self) -> Future[None]:
-        """Cancel a nonexistent goal; return the future of the response. May be called from any thread."""
+        """Cancel a nonexistent goal; return a future for the response. May be called from any thread."""
         reached: Future[None] = Future()
 
         def answered(_: object) -> None:
@@ -195,7 +186,7 @@ class ActionClient:
         return reached
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the accepted goal, or None if it is refused. May be called from any thread."""
+        """Send a goal; return a future for the accepted goal, or for None if it is rejected. May be called from any thread."""
         accepted: Future[Ros2Goal | None] = Future()
         self._calls.executor.create_task(self._send, goal, feedback, accepted)
         return accepted
@@ -222,7 +213,7 @@ class ActionClient:
             try:
                 accepted.set_result(GoalOfRos2(self._calls, handle, ended) if handle.accepted else None)
             except InvalidStateError:
-                # The caller no longer waits, and the goal counts as refused in ROS 1, so the goal must not run.
+                # The caller no longer waits, and the goal counts as rejected in ROS 1, so it must not run.
                 self._callbacks.pop(id, None)
                 if handle.accepted:
                     handle.cancel_goal_async()
@@ -235,21 +226,21 @@ class ActionClient:
             _fail(accepted, error)
 
     def _read_feedback(self) -> None:
-        """Deliver queued feedback that was sent before the result that has arrived."""
+        """Deliver the queued feedback that was sent before the result that has arrived."""
         handle = self._feedback.handle
         with handle:
             while taken := handle.take_message(self._feedback_class, True):
                 self._take_feedback(taken[0])
 
     def _take_feedback(self, data: bytes) -> None:
-        # The goal's id has 16 bytes, so that removing it does not change the alignment of the remaining data.
+        # The goal's id has 16 bytes, so removing it does not change the alignment of the remaining data.
         callback = self._callbacks.get(bytes(data[_HEADER : _HEADER + _ID]))
         if callback:
             callback(data[:_HEADER] + data[_HEADER + _ID :])
 
 
 class _CancelProbe:
-    """A probe of an action's servers that uses the action's client, which stays open."""
+    """A probe of an action's servers. It uses the action's client, which stays open."""
 
     def __init__(self, client: ActionClient) -> None:
         self._client = client
@@ -283,19 +274,8 @@ def _client_class() -> Callable[..., _RclpyActionClient]:
 # --- goals of ROS 2 in ROS 1
 
 
-class GoalOfRos1(Protocol):
-    """A goal that a ROS 1 server has accepted."""
-
-    @property
-    def ended(self) -> Future[tuple[int, bytes | None]]:
-        """Return the future of the final status (see above) and the result, which is None if it is empty."""
-
-    def cancel(self) -> None:
-        """Request the server to cancel the goal. May be called from any thread."""
-
-
 class Feedback:
-    """A goal's feedback: buffered until the goal's handle exists, then published. May be called from any thread."""
+    """A goal's feedback, which is buffered until the goal's handle exists, then published. May be called from any thread."""
 
     def __init__(self, calls: Calls, class_: MessageClass) -> None:
         self._calls = calls
@@ -318,10 +298,6 @@ class Feedback:
             self._kept.append(data)
         else:
             self._handle.publish_feedback(self._calls.deserialize(data, self._class))
-
-
-Accept = Callable[[bytes, Callable[[bytes], None]], "Future[GoalOfRos1 | None]"]
-"""Accepts a goal, given the function for its feedback; returns the accepted goal, or None if the goal is refused."""
 
 
 class ActionServer:
@@ -354,21 +330,21 @@ class ActionServer:
         )
 
     def close(self) -> None:
-        """Close after sending known results and refusals. Call from any thread but the executor's."""
+        """Close the action after sending known results and rejections. Call it from any thread but the executor's."""
         sent = threading.Event()
         self._calls.end(functools.partial(self._wait_until_sent, sent))
-        sent.wait(_CLOSE_SECONDS)
+        sent.wait(CLOSE_SECONDS)
         self._is_closed = True
         self._calls.end(self._server.destroy)
 
     def _wait_until_sent(self, sent: threading.Event) -> None:
-        """Set the event in the executor's first iteration in which no response is pending."""
+        """Set the event in the first iteration of the executor in which no response is pending."""
         if self._is_closed:
             return
         if self._requests or any(goal.ended.done() for _, goal, _ in self._goals.values()):
             self._calls.end(functools.partial(self._wait_until_sent, sent))
         else:
-            # rclpy may complete the response in a task that runs after the bridge's part.
+            # rclpy may complete the response in a task that runs after the bridge's own code.
             self._calls.end(sent.set)
 
     async def _requested(self, goal: Message) -> object:
@@ -387,7 +363,7 @@ class ActionServer:
             accepted = None
         if accepted is None:
             return self._module.GoalResponse.REJECT
-        # Later, the goal's handle will refer to this object.
+        # Store the goal under its id(): the goal's handle will refer to this object later.
         self._goals[id(goal)] = (goal, accepted, feedback)
         return self._module.GoalResponse.ACCEPT
 

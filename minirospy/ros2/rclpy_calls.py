@@ -1,6 +1,6 @@
 """Clients and servers of ROS 2 services with rclpy, which has no API for serialized requests.
 
-A request or response is an object of the class that ROS 2 has generated for its type; rclpy's serialization converts it
+A request or response is an object of the class that ROS 2 has generated for its type. rclpy's serialization converts it
 from and to CDR. Everything runs in the executor's thread, except for methods whose docstrings say otherwise.
 """
 
@@ -32,9 +32,9 @@ __all__ = [
 ]
 
 _REASONS = ("message", "status_message", "error_message", "error_string", "error", "reason")
-"""Fields in which a failed call's response may contain the reason."""
+"""Names of fields in a response that may contain the reason why a call failed."""
 
-_DEPTH = 1000  # requests or responses queued for the bridge
+_DEPTH = 1000  # maximum number of requests or responses queued for the bridge
 
 _GUID_PREFIX = 12
 
@@ -52,7 +52,7 @@ class Message(Protocol):
 
 
 class MessageClass(Protocol):
-    """A message's, request's or response's class."""
+    """The interface of a generated class for messages, requests or responses."""
 
     def __call__(self) -> Message: ...
 
@@ -61,14 +61,14 @@ class MessageClass(Protocol):
 
 
 class ServiceClass(Protocol):
-    """A service's class."""
+    """The interface of a generated ROS 2 service class."""
 
     Request: MessageClass
     Response: MessageClass
 
 
 class RclpyFuture(Protocol):
-    """An rclpy future."""
+    """The interface of an rclpy future."""
 
     def result(self) -> object: ...
 
@@ -80,7 +80,7 @@ class RclpyFuture(Protocol):
 
 
 class RclpyHandle(Protocol):
-    """A subscription's handle, a context manager for its use."""
+    """A subscription's handle, which is a context manager for its use."""
 
     def __enter__(self) -> object: ...
 
@@ -159,7 +159,7 @@ class ServiceNode(Protocol):
 
 
 class NotAnsweredError(Exception):
-    """A request that gets no response, because ROS 2 services have no errors."""
+    """A request receives no response; ROS 2 services have no error responses."""
 
 
 class Calls:
@@ -172,13 +172,13 @@ class Calls:
         self.serialize: Callable[[object], bytes] = serialization.serialize_message
         self.deserialize: Callable[[bytes, MessageClass], Message] = serialization.deserialize_message
         self._future: Callable[..., RclpyFuture] = importlib.import_module("rclpy.task").Future
-        # In rmw_zenoh a response returns on the path of its request, so that no response is lost.
+        # In rmw_zenoh, a response uses the path of its request, so no response is lost.
         rmw = str(importlib.import_module("rclpy.utilities").get_rmw_implementation_identifier())
         self._loses_responses = not rmw.startswith("rmw_zenoh")
-        # Reentrant, so that a request that waits for its response does not block other requests.
+        # Reentrant, so that a request that is waiting for its response does not block other requests.
         self.options: dict[str, object] = {
             "callback_group": importlib.import_module("rclpy.callback_groups").ReentrantCallbackGroup(),
-            # The default QoS for services, with a longer queue.
+            # This is the default QoS for services with a longer queue.
             "qos_profile": importlib.import_module("rclpy.qos").QoSProfile(depth=_DEPTH),
         }
 
@@ -191,20 +191,20 @@ class Calls:
         return Server(self, name, class_, answer)
 
     def servers(self, service: str) -> frozenset[bytes] | None:
-        """Return the ids of a service's servers; or None if no response can be lost. May be called from any thread."""
+        """Return the ids of a service's servers, or None if no response can be lost. May be called from any thread."""
         if not self._loses_responses:
             return None
         return frozenset(bytes(info.endpoint_gid) for info in self._writers(service))
 
     def parameter_probe(self, service: str) -> ParameterProbe | None:
-        """Return a probe for a service's nodes, or None if one has no parameters or is not known yet.
+        """Return a probe for a service's nodes, or None if one of them has no parameters or is not known yet.
 
         May be called from any thread.
         """
         names = set()
         for server in self._writers(service):
             name = f"{server.node_namespace.rstrip('/')}/{server.node_name}/{ParameterService.GET.service}"
-            # If another process has a node with the same name, its response would not show that this node has been
+            # If another process has a node with the same name, its response would not prove that this node has been
             # reached.
             if {_process(each) for each in self._writers(name)} != {_process(server)}:
                 return None
@@ -221,14 +221,14 @@ class Calls:
     def end(self, destroy: Callable[[], object]) -> None:
         """Destroy an object in the executor's thread, because that thread may be about to wait for the object.
 
-        May be called from any thread. rclpy's executor fails if an object is destroyed while it builds its wait set.
+        May be called from any thread. rclpy's executor fails if an object is destroyed while the executor builds its wait set.
         """
         self.executor.create_task(destroy)
 
     async def result(self, future: Future[_T], *, after_tasks: bool = False) -> _T:
         """Return the result of another thread's future, in a coroutine of the executor.
 
-        ``after_tasks``: only after the tasks that the other thread has already submitted to the executor.
+        With ``after_tasks``, return it only after the tasks that the other thread has already submitted to the executor.
         """
         waiting = self._future(executor=self.executor)
 
@@ -264,22 +264,22 @@ class Client:
 
     @property
     def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the servers; or None if no response can be lost. May be called from any thread."""
+        """Return the ids of the servers, or None if no response can be lost. May be called from any thread."""
         return self._calls.servers(self._name)
 
     def probe(self) -> ParameterProbe | None:
-        """Return a probe that requests no parameters (an empty list) from the servers' nodes."""
+        """Return a probe that sends requests with an empty list of parameters to the servers' nodes."""
         return self._calls.parameter_probe(self._name)
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return the future of the response, both as CDR. May be called from any thread."""
+        """Send a request and return a future for the response, both as CDR. May be called from any thread."""
         answered: Future[bytes] = Future()
         # Send in the executor's thread, so that no response arrives before its request is recorded.
         self._calls.executor.create_task(self._send, request, answered)
         return answered
 
     def call_empty(self) -> Future[bytes]:
-        """Send a request with default values. May be called from any thread."""
+        """Send a request with default values; return a future for the response. May be called from any thread."""
         return self.call(self._calls.serialize(self._class.Request()))
 
     def close(self) -> None:
@@ -313,7 +313,7 @@ class Client:
 
 
 class ParameterProbe:
-    """A probe of nodes through their parameter services: a request for no parameters has no effect."""
+    """A probe of nodes through their parameter services, because a request for no parameters has no effect."""
 
     def __init__(self, clients: Sequence[Client]) -> None:
         self._clients = clients
@@ -324,7 +324,7 @@ class ParameterProbe:
         return all(client.is_ready for client in self._clients)
 
     def reach(self) -> Future[None]:
-        """Send a request to each node; return the future of the last response. May be called from any thread."""
+        """Send a request to each node; return a future for the last response. May be called from any thread."""
         reached: Future[None] = Future()
         sent = [client.call_empty() for client in self._clients]
 
@@ -355,8 +355,8 @@ class ParameterProbe:
 class Server:
     """A service that the bridge offers in ROS 2.
 
-    ``answer`` takes a request's CDR and returns the future of the response's CDR. If the future raises MinirospyError,
-    the call fails: the reason is sent in the response, if the response has a field for the reason, and logged.
+    ``answer`` takes a request's CDR and returns a future for the response's CDR. If the future raises MinirospyError, the
+    call fails. The reason is logged, and sent in the response if the response has a field for it.
     """
 
     def __init__(
@@ -394,7 +394,7 @@ class Server:
 
 
 def _process(info: _EndpointInfo) -> bytes:
-    """Return the part of an endpoint's id that all endpoints in a process share. Source: RTPS 2.5, 9.3.1."""
+    """Return the part of an endpoint's id that is common to all endpoints in a process. Source: RTPS 2.5, 9.3.1."""
     return bytes(info.endpoint_gid)[:_GUID_PREFIX]
 
 

@@ -1,4 +1,4 @@
-"""Parameters in ROS 2 with rclpy: services on the bridge's node for ROS 1's parameters, and access to other nodes' parameters."""
+"""Parameters in ROS 2, with rclpy: the bridge node's services for ROS 1's parameters, and access to other nodes'."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from minirospy.ros2.rclpy_calls import Calls, Client, Message, NotAnsweredError,
 __all__ = ["NodeParameters", "ParameterServer", "ParameterStore"]
 
 _SECONDS = 5.0
-_AGAIN_SECONDS = 0.5
+AGAIN_SECONDS = 0.5
 _T = TypeVar("_T")
 _Handler = Callable[[Message, Message], Coroutine[object, None, None]]
 
 
 class ParameterStore(Protocol):
-    """The ROS 1 parameters; with names and values as in ROS 2.
+    """The ROS 1 parameters, with names and values as in ROS 2.
 
     Runs on the node's loop; all methods raise MinirospyError if a call to the master fails.
     """
@@ -35,7 +35,7 @@ class ParameterStore(Protocol):
         """Return the values, with type 0 if a parameter is not set."""
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
-        """Set or delete parameters; return an error for each, "" for success."""
+        """Set or delete parameters; return an error message for each, which is "" for success."""
 
 
 class ParameterServer:
@@ -126,7 +126,7 @@ class ParameterServer:
 
 
 class NodeParameters:
-    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread.
+    """Parameters of other ROS 2 nodes. All methods block, so call them in a worker thread.
 
     All raise BridgeError if the call fails.
     """
@@ -169,7 +169,7 @@ class NodeParameters:
             request = type_.Request()
             empty = self._calls.serialize(request)
             try:
-                # Repeat the request: while the node has not discovered the client, its responses are lost (see
+                # Repeat the request, because responses are lost until the node has discovered the client (see
                 # reach.py).
                 data = _first(lambda: client.call(empty), end)
                 if fields:
@@ -185,7 +185,7 @@ class NodeParameters:
 
 def _first(call: Callable[[], Future[bytes]], end: float) -> bytes:
     """Repeat a call until it gets a response, and return the response. Raise TimeoutError at ``end``."""
-    pause = _AGAIN_SECONDS
+    pause = AGAIN_SECONDS
     while True:
         try:
             return _result(call(), min(end, time.monotonic() + pause))

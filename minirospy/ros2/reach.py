@@ -1,8 +1,8 @@
-"""Wait until ROS 2 servers have discovered the bridge's client: earlier responses may be lost. Runs on the node's loop.
+"""Waits until ROS 2 servers have discovered the bridge's client, because earlier responses may be lost. Runs on the node's loop.
 
 A server discovers a client's endpoints later than the client discovers the server. Until then, rmw_fastrtps and
-rmw_cyclonedds buffer a response for 100 ms and then drop it. A client is not notified of the server's discovery, but a
-response proves it: a request without effect is repeated until a response arrives. A process announces its endpoints in
+rmw_cyclonedds buffer a response for 100 ms and then drop it. A client is not notified when a server has discovered it,
+but a response proves it, so a no-op request is repeated until a response arrives. A process announces its endpoints in
 the order of their creation, so the response to a client that was created later shows that earlier endpoints have been
 discovered, too.
 """
@@ -12,35 +12,20 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from minirospy.base.errors import BridgeError
 
 if TYPE_CHECKING:
-    from minirospy.ros2.interface import Ros2Probe
+    from minirospy.ros2.interface import Reachable, Ros2Probe
 
-__all__ = ["Reach", "Reachable"]
+__all__ = ["Reach"]
 
 _LOOK_SECONDS = 0.02
-_AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
+AGAIN_SECONDS, _SLOWEST_SECONDS = 0.5, 8.0
 _NO_PROBE_SECONDS = 1.0  # seconds to wait for servers that cannot be probed
-_MAX_SECONDS = 10.0
-"""Maximum wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
-
-
-class Reachable(Protocol):
-    """A client of a service or an action. Methods may be called from any thread."""
-
-    @property
-    def is_ready(self) -> bool:
-        """Return whether a server is connected."""
-
-    @property
-    def servers(self) -> frozenset[bytes] | None:
-        """Return the ids of the existing servers, or None if no response can be lost."""
-
-    def probe(self) -> Ros2Probe | None:
-        """Return a probe of the servers, or None if they have no request without effect."""
+MAX_SECONDS = 10.0
+"""Maximum number of seconds to wait. A busy server may not have responded by then; requests are sent to it nevertheless."""
 
 
 class Reach:
@@ -63,7 +48,7 @@ class Reach:
     async def wait(self, seconds: float = math.inf) -> None:
         """Return once responses from the current servers can arrive, or after ``seconds``.
 
-        The maximum is ten seconds, so that unresponsive servers do not delay every request.
+        Wait for ten seconds at most, so that unresponsive servers do not delay every request.
         """
         servers = self._client.servers
         if servers is None or (self._reached is not None and servers <= self._reached):
@@ -72,14 +57,14 @@ class Reach:
         # Do not block queued calls while their link is being closed.
         if self._is_closed or self._reaching is None:
             return
-        seconds = min(seconds, _MAX_SECONDS)
+        seconds = min(seconds, MAX_SECONDS)
         if self._ready_at is not None and self._wanted <= servers:
             spent = asyncio.get_running_loop().time() - self._ready_at
-            seconds = min(seconds, _MAX_SECONDS - spent)
+            seconds = min(seconds, MAX_SECONDS - spent)
         await asyncio.wait([self._reaching], timeout=max(0.0, seconds))
 
     async def close(self) -> None:
-        """Stop; pending waits return. Idempotent."""
+        """Stop probing; pending waits return. Idempotent."""
         self._is_closed = True
         if self._reaching:
             self._reaching.cancel()
@@ -121,8 +106,8 @@ class Reach:
 
 
 async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
-    pause = _AGAIN_SECONDS
-    # Stop if a server's node has exited, because the node's services will never be ready again.
+    pause = AGAIN_SECONDS
+    # Stop if a server's node has exited, because the node's services will never become ready again.
     while is_current():
         if not probe.is_ready:
             await asyncio.sleep(_LOOK_SECONDS)
@@ -132,7 +117,7 @@ async def _answered(probe: Ros2Probe, is_current: Callable[[], bool]) -> bool:
         except asyncio.TimeoutError:
             pass
         except BridgeError:
-            # The actual requests will fail for the same reason and report the error.
+            # Ignore the error: the actual requests will fail for the same reason and report it.
             await asyncio.sleep(pause)
         else:
             return True

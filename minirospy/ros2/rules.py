@@ -1,8 +1,7 @@
 """The mapping of types and their fields between ROS 1 and ROS 2. Pure.
 
-Most types have the same name and fields on both sides. Exceptions are listed here; the user's own exceptions come from a
-file in the format of ros1_bridge's mapping rules.
-Source: https://github.com/ros2/ros1_bridge/blob/master/doc/index.rst.
+Most types have the same name and fields on both sides. Exceptions are listed here. Users can add exceptions in a file
+that has the format of ros1_bridge's mapping rules. Source: https://github.com/ros2/ros1_bridge/blob/master/doc/index.rst.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 class TypeRule:
     """The exceptions for a ROS 1 type.
 
-    ``names``: its possible names in ROS 2, ``pkg/Name``. ``fields``: maps all fields that are passed to ROS 2's fields;
-    None: fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side lacks. ``inlined``:
-    a field that ROS 2 replaces by that field's own fields.
+    ``names`` are its possible names in ROS 2, as ``pkg/Name``. ``fields`` maps all fields that are passed on to ROS 2's
+    fields. If it is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side
+    lacks. ``inlined`` is a field that ROS 2 replaces by that field's own fields.
     """
 
     names: tuple[str, ...] = ()
@@ -43,7 +42,7 @@ _NO_RULE = TypeRule()
 class Rules:
     """Rules for messages, services and actions, by ``pkg/Name``.
 
-    Parts of services and actions are messages with ROS 1's names.
+    Parts of services and actions count as messages, with ROS 1's names.
     """
 
     messages: Mapping[str, TypeRule] = field(default_factory=dict)
@@ -51,7 +50,7 @@ class Rules:
     actions: Mapping[str, TypeRule] = field(default_factory=dict)
 
     def message(self, ros1_type: str) -> TypeRule:
-        """Return the rule for a message type, an empty one if there is none."""
+        """Return the rule for a message type, or an empty rule if there is none."""
         return self.messages.get(ros1_type, _NO_RULE)
 
     def ros2_messages(self, ros1_type: str) -> tuple[str, ...]:
@@ -59,7 +58,7 @@ class Rules:
         return self.message(ros1_type).names or (ros1_type,)
 
     def ros1_message(self, ros2_type: str) -> str:
-        """Return the ROS 1 type for a ROS 2 message type: the same name, unless that name is another type in ROS 2."""
+        """Return the ROS 1 type for a ROS 2 message type. It has the same name, unless that name is another type in ROS 2."""
         if not self.message(ros2_type).names:
             kept = [name for name, rule in self.messages.items() if ros2_type in rule.names]
             other = [name for name in kept if name.partition("/")[0] != "tf"]
@@ -98,7 +97,7 @@ def _of_ros1(rules: Mapping[str, TypeRule], ros2_type: str) -> tuple[str, ...]:
 
 
 def snake_case(name: str) -> str:
-    """Return a field's name in ROS 2's style: ``seqNumber`` -> ``seq_number``."""
+    """Convert a field's name to ROS 2's style, such as ``seqNumber`` to ``seq_number``."""
     parts = re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name)
     return re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1_\2", parts).lower()
 
@@ -120,7 +119,7 @@ BUILT_IN = Rules(
             ),
             "tf/tfMessage": TypeRule(names=("tf2_msgs/TFMessage",)),
             "uuid_msgs/UniqueID": TypeRule(names=("unique_identifier_msgs/UUID",)),
-            # Fields that ROS 2 has added: they are empty in messages from ROS 1, and dropped in messages to ROS 1.
+            # Fields that ROS 2 has added. They are empty in messages from ROS 1, and dropped in messages to ROS 1.
             "sensor_msgs/BatteryState": _only(ros2=("temperature",)),
             "sensor_msgs/Range": _only(ros2=("variance",)),
             "shape_msgs/SolidPrimitive": _only(ros2=("polygon",)),

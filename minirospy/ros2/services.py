@@ -1,4 +1,4 @@
-"""Open and close services between the two sides, and handle calls."""
+"""Opens and closes services between the two sides, and handles calls."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ if TYPE_CHECKING:
 
 __all__ = ["ServiceBridge", "ServiceCodec"]
 
-_QUERY_SECONDS = 1.0
-"""Timeout, after which only services with known types are bridged."""
+QUERY_SECONDS = 1.0
+"""Timeout in seconds, after which only services with known types are bridged."""
 _LOOK_SECONDS = 0.5
 _ABSENT_LOOKS = 3
 _MAX_CALLS = 1_000
-"""Concurrent calls from a ROS 2 service to ROS 1; further calls fail with an error."""
+"""Maximum number of concurrent calls from a ROS 2 service to ROS 1; further calls fail with an error."""
 _MAX_UNDER_WAY = 8
-"""Concurrent requests to a ROS 2 server: its queue has 10 places, and further requests would be lost."""
+"""Maximum number of concurrent requests to a ROS 2 server: its queue has 10 places, and further requests would be lost."""
 
 
 @dataclass(frozen=True)
 class ServiceCodec:
-    """Converts a service's requests and responses; ``type``: the ROS 1 type."""
+    """Converts a service's requests and responses; ``type`` is the ROS 1 type."""
 
     type: InterfaceType
     request: Transcoder
@@ -62,7 +62,7 @@ class ServiceCodec:
 
 
 class _Types:
-    """The codecs for services, by their types on both sides."""
+    """The codecs for services, by the types on both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -149,7 +149,7 @@ class ServiceBridge:
         await self._headers.close()
 
     async def pairs(self, ros1: Mapping[str, tuple[str, ...]]) -> list[Pair]:
-        """Return the services to bridge, given the services in ROS 1, and the reasons why some are not bridged."""
+        """Return the services to bridge, and the reasons why some are not bridged, given the services in ROS 1."""
         return pairs(await self._wanted(ros1), self._codec)
 
     async def look(self, ros1: Mapping[str, tuple[str, ...]]) -> bool:
@@ -161,13 +161,13 @@ class ServiceBridge:
         foreign = {name: [node for node in nodes if not is_bridge(node)] for name, nodes in ros1.items()}
         ros2 = {name: type_ for name, type_ in self._side.services().items() if self._services(name)}
         await self._headers.look(
-            [(name, nodes[0]) for name, nodes in foreign.items() if nodes], _QUERY_SECONDS
+            [(name, nodes[0]) for name, nodes in foreign.items() if nodes], QUERY_SECONDS
         )
         types = {service: header["type"] for (service, _), header in self._headers.found.items()}
         return service_links(ros1, types, ros2, self._types.partner)
 
     async def _header(self, key: tuple[str, str]) -> Header:
-        """Return a server's connection header, needed because the ROS 1 master does not know service types."""
+        """Return a server's connection header, which is needed because the ROS 1 master does not know service types."""
         header = await service_header(self._node, key[0])
         if "type" not in header:
             raise WireError(f"service [{key[0]}] names no type")
@@ -210,7 +210,7 @@ class _InRos1:
         await self._server
 
     async def close(self) -> None:
-        # Running calls fail with an error.
+        # Make running calls fail with an error.
         self._ended.set()
         await self._reach.close()
         await self._server.close()
@@ -262,7 +262,7 @@ class _InRos1:
         return answered.result()
 
     async def _becomes_ready(self) -> bool:
-        """Wait for the server; if the service has just been discovered, its client may not be connected yet."""
+        """Wait for the server; return whether it is connected. If the service was just discovered, this may take a moment."""
         loop = asyncio.get_running_loop()
         end = loop.time() + _ABSENT_LOOKS * _LOOK_SECONDS
         while not self._client.is_ready:
@@ -315,7 +315,7 @@ class _InRos2:
         task = asyncio.ensure_future(self._pass_on(request, answered))
         self._calls.add(task)
         task.add_done_callback(self._calls.discard)
-        # Also needed if the task is cancelled, even before its first step.
+        # Cancel the future even if the task is cancelled before its first step.
         task.add_done_callback(lambda _: answered.cancel())
 
     async def _pass_on(self, request: bytes, answered: Future[bytes]) -> None:

@@ -1,4 +1,4 @@
-"""The ROS 2 backend with rclpy: topics, publishers and subscriptions of serialized messages.
+"""The ROS 2 backend with rclpy, for topics, publishers and subscriptions of serialized messages.
 
 Only this module and rclpy_*.py use rclpy. ROS 2 calls back in the thread of its executor.
 """
@@ -21,10 +21,17 @@ from typing import Protocol, cast
 
 from minirospy.base.errors import BridgeError
 from minirospy.ros2.action_links import send_goal_service
-from minirospy.ros2.interface import Ros2ActionClient, Ros2Client, Ros2Handle, Ros2Parameters, Ros2Publisher
+from minirospy.ros2.interface import (
+    Accept,
+    Ros2ActionClient,
+    Ros2Client,
+    Ros2Handle,
+    Ros2Parameters,
+    Ros2Publisher,
+)
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.links import BRIDGE_PREFIX, Ros2End, Ros2Topic, parse_domain
-from minirospy.ros2.rclpy_actions import Accept, ActionClass, ActionClient, ActionServer
+from minirospy.ros2.rclpy_actions import ActionClass, ActionClient, ActionServer
 from minirospy.ros2.rclpy_calls import Calls, MessageClass, NotAnsweredError, RclpySubscription, ServiceClass
 from minirospy.ros2.rclpy_parameters import NodeParameters, ParameterServer, ParameterStore
 
@@ -32,7 +39,7 @@ __all__ = ["RclpySide", "large_message_settings", "require_rclpy"]
 
 _log = logging.getLogger(__name__)
 _DRAINED = 200
-"""Messages read per callback of the executor, because a callback costs more than reading one message."""
+"""Maximum number of messages read per executor callback, because a callback costs more than reading a message."""
 
 
 # --- what is used of rclpy, which has no types where it is not installed
@@ -90,7 +97,7 @@ def require_rclpy() -> None:
 _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
 """Environment variables for Fast DDS's settings file.
 
-_OLD_DISTRIBUTIONS have version 2 or older, which uses the second one.
+The second one is for Fast DDS version 2 and older, which _OLD_DISTRIBUTIONS have.
 """
 _OLD_DISTRIBUTIONS = ("humble", "iron", "jazzy")
 _PACKAGE = re.compile(r"[a-z](_?[a-z0-9]+)*")
@@ -112,7 +119,7 @@ def large_message_settings(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 class RclpySide:
-    """The rclpy backend: one node and one executor, in one thread."""
+    """The rclpy backend, with one node and one executor in one thread."""
 
     def __init__(self, name: str) -> None:
         """Start the node. Raise BridgeError if ROS 2 reports an error."""
@@ -164,7 +171,7 @@ class RclpySide:
 
     def fields(self, type_: str) -> dict[str, str]:
         """Return the fields of a message type. Raise TypesDiffer if it is not installed."""
-        return dict(self._class(type_).get_fields_and_field_types())
+        return dict(self.message_class(type_).get_fields_and_field_types())
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
         """Return a reliable publisher, which is compatible with every subscriber.
@@ -172,8 +179,8 @@ class RclpySide:
         Raise TypesDiffer if the type is not installed.
         """
         profile = self._profile(depth, is_reliable=True, is_latched=is_latched)
-        publisher = self._node.create_publisher(self._class(type_), topic, profile)
-        return _Publisher(self._calls, self._node, publisher)
+        publisher = self._node.create_publisher(self.message_class(type_), topic, profile)
+        return TopicPublisher(self._calls, self._node, publisher)
 
     def subscribe(
         self,
@@ -190,7 +197,7 @@ class RclpySide:
         Raise TypesDiffer if the type is not installed.
         """
         profile = self._profile(depth, is_reliable=is_reliable, is_latched=is_latched)
-        return _Subscription(self._calls, self._node, self._class(type_), topic, deliver, profile)
+        return TopicSubscription(self._calls, self._node, self.message_class(type_), topic, deliver, profile)
 
     def nodes(self) -> list[tuple[str, str]]:
         """Return the names and namespaces of all nodes except for bridges."""
@@ -199,7 +206,7 @@ class RclpySide:
 
     def services(self) -> Mapping[str, str]:
         """Return the services of nodes other than this bridge, and their types."""
-        # Includes services that have clients but no server.
+        # This also contains services that have clients but no server.
         named = {str(name): _short(types[0]) for name, types in self._node.get_service_names_and_types()}
         if hasattr(self._node, "count_services"):
             own = tuple(self._served)
@@ -208,7 +215,7 @@ class RclpySide:
                 for name, type_ in named.items()
                 if self._node.count_services(name) > own.count(name)
             }
-        # Before ROS 2 Jazzy, query each node.
+        # Before ROS 2 Jazzy, each node must be queried.
         offered: dict[str, str] = {}
         for name, namespace in self.nodes():
             # The node has just exited.
@@ -219,7 +226,7 @@ class RclpySide:
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
         """Return the fields of a service's request and response. Raise TypesDiffer if it is not installed."""
-        class_ = self._service_class(type_)
+        class_ = self.service_class(type_)
         return (
             dict(class_.Request.get_fields_and_field_types()),
             dict(class_.Response.get_fields_and_field_types()),
@@ -227,17 +234,17 @@ class RclpySide:
 
     def client(self, service: str, type_: str) -> Ros2Client:
         """Return a client. Raise TypesDiffer if the type is not installed."""
-        return self._calls.client(service, self._service_class(type_))
+        return self._calls.client(service, self.service_class(type_))
 
     def serve(self, service: str, type_: str, answer: Callable[[bytes], Future[bytes]]) -> Ros2Handle:
         """Offer a service. Raise TypesDiffer if the type is not installed."""
-        server = self._calls.server(service, self._service_class(type_), answer)
+        server = self._calls.server(service, self.service_class(type_), answer)
         self._served.append(service)
         return _Served(self._calls, server, lambda: self._served.remove(service))
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
         """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if it is not installed."""
-        class_ = self._action_class(type_)
+        class_ = self.action_class(type_)
         goal, result, feedback = (
             dict(each.get_fields_and_field_types()) for each in (class_.Goal, class_.Result, class_.Feedback)
         )
@@ -245,12 +252,12 @@ class RclpySide:
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient:
         """Return a client of an action. Raise TypesDiffer if the type is not installed."""
-        return ActionClient(self._calls, action, self._action_class(type_))
+        return ActionClient(self._calls, action, self.action_class(type_))
 
     def action_server(self, action: str, type_: str, accept: Accept) -> Ros2Handle:
         """Offer an action. Raise TypesDiffer if the type is not installed."""
         service = send_goal_service(action)
-        server = ActionServer(self._calls, action, self._action_class(type_), accept)
+        server = ActionServer(self._calls, action, self.action_class(type_), accept)
         self._served.append(service)
         return _Served(self._calls, server, lambda: self._served.remove(service))
 
@@ -259,7 +266,7 @@ class RclpySide:
         return ParameterServer(self._calls, str(self._node.get_name()), store, loop)
 
     def node_parameters(self) -> Ros2Parameters:
-        """Return access to the parameters of other nodes."""
+        """Return an object that accesses the parameters of other nodes."""
         return NodeParameters(self._calls)
 
     def close(self) -> None:
@@ -303,7 +310,7 @@ class RclpySide:
         return profile
 
     @staticmethod
-    def _class(type_: str) -> MessageClass:
+    def message_class(type_: str) -> MessageClass:
         found = _imported(type_, "msg")
         # minirospy's own ROS 1 packages also have classes with that name.
         if not hasattr(found, "get_fields_and_field_types"):
@@ -311,14 +318,14 @@ class RclpySide:
         return cast("MessageClass", found)
 
     @staticmethod
-    def _service_class(type_: str) -> ServiceClass:
+    def service_class(type_: str) -> ServiceClass:
         found = _imported(type_, "srv")
         if not hasattr(getattr(found, "Request", None), "get_fields_and_field_types"):
             raise TypesDiffer(f"the service type [{type_}] is not installed in ROS 2")
         return cast("ServiceClass", found)
 
     @staticmethod
-    def _action_class(type_: str) -> ActionClass:
+    def action_class(type_: str) -> ActionClass:
         found = _imported(type_, "action")
         if not hasattr(getattr(found, "Goal", None), "get_fields_and_field_types"):
             raise TypesDiffer(f"the action type [{type_}] is not installed in ROS 2")
@@ -326,7 +333,7 @@ class RclpySide:
 
 
 class _Served:
-    """A service that the bridge offers; it is listed as the bridge's own until it is closed."""
+    """A service that the bridge offers. It is listed as the bridge's own until it is closed."""
 
     def __init__(self, calls: Calls, server: Ros2Handle, on_close: Callable[[], None]) -> None:
         self._calls = calls
@@ -338,7 +345,7 @@ class _Served:
         self._calls.end(self._on_close)
 
 
-class _Publisher:
+class TopicPublisher:
     def __init__(self, calls: Calls, node: _Node, publisher: _RclpyPublisher) -> None:
         self._calls = calls
         self._node = node
@@ -355,7 +362,7 @@ class _Publisher:
         self._calls.end(lambda: self._node.destroy_publisher(self._publisher))
 
 
-class _Subscription:
+class TopicSubscription:
     def __init__(
         self,
         calls: Calls,
@@ -367,7 +374,7 @@ class _Subscription:
     ) -> None:
         self._calls = calls
         self._node = node
-        self._class = class_
+        self.message_class = class_
         self._deliver = deliver
         self._is_closed = False
         handles = importlib.import_module("rclpy.impl.implementation_singleton")
@@ -387,7 +394,7 @@ class _Subscription:
             self._deliver(data)
             try:
                 with handle:
-                    taken = handle.take_message(self._class, True)
+                    taken = handle.take_message(self.message_class, True)
             except self._invalid_handle:
                 return  # the loop's thread closed the subscription in the meantime
             if taken is None:
@@ -398,7 +405,7 @@ class _Subscription:
 
 def _imported(type_: str, kind: str) -> object:
     package, _, name = type_.partition("/")
-    # The name comes from a remote node: importing an arbitrary module would execute it.
+    # Check the name, because it comes from a remote node, and importing an arbitrary module would execute it.
     if not (_PACKAGE.fullmatch(package) and _NAME.fullmatch(name) and _is_interface_package(package)):
         return None
     try:
@@ -414,13 +421,13 @@ def _is_interface_package(package: str) -> bool:
     try:
         found = importlib.util.find_spec(package)
     except (ImportError, ValueError):
-        # ValueError: a module without a spec was put into sys.modules.
+        # ValueError: a program has put a module without a spec into sys.modules.
         return False
     folders = found.submodule_search_locations if found else None
     return any(any(Path(folder).glob(f"{package}_s__rosidl_typesupport_*")) for folder in folders or ())
 
 
 def _short(type_: str) -> str:
-    """Return ``pkg/Name`` for ``pkg/msg/Name``."""
+    """Convert ``pkg/msg/Name`` to ``pkg/Name``."""
     package, _, rest = type_.partition("/")
     return f"{package}/{rest.rpartition('/')[2]}"

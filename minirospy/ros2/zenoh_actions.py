@@ -1,7 +1,7 @@
-"""Clients and servers of ROS 2 actions over Zenoh: three services and two topics, named as by rcl_action.
+"""Clients and servers of ROS 2 actions over Zenoh, with three services and two topics that are named as in rcl_action.
 
-A goal is preceded by its id: 16 bytes, so the alignment of the rest does not change.
-Source: https://design.ros2.org/articles/actions.html, and the definitions of action_msgs.
+A goal is preceded by its id, which has 16 bytes, so that the alignment of the rest does not change. Source:
+https://design.ros2.org/articles/actions.html, and the definitions of action_msgs.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from minirospy.ros2.zenoh_keys import Kind
 from minirospy.ros2.zenoh_topics import ZenohPublisher, subscribe
 
 if TYPE_CHECKING:
-    from minirospy.ros2.rclpy_actions import Accept, GoalOfRos1, Ros2Goal
+    from minirospy.ros2.interface import Accept, GoalOfRos1, Ros2Goal
     from minirospy.ros2.zenoh_keys import Entity
     from minirospy.ros2.zenoh_node import ZenohNode
 
@@ -39,12 +39,12 @@ _BODY = _HEADER + 16
 _NO_ID = bytes(16)
 _SECOND = 1_000_000_000
 _ACCEPTED, _EXECUTING, _CANCELING = 1, 2, 3
-"""Statuses of a goal that has not ended (action_msgs/GoalStatus); 0 means unknown."""
+"""Statuses of a goal that has not ended, from action_msgs/GoalStatus; 0 means unknown."""
 _UNKNOWN_GOAL, _ENDED_GOAL = 2, 3
-"""Error codes of action_msgs/srv/CancelGoal."""
-_KEPT_SECONDS = 60.0  # how long a goal's result is stored after the goal's end
+"""Error codes from action_msgs/srv/CancelGoal."""
+_KEPT_SECONDS = 60.0  # seconds to store a goal's result after the goal has ended
 _MAX_GOALS = 2_000
-_CLOSE_SECONDS = 1.0
+CLOSE_SECONDS = 1.0
 
 
 class ActionEnds(NamedTuple):
@@ -58,9 +58,9 @@ class ActionEnds(NamedTuple):
 
 
 class ActionType:
-    """The messages that contain goals, results and feedback.
+    """The messages that contain an action's goals, results and feedback.
 
-    ``name``: ``pkg/action/Name``; ``fields``: looks up a part's fields.
+    ``name`` is ``pkg/action/Name``; ``fields`` is a function that returns a part's fields.
     """
 
     def __init__(self, name: str, fields: Callable[[str], Fields]) -> None:
@@ -76,26 +76,29 @@ class ActionType:
         return decode(f"{self._name}_{part}", self._fields, data)
 
     def response(self, status: int, result: bytes | None) -> bytes:
-        """Return the response to a request for a result; None is an empty result.
+        """Return the response to a request for a result. None means an empty result.
 
-        Raise DeserializationError if it is invalid.
+        Raise DeserializationError if the result is invalid.
         """
         values = {} if result is None else self.read("Result", result)
         return self.write("GetResult_Response", {"status": status, "result": values})
 
     def result(self, response: bytes) -> tuple[int, bytes]:
-        """Return the status and the result from such a response. Raise DeserializationError if it is invalid."""
+        """Return the status and the result from a response to a request for a result.
+
+        Raise DeserializationError if it is invalid.
+        """
         found = self.read("GetResult_Response", response)
         return cast("int", found["status"]), self.write(
             "Result", cast("Mapping[str, object]", found["result"])
         )
 
     def message(self, name: str, values: Mapping[str, object]) -> bytes:
-        """Return the CDR of a message of action_msgs."""
+        """Return the CDR of a message from action_msgs."""
         return encode(name, self._fields, values)
 
     def cancelled(self, request: bytes) -> tuple[bytes, int]:
-        """Return the goal's id and time from a cancel request. Raise DeserializationError if it is invalid."""
+        """Return the goal's id and time from a cancel request. Raise DeserializationError if the request is invalid."""
         found = decode("action_msgs/srv/CancelGoal_Request", self._fields, request)
         info = cast("dict[str, dict[str, object]]", found["goal_info"])
         stamp = cast("dict[str, int]", info["stamp"])
@@ -133,11 +136,11 @@ class _SentGoal:
         self._id = id
 
     def cancel(self) -> None:
-        """Request the server to cancel the goal."""
+        """Send the server a cancel request."""
         self._client.cancel(self._id)
 
     def result(self) -> Future[tuple[int, bytes]]:
-        """Return the future of the status and the result."""
+        """Return a future for the status and the result."""
         return self._client.result(self._id)
 
 
@@ -163,13 +166,16 @@ class ZenohActionClient:
 
     @property
     def servers(self) -> None:
-        """Return None: a response returns on the path of its request, whose existence the tokens prove."""
+        """Return None, because no response can be lost: it uses the path of its request, whose existence the tokens prove."""
 
     def probe(self) -> None:
-        """Return None: no probe is needed."""
+        """Return None, because no probe is needed."""
 
     def send(self, goal: bytes, feedback: Callable[[bytes], None]) -> Future[Ros2Goal | None]:
-        """Send a goal; return the future of the accepted goal, None if it is refused. The future fails with BridgeError."""
+        """Send a goal; return a future for the accepted goal, or for None if it is rejected.
+
+        The future fails with BridgeError.
+        """
         id = uuid.uuid4().bytes
         self._callbacks[id] = feedback
         accepted: Future[Ros2Goal | None] = Future()
@@ -183,7 +189,7 @@ class ZenohActionClient:
                     self._callbacks.pop(id, None)
                 accepted.set_result(sent)
             except InvalidStateError:
-                # The caller no longer waits, and the goal counts as refused in ROS 1, so the goal must not run.
+                # The caller no longer waits, and the goal counts as rejected in ROS 1, so it must not run.
                 self._callbacks.pop(id, None)
                 if sent:
                     sent.cancel()
@@ -195,13 +201,13 @@ class ZenohActionClient:
         return accepted
 
     def cancel(self, id: bytes) -> None:
-        """Request the server to cancel a goal; the goal's result shows whether it was cancelled."""
+        """Send the server a request to cancel a goal. The goal's result shows whether it was cancelled."""
         self._cancel_goal.call(
             self._type.message("action_msgs/srv/CancelGoal_Request", {"goal_info": _info(id)})
         )
 
     def result(self, id: bytes) -> Future[tuple[int, bytes]]:
-        """Return the future of a goal's status and result. The future fails with BridgeError."""
+        """Return a future for a goal's status and result. The future fails with BridgeError."""
         ended: Future[tuple[int, bytes]] = Future()
 
         def arrived(done: Future[bytes]) -> None:
@@ -256,7 +262,7 @@ class _Goal:
 
 
 class ZenohActionServer:
-    """An action that the bridge offers in ROS 2. Runs in one thread, so that all messages are sent in order."""
+    """An action that the bridge offers in ROS 2. It runs in one thread, so that all messages are sent in order."""
 
     def __init__(self, node: ZenohNode, ends: ActionEnds, type_: ActionType, accept: Accept) -> None:
         self._name = ends.send_goal.name.removesuffix("/_action/send_goal")
@@ -276,12 +282,12 @@ class ZenohActionServer:
         ]
 
     def close(self) -> None:
-        """Close after sending known results. Idempotent."""
+        """Close the action after sending known results. Idempotent."""
         with contextlib.suppress(RuntimeError, concurrent.futures.TimeoutError):
-            # The first pass may submit responses for goals that have just ended; the second pass waits for these
+            # The first call may submit responses for goals that have just ended; the second call waits for these
             # responses.
-            self._thread.submit(lambda: None).result(_CLOSE_SECONDS)
-            self._thread.submit(lambda: None).result(_CLOSE_SECONDS)
+            self._thread.submit(lambda: None).result(CLOSE_SECONDS)
+            self._thread.submit(lambda: None).result(CLOSE_SECONDS)
         for server in self._servers:
             server.close()
         for publisher in (self._feedback, self._status):

@@ -1,6 +1,6 @@
-"""Clients and servers of ROS 2 services over Zenoh: a request is a query, the response its reply.
+"""Clients and servers of ROS 2 services over Zenoh. A request is a query; its response is the query's reply.
 
-Callbacks of Zenoh, and therefore of the futures, run in Zenoh's threads.
+Callbacks from Zenoh, and therefore the futures' callbacks, run in Zenoh's threads.
 """
 
 from __future__ import annotations
@@ -31,11 +31,14 @@ __all__ = ["MAX_UNDER_WAY", "ZenohClient", "ZenohServer"]
 _log = logging.getLogger(__name__)
 
 MAX_BYTES = 64 << 20
-MAX_UNDER_WAY = 200  # requests of a service whose responses have not been written yet
+MAX_UNDER_WAY = 200  # maximum number of requests to a service whose responses have not been written yet
 _MAX_OF_ACTION = 2_000
-"""Pending requests to an action, more than goals, because a request for a result waits until the goal has ended."""
+"""Maximum number of pending requests to an action.
+
+It exceeds the number of goals, because a request for a result waits for the goal.
+"""
 _MAX_SECONDS = 10_000_000
-"""Practically unlimited: the bridge has its own timeouts, and Zenoh's timeout would end a long goal."""
+"""Timeout in seconds, practically unlimited: the bridge has its own timeouts, and Zenoh's would end a long goal."""
 
 
 class ZenohClient:
@@ -44,7 +47,8 @@ class ZenohClient:
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         self._node = node
         self._end = end
-        # On a slow network, sending a request blocks for seconds, which must not block the caller, the loop.
+        # Send requests in a thread: on a slow network, sending blocks for seconds, which must not block the event
+        # loop.
         self._requests = concurrent.futures.ThreadPoolExecutor(1, "zenoh-requests")
         self._handle = Handle(node, end)
 
@@ -56,13 +60,13 @@ class ZenohClient:
 
     @property
     def servers(self) -> None:
-        """Return None: a response returns on the path of its request, whose existence the tokens prove."""
+        """Return None, because no response can be lost: it uses the path of its request, whose existence the tokens prove."""
 
     def probe(self) -> None:
-        """Return None: no probe is needed."""
+        """Return None, because no probe is needed."""
 
     def call(self, request: bytes) -> Future[bytes]:
-        """Send a request and return the future of the response, both as CDR. The future fails with BridgeError."""
+        """Send a request and return a future for the response, both as CDR. The future fails with BridgeError."""
         answered: Future[bytes] = Future()
         name = self._end.name
 
@@ -113,9 +117,9 @@ class ZenohClient:
 class ZenohServer:
     """A service that the bridge offers in ROS 2.
 
-    ``answer`` takes a request's CDR and returns the future of the response's CDR. If the future raises MinirospyError,
-    the call fails: the reason is sent in the response, if the response has a field for the reason, else as the query's
-    error, which rmw_zenoh logs. ``thread``: the executor that sends replies, by default a separate one.
+    ``answer`` takes a request's CDR and returns a future for the response's CDR. If the future raises MinirospyError, the
+    call fails. The reason is sent in the response if the response has a field for it, otherwise as the query's error,
+    which rmw_zenoh logs. ``thread`` is the executor that sends replies, by default a separate one.
     """
 
     def __init__(
@@ -133,7 +137,7 @@ class ZenohServer:
         self._under_way = 0
         self._lock = threading.Lock()
         self._most = MAX_UNDER_WAY if thread is None else _MAX_OF_ACTION
-        # On a slow network, sending a reply may block.
+        # Send replies in a thread, because sending may block on a slow network.
         self._replies = thread or concurrent.futures.ThreadPoolExecutor(1, "zenoh-replies")
         self._own = None if thread else self._replies
         handler = node.handler(self._arrived)
@@ -169,7 +173,7 @@ class ZenohServer:
             answered = self._answer(query.payload.to_bytes())
         except (DeserializationError, ValueError, RuntimeError) as error:
             self._done()
-            # RuntimeError: the loop was closed.
+            # RuntimeError: the loop has been closed.
             self._refuse(query, "the bridge has ended" if isinstance(error, RuntimeError) else str(error))
             return
 
@@ -199,7 +203,7 @@ class ZenohServer:
                 # Send an error, because a response of zeros would look like a valid response.
                 self._refuse(query, reason)
                 return
-            # A response such as those for SetBool and Trigger: success is false, followed by the reason.
+            # This is a response such as those for SetBool and Trigger: success is false, followed by the reason.
             text = reason.encode() + b"\0"
             data = CDR_HEADER + bytes(4) + struct.pack("<I", len(text)) + text
         except concurrent.futures.CancelledError:

@@ -1,6 +1,6 @@
-"""The Zenoh keys and attachments of rmw_zenoh: topics, services, nodes and their endpoints. Pure.
+"""The Zenoh keys and attachments that rmw_zenoh uses for topics, services, nodes and their endpoints. Pure.
 
-Source: https://github.com/ros2/rmw_zenoh/blob/rolling/docs/design.md, and liveliness_utils.cpp of the same repository.
+Source: https://github.com/ros2/rmw_zenoh/blob/rolling/docs/design.md, and liveliness_utils.cpp in the same repository.
 """
 
 from __future__ import annotations
@@ -53,15 +53,15 @@ class Qos:
     depth: int = 10
 
     def __str__(self) -> str:
-        """Return the QoS as written in a token: the differences from rmw_zenoh's default."""
+        """Return the QoS as written in a token, which lists only the differences from rmw_zenoh's default."""
         depth = "" if self.depth == _DEFAULT_DEPTH else str(self.depth)
         return f"{'' if self.is_reliable else 2}:{1 if self.is_transient_local else ''}:,{depth}:,:,:,,"
 
 
 class Entity(NamedTuple):
-    """A node, or an endpoint of a topic or service. ``type``: ``pkg/Name``, ``pkg/srv/Name`` or ``pkg/action/Name``.
+    """A node, or an endpoint of a topic or service.
 
-    ``session``: the id of the entity's Zenoh session.
+    ``type`` is ``pkg/Name``, ``pkg/srv/Name`` or ``pkg/action/Name``. ``session`` is the id of the entity's Zenoh session.
     """
 
     domain: str
@@ -98,7 +98,7 @@ def data_key(domain: str, name: str, type_: str, hash_: str) -> str:
 
 
 def dds_name(type_: str) -> str:
-    """Return ``pkg::msg::dds_::Name_`` for ``pkg/Name``, and similarly for ``pkg/srv/Name``."""
+    """Convert ``pkg/Name`` to ``pkg::msg::dds_::Name_``, and ``pkg/srv/Name`` accordingly."""
     package, _, rest = type_.partition("/")
     kind, _, name = rest.rpartition("/")
     return f"{package}::{kind or 'msg'}::dds_::{name}_"
@@ -115,7 +115,7 @@ def format_token(entity: Entity) -> str:
 
 
 def parse_token(key: str) -> Entity | None:
-    """Parse a token's key; return None if the bridge does not understand it."""
+    """Parse a token's key; return None if it is not in a format that the bridge supports."""
     parts = key.split("/")
     if len(key) > _MAX_LENGTH or len(parts) < 9 or parts[0] != _SPACE:
         return None
@@ -125,7 +125,7 @@ def parse_token(key: str) -> Entity | None:
     head = (domain, session, int(id), Kind(kind), node, namespace.replace("%", "/"))
     if kind == Kind.NODE.value:
         return Entity(*head)
-    # Newer versions may append more parts.
+    # Ignore further parts, which newer versions may append.
     if len(rest) < 4:
         return None
     name, found, qos = rest[0].replace("%", "/"), _DDS_NAME.fullmatch(rest[1]), _parse_qos(rest[3])
@@ -172,7 +172,7 @@ _TIME = slice(8, 16)
 
 
 def attachment(sequence: int, time: int, gid: bytes) -> bytes:
-    """Return the attachment of a message or request; ``time`` in nanoseconds since 1970."""
+    """Return the attachment of a message or request; ``time`` is in nanoseconds since 1970."""
     return _ATTACHMENT.pack(sequence, time, len(gid), gid)
 
 

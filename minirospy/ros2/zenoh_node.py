@@ -1,4 +1,4 @@
-"""The bridge's ROS 2 node on a Zenoh session: its tokens and endpoints, and the graph from other sessions' tokens."""
+"""The bridge's ROS 2 node on a Zenoh session, with its tokens and endpoints, and the graph from other sessions' tokens."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Graph:
 
 
 class ZenohNode:
-    """A session with one node. ``graph``: the nodes and endpoints of other sessions."""
+    """A session with one node. ``graph`` contains the nodes and endpoints in other sessions."""
 
     def __init__(self, name: str, options: NetworkOptions) -> None:
         """Open the session and wait for the router. Raise BridgeError if that fails."""
@@ -97,7 +97,7 @@ class ZenohNode:
         self.graph = Graph(self._zid)
         self._is_closed = False
         liveliness = self.session.liveliness()
-        # These declarations last until the session closes.
+        # These declarations last until the session is closed.
         self._declared = [
             liveliness.declare_token(format_token(self.entity(Kind.NODE))),
             liveliness.declare_subscriber(
@@ -108,7 +108,7 @@ class ZenohNode:
     def entity(
         self, kind: Kind, name: str = "", type_: str = "", hash_: str = "", qos: Qos | None = None
     ) -> Entity:
-        """Return a new endpoint of this node, whose token :class:`Handle` declares; the first one is the node itself."""
+        """Return a new endpoint of this node; a :class:`Handle` declares its token. The first one is the node itself."""
         id = next(self._ids)
         return Entity(self.domain, self._zid, id, kind, self._name, "/", name, type_, hash_, qos or Qos())
 
@@ -117,17 +117,17 @@ class ZenohNode:
         if self._is_closed:
             return
         self._is_closed = True
-        # If the link is broken, undeclaring fails; the peer detects the loss itself.
+        # If the link is broken, undeclaring fails, but the peer detects the loss itself.
         with contextlib.suppress(self.zenoh.ZError):
             self.session.close()
 
     def handler(self, function: Callable[..., object], ended: Callable[[], object] | None = None) -> object:
-        """Return a handler that Zenoh calls in its own thread; by default Zenoh starts a thread for each handler."""
+        """Return a handler that Zenoh calls in its own thread. By default, Zenoh starts a thread for each handler."""
         return self.zenoh.handlers.Callback(function, ended, indirect=False)
 
     def _opened(self, options: NetworkOptions) -> Session:
         config = configured(options)
-        # Messages that are stored for late subscribers need timestamps.
+        # Enable time stamps, which messages that are stored for late subscribers need.
         config.insert_json5("timestamping/enabled", "true")
         try:
             session: Session = self.zenoh.open(config)
@@ -144,7 +144,7 @@ class ZenohNode:
 
 
 class Handle:
-    """An endpoint of a node, with its token and declarations, until it is closed."""
+    """A node's endpoint, with its token and declarations, until it is closed."""
 
     def __init__(self, node: ZenohNode, end: Entity, *declared: Declared) -> None:
         key = format_token(end)

@@ -1,4 +1,4 @@
-"""Parameters in ROS 2 over Zenoh: services on the bridge's node for ROS 1's parameters, and access to other nodes' parameters."""
+"""Parameters in ROS 2, over Zenoh: the bridge node's services for ROS 1's parameters, and access to other nodes'."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 __all__ = ["ZenohNodeParameters", "ZenohParameterServer"]
 
 _PACKAGE = "rcl_interfaces"
-_SECONDS = 5.0
+ANSWER_SECONDS = 5.0
 _BYTES = 5
 _Values = Mapping[str, object]
 
 
 class ZenohParameterServer:
-    """The parameter services of the bridge's node. ``fields``: returns the fields of a type, as ``Definitions.fields`` does."""
+    """The parameter services of the bridge's node. ``fields`` returns the fields of a type, as ``Definitions.fields`` does."""
 
     def __init__(
         self,
@@ -69,7 +69,7 @@ class ZenohParameterServer:
                 return encode(f"{whole}_Response", self._fields, response)
             except (MinirospyError, DeserializationError):
                 raise
-            except Exception as error:  # the client waits for a response, whatever the error
+            except Exception as error:  # the client waits for a response, regardless of the error
                 raise BridgeError(f"parameters of ROS 1: {' '.join(str(error).split())}") from error
 
         return lambda request: asyncio.run_coroutine_threadsafe(answered(request), self._loop)
@@ -106,7 +106,7 @@ class ZenohParameterServer:
 
 
 class ZenohNodeParameters:
-    """Parameters of other ROS 2 nodes. Methods block: call them in a worker thread.
+    """Parameters of other ROS 2 nodes. All methods block, so call them in a worker thread.
 
     All raise BridgeError if the call fails.
     """
@@ -138,14 +138,14 @@ class ZenohNodeParameters:
         whole = f"{_PACKAGE}/srv/{service.type}"
         client = self._side.client(f"{node}/{service.service}", f"{_PACKAGE}/{service.type}")
         try:
-            end = time.monotonic() + _SECONDS
+            end = time.monotonic() + ANSWER_SECONDS
             while not client.is_ready:
                 if time.monotonic() >= end:
                     raise BridgeError(f"the node [{node}] of ROS 2 has no parameters, or is not there")
                 time.sleep(0.02)
             try:
                 called = client.call(encode(f"{whole}_Request", self._fields, values))
-                return decode(f"{whole}_Response", self._fields, called.result(_SECONDS))
+                return decode(f"{whole}_Response", self._fields, called.result(ANSWER_SECONDS))
             except FutureTimeoutError:
                 raise BridgeError(f"the node [{node}] of ROS 2 does not answer") from None
             except DeserializationError as error:

@@ -1,7 +1,7 @@
-"""The ROS 2 backend over Zenoh, for nodes that run rmw_zenoh; no ROS 2 is installed here.
+"""The ROS 2 backend over Zenoh, for nodes that use rmw_zenoh. It requires no ROS 2 on this machine.
 
 Zenoh calls back in its own threads. Definitions are derived from ROS 1 definitions and the rules; a type is not bridged
-if its hash in the other side's keys differs.
+if its hash differs from the one in the other side's keys.
 """
 
 from __future__ import annotations
@@ -12,7 +12,14 @@ from concurrent.futures import Future
 from typing import TYPE_CHECKING
 
 from minirospy.ros2.definitions import NO_HASH, Definitions
-from minirospy.ros2.interface import Ros2ActionClient, Ros2Client, Ros2Handle, Ros2Parameters, Ros2Publisher
+from minirospy.ros2.interface import (
+    Accept,
+    Ros2ActionClient,
+    Ros2Client,
+    Ros2Handle,
+    Ros2Parameters,
+    Ros2Publisher,
+)
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.links import Ros2End, Ros2Topic, is_bridge
 from minirospy.ros2.zenoh_actions import ActionEnds, ActionType, ZenohActionClient, ZenohActionServer
@@ -24,7 +31,6 @@ from minirospy.ros2.zenoh_topics import ZenohPublisher, subscribe
 from minirospy.zenoh.library import NetworkOptions
 
 if TYPE_CHECKING:
-    from minirospy.ros2.rclpy_actions import Accept
     from minirospy.ros2.rclpy_parameters import ParameterStore
 
 __all__ = ["ZenohSide"]
@@ -68,7 +74,10 @@ class ZenohSide:
         return [(each.node, each.namespace) for each in self._graph.nodes() if not is_bridge(each.node)]
 
     def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer if it is unknown, or the other side's definition differs."""
+        """Return the fields of a message type.
+
+        Raise TypesDiffer if it is unknown, or the other side has a different definition.
+        """
         hash_ = self._agreed(type_, self._definitions.hash(type_), _TOPIC)
         return dict(self._definitions.message(type_, is_humble=hash_ == NO_HASH))
 
@@ -140,7 +149,7 @@ class ZenohSide:
         return ZenohParameterServer(self, self._name, self._definitions.fields, store, loop)
 
     def node_parameters(self) -> Ros2Parameters:
-        """Return access to the parameters of other nodes."""
+        """Return an object that accesses the parameters of other nodes."""
         return ZenohNodeParameters(self, self._definitions.fields)
 
     def close(self) -> None:
@@ -152,7 +161,7 @@ class ZenohSide:
         return self._node.entity(kind, topic, type_, hash_, qos)
 
     def _service_end(self, kind: Kind, name: str, type_: str) -> Entity:
-        """Return a service's endpoint; ``type_``: ``pkg/srv/Name`` or ``pkg/action/Name_SendGoal``."""
+        """Return a service's endpoint. ``type_`` is ``pkg/srv/Name`` or ``pkg/action/Name_SendGoal``."""
         hash_ = self._agreed(type_, self._definitions.hash(type_), _SERVICE, name)
         return self._node.entity(kind, name, type_, hash_, Qos())
 
@@ -171,9 +180,9 @@ class ZenohSide:
         return ActionType(type_.replace("/", "/action/"), self._definitions.fields)
 
     def _agreed(self, type_: str, own: str, kinds: tuple[Kind, ...], name: str = "") -> str:
-        """Return the hash of a type to use in keys: the local hash, if an endpoint on the other side has it too.
+        """Return the hash of a type to use in keys: the local hash, or NO_HASH if the other side uses no hashes.
 
-        Raise TypesDiffer otherwise.
+        Raise TypesDiffer if the other side's endpoints have a different hash.
         """
         ends = self._graph.of_name(name, *kinds) if name else self._graph.ends(*kinds)
         hashes = {end.hash for end in ends if end.type == type_ and not is_bridge(end.node)}
@@ -185,7 +194,7 @@ class ZenohSide:
             raise TypesDiffer(
                 f"[{type_}] has another definition in ROS 2: its hash there is {min(hashes)}, here {own}"
             )
-        # No endpoint has this type: use the key format that most endpoints use.
+        # No endpoint has this type, so use NO_HASH only if all other endpoints do.
         are_humble = [end.hash == NO_HASH for end in self._graph.ends(*_TOPIC, *_SERVICE)]
         return NO_HASH if are_humble and all(are_humble) else own
 

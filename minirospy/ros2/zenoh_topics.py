@@ -1,4 +1,4 @@
-"""ROS 2 publishers and subscriptions over Zenoh, also for actions. Callbacks run in Zenoh's threads."""
+"""ROS 2 publishers and subscriptions over Zenoh, which actions also use. Callbacks run in Zenoh's threads."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 
 
 class ZenohPublisher(Handle):
-    """A publisher with the quality of service from its endpoint."""
+    """A publisher with the quality of service of its endpoint."""
 
     def __init__(self, node: ZenohNode, end: Entity) -> None:
         outlet = _outlet(node, end)
@@ -32,10 +32,10 @@ class ZenohPublisher(Handle):
 
     @property
     def subscribers(self) -> int:
-        """Return the number of subscribers; 0 until subscribers in other sessions are connected."""
+        """Return the number of subscribers, or 0 until subscribers in other sessions are connected."""
         found = self._graph.of_name(self._end.name, Kind.SUBSCRIPTION)
         count = len([each for each in found if each.key == self._end.key])
-        # A transient local publisher stores its messages, so that none is lost.
+        # A transient local publisher stores its messages, so none is lost.
         is_ready = self._end.qos.is_transient_local or self._outlet.matching_status.matching
         return count if is_ready else 0
 
@@ -48,7 +48,8 @@ class ZenohPublisher(Handle):
 
 def _outlet(node: ZenohNode, end: Entity) -> Outlet:
     drop = node.zenoh.CongestionControl.DROP
-    # The bridge's own subscription to the topic ignores this session, so that subscription must not count as a match.
+    # Count only remote subscribers, because the bridge's own subscription to the topic ignores this session's
+    # messages.
     remote = node.zenoh.Locality.REMOTE
     if not end.qos.is_transient_local:
         return node.session.declare_publisher(end.key, congestion_control=drop, allowed_destination=remote)

@@ -27,8 +27,8 @@ class StopGuard:
         """Create the guard; ``clock`` returns seconds."""
         self._clock = clock
         self._changed = threading.Condition()
-        self._deadlines: dict[Stop, float] = {}
-        self._thread: threading.Thread | None = None
+        self.deadlines: dict[Stop, float] = {}
+        self.thread: threading.Thread | None = None
         self._next = 0.0
         # The deadline for which the thread is waiting.
 
@@ -38,14 +38,14 @@ class StopGuard:
         Raise BridgeError if the thread cannot be started.
         """
         with self._changed:
-            self._deadlines[stop] = deadline
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._run, name="stop-guard", daemon=True)
+            self.deadlines[stop] = deadline
+            if self.thread is None:
+                self.thread = threading.Thread(target=self._run, name="stop-guard", daemon=True)
                 try:
-                    self._thread.start()
+                    self.thread.start()
                 except RuntimeError as error:
-                    self._thread = None
-                    del self._deadlines[stop]
+                    self.thread = None
+                    del self.deadlines[stop]
                     raise BridgeError(
                         f"nothing is driven: no thread can be started to stop it: {error}"
                     ) from error
@@ -55,7 +55,7 @@ class StopGuard:
     def disarm(self, stop: Stop) -> None:
         """Remove the deadline of ``stop``. Idempotent."""
         with self._changed:
-            self._deadlines.pop(stop, None)
+            self.deadlines.pop(stop, None)
 
     def _run(self) -> None:
         while due := self._wait():
@@ -68,14 +68,14 @@ class StopGuard:
     def _wait(self) -> list[Stop]:
         """Wait until deadlines have passed, and return their functions; return [] if there are no deadlines."""
         with self._changed:
-            while self._deadlines:
+            while self.deadlines:
                 now = self._clock()
-                due = [stop for stop, deadline in self._deadlines.items() if deadline <= now]
+                due = [stop for stop, deadline in self.deadlines.items() if deadline <= now]
                 if due:
                     for stop in due:
-                        del self._deadlines[stop]
+                        del self.deadlines[stop]
                     return due
-                self._next = min(self._deadlines.values())
+                self._next = min(self.deadlines.values())
                 self._changed.wait(self._next - now)
-            self._thread = None
+            self.thread = None
             return []

@@ -44,7 +44,7 @@ __all__ = ["FOXGLOVE_PORT", "ROSBRIDGE_PORT", "VIDEO_PORT", "Bridge", "BridgeOpt
 FOXGLOVE_PORT = 8765
 ROSBRIDGE_PORT = 9090
 VIDEO_PORT = 8080
-_DIAGNOSTICS_SECONDS = 1.0
+DIAGNOSTICS_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Bridge:
         )
         client_topics = ClientTopics(node)
         self.rosbridge = RosbridgeEndpoint(self.graph, self.options.rosbridge, client_topics.changed)
-        self._video = VideoPages(self.graph)
+        self.video = VideoPages(self.graph)
         self._beside: list[ClientTopics | Rosapi | Republisher] = []
         if self.options.rosbridge_port is not None:
             self._beside.append(client_topics)
@@ -154,7 +154,7 @@ class Bridge:
             endpoints,
             self.options.access,
             limits=self.options.limits,
-            pages={**self._video.handlers, "/status": self._status_page},
+            pages={**self.video.handlers, "/status": self._status_page},
             public_pages=public,
             tls=tls,
             account=self._account,
@@ -268,7 +268,7 @@ class Bridge:
 
         before: Mapping[str, int] = {}
         while True:
-            await asyncio.sleep(_DIAGNOSTICS_SECONDS)
+            await asyncio.sleep(DIAGNOSTICS_SECONDS)
             dropped: dict[str, int] = {}
             array = DiagnosticArray()
             array.header.stamp = self.node.now()

@@ -222,14 +222,14 @@ class SharedGraph:
         self.topics: dict[str, SharedTopic] = {}
         self.texts = TypeTexts(node)
         self._is_first_look = True
-        self._max_refresh_interval = max(max_refresh_interval, MIN_REFRESH_INTERVAL)
+        self.max_refresh_interval = max(max_refresh_interval, MIN_REFRESH_INTERVAL)
         self._listeners: list[GraphListener] = []
-        self._publishers: dict[str, _SharedPublisher] = {}
+        self.publishers: dict[str, _SharedPublisher] = {}
         self._refresh_soon = asyncio.Event()
         self._looking = asyncio.Lock()
         self._reporter = ErrorReporter(_log, "a task of the bridge")
         self._watching: asyncio.Task[None] | None = None
-        self._tasks: set[asyncio.Task[None]] = set()
+        self.tasks: set[asyncio.Task[None]] = set()
         self._has_new_types = False
         self._service_types = NodeQueries(
             self._service_type,
@@ -246,7 +246,7 @@ class SharedGraph:
 
     async def close(self) -> None:
         """Close all subscriptions, publications and tasks. Idempotent."""
-        tasks = [*self._tasks, *([self._watching] if self._watching else [])]
+        tasks = [*self.tasks, *([self._watching] if self._watching else [])]
         self._watching = None
         for task in tasks:
             task.cancel()
@@ -315,7 +315,7 @@ class SharedGraph:
             pause = (
                 MIN_REFRESH_INTERVAL
                 if self.snapshot is not before and self.snapshot != before
-                else min(pause * 1.5, self._max_refresh_interval)
+                else min(pause * 1.5, self.max_refresh_interval)
             )
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(self._refresh_soon.wait(), pause)
@@ -362,14 +362,14 @@ class SharedGraph:
         """Advertise a topic. Raise BridgeError if clients may not publish it, or it is published with another type."""
         if not self.filters.publishable(topic):
             raise BridgeError(f"topic [{topic}] may not be published by clients")
-        shared = self._publishers.get(topic)
+        shared = self.publishers.get(topic)
         if shared is None:
             known = self.snapshot.types.get(topic)
             if known not in (None, ANY, type_.name):
                 raise BridgeError(f"topic [{topic}] is of type [{known}], not [{type_.name}]")
             publisher = self.node.advertise(topic, raw_class(type_), queue_size=_QUEUE, latch=latch)
             joining = self.spawn(publisher.wait_for_expected())
-            shared = self._publishers[topic] = _SharedPublisher(type_, latch, publisher, joining)
+            shared = self.publishers[topic] = _SharedPublisher(type_, latch, publisher, joining)
             self.refresh_soon()
         elif shared.type.md5sum != type_.md5sum:
             raise BridgeError(f"topic [{topic}] is published as [{shared.type.name}] by another client")
@@ -379,8 +379,8 @@ class SharedGraph:
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
         """Unadvertise a topic after the last client that published it has left."""
         shared.clients -= 1
-        if not shared.clients and self._publishers.get(topic) is shared:
-            del self._publishers[topic]
+        if not shared.clients and self.publishers.get(topic) is shared:
+            del self.publishers[topic]
             self.spawn(shared.publisher.close())
             self.refresh_soon()
 
@@ -407,8 +407,8 @@ class SharedGraph:
                 self._reporter.report(error)
 
         task = asyncio.ensure_future(guarded())
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self.tasks.add(task)
+        task.add_done_callback(self.tasks.discard)
         # A task that is cancelled before its first step has not started the coroutine, so close the coroutine.
         task.add_done_callback(lambda _: work.close())
         return task

@@ -34,7 +34,7 @@ MAX_QUICK_CHARACTERS = 64 * 1024
 # Maximum characters in a string with few values, such as a base64 image, that is parsed on the event loop
 MAX_QUICK_STRINGS = 4 * 1024 * 1024
 MAX_QUICK_VALUES = 20_000
-_PIECE = 32 * 1024  # maximum characters of numbers that one call parses
+PIECE_NUMBERS = 32 * 1024  # characters of numbers that one call parses
 
 _PIECE_VALUES = 1000  # maximum values of a list that one call encodes: 1 ms for floats
 _PIECE_CHARACTERS = 64 * 1024  # maximum characters of a string that one call encodes
@@ -134,11 +134,11 @@ def _array(start: tuple[str, int], scan_once: Callable[[str, int], tuple[object,
         return values, at + 1
 
     while True:
-        mark = _MARKS.search(text, at, at + _PIECE)
+        mark = _MARKS.search(text, at, at + PIECE_NUMBERS)
         if mark and mark[0] == "]":
             return values + _numbers(text, at, mark.start()), mark.end()
         # Parse numbers up to the next value that is not a number, or the end of the piece.
-        comma = text.rfind(",", at, mark.start() if mark else at + _PIECE)
+        comma = text.rfind(",", at, mark.start() if mark else at + PIECE_NUMBERS)
         if comma >= 0:
             values += _numbers(text, at, comma)
             at = comma + 1

@@ -22,9 +22,10 @@ _VARIABLE = re.compile(r"(?<!\\)\$(ENV)?\{([^${}]*)\}")
 _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
-"""Optional packages that Python packages search for, which are reported as found."""
-_MAX_LOOPS = 100_000  # maximum iterations of a foreach() with RANGE
-_MAX_DEPTH = 40  # maximum depth of nested files and macros; a file nested deeper must include itself
+"""Optional packages that Python packages search for, reported as found."""
+_CHECKS = ("check_include_file", "check_include_files", "check_include_file_cxx")
+_MAX_LOOPS = 100_000  # iterations of a foreach() with RANGE
+_MAX_DEPTH = 40  # nested files and macros; a file nested deeper must include itself
 
 
 class Command(NamedTuple):
@@ -118,6 +119,7 @@ class _Run:
             "file": self._file,
             "find_package": self._find_package,
             "get_filename_component": self._filename,
+            **dict.fromkeys(_CHECKS, self._check),
         }
 
     def file(self, file: Path) -> Iterator[Command]:
@@ -363,6 +365,11 @@ class _Run:
         """Report required packages as found; the build reports missing ones."""
         if "REQUIRED" in arguments or _HERE & {*arguments[:1]}:
             self._known.update(dict.fromkeys((f"{name}_FOUND" for name in arguments), "1"))
+
+    def _check(self, arguments: list[str]) -> None:
+        """Run ``check_include_files(header NAME)``: report the header as found, because nothing compiles with it."""
+        for name in arguments[1:2]:
+            self._known[name] = "1"
 
     def _filename(self, arguments: list[str]) -> None:
         """Run ``get_filename_component(NAME file what)``."""

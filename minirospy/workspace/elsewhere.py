@@ -18,7 +18,7 @@ _DEFINITIONS = "it holds definitions: `git clone {repository}` in a workspace's 
 _QT = "{command}, clone {repository} into a workspace's src, `catkin_make`, and source devel/setup.bash"
 
 _NAVIGATION = "localization and navigation, in C++"
-_CPP = {
+CPP = {
     # Navigation and maps.
     "amcl": _NAVIGATION,
     "base_local_planner": _NAVIGATION,
@@ -127,7 +127,7 @@ _CPP = {
 """Packages with compiled programs, and their descriptions."""
 
 _MUX = "`rosrun topic_tools mux /cmd_vel IN1 IN2` passes one of several topics on; services choose which"
-_INSTEAD = {
+INSTEAD = {
     "rviz": "`rviz -d FILE` shows the same in a browser",
     "twist_mux": _MUX,
     "yocs_cmd_vel_mux": _MUX,
@@ -140,7 +140,7 @@ _QT_REPOSITORIES = (
     "ros-visualization's python_qt_binding, qt_gui_core (branch melodic-devel of both), rqt (kinetic-devel) and {plugin} "
     "(master)"
 )
-_QT_PLUGINS = (
+QT_PLUGINS = (
     "rqt_action",
     "rqt_dep",
     "rqt_joint_trajectory_controller",
@@ -152,7 +152,7 @@ _QT_PLUGINS = (
     "rqt_srv",
     "rqt_web",
 )
-_QT_LIBRARIES = (
+QT_LIBRARIES = (
     "python_qt_binding",
     "qt_dotgraph",
     "qt_gui",
@@ -162,7 +162,7 @@ _QT_LIBRARIES = (
     "rqt_py_common",
 )
 
-_MESSAGES = {
+MESSAGES = {
     "costmap_converter": "https://github.com/rst-tu-dortmund/costmap_converter",
 }
 """Packages of message definitions, with the arguments that `git clone` needs to get their ROS 1 version."""
@@ -175,7 +175,7 @@ IMPORTED = frozenset(
         "nodelet",
         "rviz",
         "rqt_graph",
-        *_QT_LIBRARIES,
+        *QT_LIBRARIES,
     }
 )
 """Modules in these packages that Python programs import. For each, `overlay/` has a module that raises ImportError."""
@@ -191,17 +191,17 @@ SUBMODULES = {
 
 def advice(name: str) -> str:
     """Describe a ROS 1 package or module and its replacement in one line; return "" if it is unknown."""
-    if name in _CPP:
-        what = f"{_CPP[name]}, which minirospy does not have"
+    if name in CPP:
+        what = f"{CPP[name]}, which minirospy does not have"
         there = _RUN_IT_THERE.format(conda=name.replace("_", "-"))
-        return f"{what}: {_INSTEAD.get(name, there)}"
-    if name in _INSTEAD:
-        return f"minirospy does not have it: {_INSTEAD[name]}"
-    if name in _QT_PLUGINS or name in _QT_LIBRARIES or name == "rqt":
-        plugin = name if name in _QT_PLUGINS else "the plug-in"
+        return f"{what}: {INSTEAD.get(name, there)}"
+    if name in INSTEAD:
+        return f"minirospy does not have it: {INSTEAD[name]}"
+    if name in QT_PLUGINS or name in QT_LIBRARIES or name == "rqt":
+        plugin = name if name in QT_PLUGINS else "the plug-in"
         command = install_command("PyQt5", "pydot", "catkin_pkg")
         how = _QT.format(command=command, repository=_QT_REPOSITORIES.format(plugin=plugin))
         return f"a window of Qt, from its source: {how}"
-    if name in _MESSAGES:
-        return f"minirospy does not bring it: {_DEFINITIONS.format(repository=_MESSAGES[name])}"
+    if name in MESSAGES:
+        return f"minirospy does not bring it: {_DEFINITIONS.format(repository=MESSAGES[name])}"
     return ""

@@ -9,9 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from minirospy.base.errors import BuildError
-from minirospy.workspace.build import Workspace
+from minirospy.workspace.build import Workspace, stand_in_files
 from minirospy.workspace.plan import DIST_PACKAGES, Install, Plan
 from minirospy.workspace.python_setup import read_python_setup
+from minirospy.workspace.stand_ins import find_stand_ins
 
 __all__ = ["install"]
 
@@ -58,6 +59,10 @@ def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path
             yield modules / f"{name}.py", (path, False)
         for path in setup.scripts:
             yield workspace.install / "bin" / path.name, (path, True)
+
+    stand_ins = find_stand_ins(plan)
+    for path in stand_in_files(plan, stand_ins, workspace.devel):
+        yield workspace.install / path.relative_to(workspace.devel), (path, path.name in stand_ins.programs)
 
     for rule in plan.installs:
         yield from _rule(workspace, plan, rule)

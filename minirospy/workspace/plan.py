@@ -113,7 +113,7 @@ class Plan(NamedTuple):
     ``definitions`` are the .msg, .srv and .action files; ``message_depends`` the packages whose messages these may
     contain; ``needs`` the packages in find_package(), with their lines; ``skipped`` the targets that need a compiler;
     ``has_setup``: setup.py names Python packages; ``not_installed``: definitions that are not installed; ``options``: the
-    .cfg files of dynamic_reconfigure.
+    .cfg files of dynamic_reconfigure; ``compiled``: the file names of the skipped targets, without ``lib`` and endings.
     """
 
     name: str
@@ -129,6 +129,7 @@ class Plan(NamedTuple):
     tests: tuple[Test, ...]
     warnings: tuple[str, ...]
     options: tuple[Path, ...] = ()
+    compiled: tuple[str, ...] = ()
 
     @property
     def cmake_lists(self) -> Path:
@@ -182,6 +183,7 @@ class _Collector:
         self._seen: set[str] = set()
         self._has_setup = False
         self._skipped: list[str] = []
+        self._properties: dict[str, dict[str, str]] = {}
         self._installs: list[Install] = []
         self._tests: list[Test] = []
         self._warnings: list[str] = []
@@ -198,6 +200,7 @@ class _Collector:
             "generate_dynamic_reconfigure_options": self._options,
             **dict.fromkeys(_FOLDERS, self._add_files),
             **dict.fromkeys(_COMPILED, self._compiled),
+            "set_target_properties": self._target_properties,
             **dict.fromkeys(_TESTS, self._test),
         }
 
@@ -251,6 +254,7 @@ class _Collector:
             tests=tuple(self._tests),
             warnings=tuple(self._warnings),
             options=tuple(self._option_files),
+            compiled=tuple(map(self._file_name, self._skipped)),
         )
 
     def _path(self, command: Command, name: str) -> str:
@@ -367,6 +371,17 @@ class _Collector:
     def _compiled(self, command: Command) -> None:
         if command.arguments and "IMPORTED" not in command.arguments and "INTERFACE" not in command.arguments:
             self._skipped.append(command.arguments[0])
+
+    def _target_properties(self, command: Command) -> None:
+        given = keyword_arguments(command.arguments, frozenset(["PROPERTIES"]))
+        words = given.get("PROPERTIES", [])
+        for target in given[""]:
+            self._properties.setdefault(target, {}).update(zip(words[::2], words[1::2], strict=False))
+
+    def _file_name(self, target: str) -> str:
+        """Return the name of the file that a compiled target makes, without ``lib`` and endings."""
+        properties = self._properties.get(target, {})
+        return properties.get("PREFIX", "") + properties.get("OUTPUT_NAME", target)
 
     def _test(self, command: Command) -> None:
         if command.arguments:

@@ -42,7 +42,7 @@ _THREADS = f"({', '.join(f'{pool}: (worker_threads: {count})' for pool, count in
 Measured: the simultaneous loss of 100 robots is noticed after 30 s with 32 threads in each pool, and after 11 s with 128
 threads in rx. The lease is 10 s.
 """
-_CONNECT_MS = 3000
+CONNECT_MS = 3000
 
 
 class EndpointError(BridgeError):
@@ -303,7 +303,7 @@ def configured(options: NetworkOptions) -> Config:
     # A gateway that loses its router keeps retrying. A client without a router fails to open, and the caller opens it
     # again.
     for key, value in (
-        ("connect/timeout_ms", _CONNECT_MS if mode == "client" else -1),
+        ("connect/timeout_ms", CONNECT_MS if mode == "client" else -1),
         ("connect/exit_on_failure", mode == "client"),
         ("connect/retry", {"period_init_ms": 500, "period_max_ms": 4000, "period_increase_factor": 2}),
         ("transport/unicast/max_sessions", _SESSIONS),

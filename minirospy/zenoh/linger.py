@@ -22,7 +22,7 @@ _OPEN_FILES = Path("/proc/self/fd" if sys.platform == "linux" else "/dev/fd")
 _LINGER = struct.Struct("ii")
 _ZENOHS = _LINGER.pack(1, 10)
 _NONE = _LINGER.pack(0, 0)
-_LOOKS = 10
+LOOKS = 10
 """Number of polls in which to examine a new file descriptor: Zenoh sets SO_LINGER only after it has connected the socket."""
 
 
@@ -45,8 +45,8 @@ class LingerRemover:
                 with contextlib.suppress(OSError):
                     file = os.fstat(int(name))
                     identity = file.st_dev, file.st_ino
-                    looks[identity] = min(self._looks.get(identity, 0) + 1, _LOOKS + 1)
-                    if looks[identity] <= _LOOKS and _removes(int(name), file):
+                    looks[identity] = min(self._looks.get(identity, 0) + 1, LOOKS + 1)
+                    if looks[identity] <= LOOKS and _removes(int(name), file):
                         count += 1
         self._looks = looks
         return count

@@ -23,6 +23,8 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger
 import minirospy
 from minirospy import Node
 from minirospy.aio.raw import RawService, raw_class
+from minirospy.base import clock as clock_module
+from minirospy.base.clock import SILENT_CLOCK
 from minirospy.base.errors import (
     MasterUnreachableError,
     ROSException,
@@ -299,7 +301,7 @@ def test_queue_size_zero_is_refused(master: str) -> None:
 
 
 def test_publish_waits_with_queue_size_none(master: str) -> None:
-    """3 MB per message and a reader that has stopped: data counts as written when its socket has accepted it."""
+    """Send messages of 3 MB to a reader that has stopped. Data counts as written once its socket has accepted it."""
 
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
@@ -387,7 +389,7 @@ def test_publishers_of_a_topic_share_its_registration(graph: MasterProxy) -> Non
 
 
 def test_node_publish_reaches_subscribers(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.aio.topics._JOIN_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.aio.topics.JOIN_SECONDS", 60.0)
 
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
@@ -417,7 +419,7 @@ def test_wrong_values_are_refused_immediately(master: str) -> None:
 
 def test_undecodable_message_is_logged(master: str, caplog: pytest.LogCaptureFixture) -> None:
     class Wrong(String):
-        """The bytes of a String, deserialized as a too large count."""
+        """The bytes of a String, which are deserialized as a count that is too large."""
 
         def deserialize(self, data: Any) -> Any:
             raise ValueError("no such bytes")
@@ -434,7 +436,7 @@ def test_undecodable_message_is_logged(master: str, caplog: pytest.LogCaptureFix
 
 
 def test_topic_is_unsubscribed_and_subscribed_again_immediately(graph: MasterProxy) -> None:
-    """By several tasks, before the registration has reached the master, or during the unregistration."""
+    """Several tasks do this before the registration has reached the master, or during the unregistration."""
 
     async def main() -> None:
         async with Node("a") as node, Node("b") as other:
@@ -465,7 +467,7 @@ def test_topic_is_unsubscribed_and_subscribed_again_immediately(graph: MasterPro
 def test_cancelled_close_still_unregisters(graph: MasterProxy, monkeypatch: pytest.MonkeyPatch) -> None:
     async def main() -> None:
         async with Node("n") as node:
-            ask = node._node._registrations.call
+            ask = node._node.registrations.call
             slowly = asyncio.Event()
 
             async def answer_late(method: str, *args: Any) -> Any:
@@ -473,7 +475,7 @@ def test_cancelled_close_still_unregisters(graph: MasterProxy, monkeypatch: pyte
                 await slowly.wait()
                 return answer
 
-            monkeypatch.setattr(node._node._registrations, "call", answer_late)
+            monkeypatch.setattr(node._node.registrations, "call", answer_late)
             for handle in (node.subscribe("t", String), node.advertise("u", String)):
                 await until(lambda: bool(graph.get_system_state().subscribers.get("/t")))
                 with pytest.raises(asyncio.TimeoutError):
@@ -506,7 +508,7 @@ def test_node_shutdown_ends_waiting_for_peers(master: str) -> None:
 
 
 def test_first_messages_all_arrive(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.aio.topics._JOIN_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.aio.topics.JOIN_SECONDS", 60.0)
 
     async def main() -> None:
         async with Node("a") as talker, Node("b") as listener:
@@ -870,6 +872,27 @@ def test_simulated_time(master: str) -> None:
     run(main)
 
 
+def test_silent_clock_is_reported_once(
+    master: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(clock_module, "_SILENT_SECONDS", 0.0)
+
+    async def main() -> None:
+        async with Node("n") as setting:
+            await setting.set_param("/use_sim_time", True)
+        async with Node("n") as node:
+            sleeping = [asyncio.ensure_future(node.sleep(5)) for _ in range(2)]
+            await until(lambda: SILENT_CLOCK in caplog.messages)
+            assert not any(sleep.done() for sleep in sleeping)
+            node.shutdown()
+            assert [type(error) for error in await asyncio.gather(*sleeping, return_exceptions=True)] == [
+                ROSInterruptException
+            ] * 2
+        assert caplog.messages.count(SILENT_CLOCK) == 1
+
+    run(main)
+
+
 def test_log_lines(master: str, capsys: pytest.CaptureFixture[str]) -> None:
     async def main() -> None:
         async with Node("b", rosout=False) as b, Node("a") as a:
@@ -938,7 +961,7 @@ def test_unreachable_master_is_an_error(master: str) -> None:
     async def main() -> None:
         async with Node("n", master_uri=master) as node:
             node._environment = node._environment._replace(master_uri="http://localhost:1")
-            node._node._registrations._environment = node._environment
+            node._node.registrations._environment = node._environment
             with pytest.raises(MasterUnreachableError):
                 await node.get_param("/x")
 

@@ -377,7 +377,7 @@ def test_silent_master_at_the_port_is_known_by_its_journal(
     is_held: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A master that holds the journal's lock is busy reading its journal, or stopped; any other program is not a master."""
-    monkeypatch.setattr(commands, "_ANSWER_SECONDS", 0.05)
+    monkeypatch.setattr(commands, "ANSWER_SECONDS", 0.05)
     path = tmp_path / "journal-1"
     journal = Journal(path, list)
     journal.lock()

@@ -38,6 +38,7 @@ def test_what_a_service_is(robot: Any, command: Any) -> None:
     uri = robot.node.service_uri
     assert command("rosservice", "type", "/set_led_state").out == "std_srvs/SetBool\n"
     assert command("rosservice", "uri", "set_led_state").out == f"{uri}\n"
+    assert command("rosservice", "node", "set_led_state") == (0, "/robot\n", "")
     assert command("rosservice", "args", "/set_led_state").out == "data\n"
     assert command("rosservice", "args", "/fail").out == "\n"
     assert command("rosservice", "info", "/set_led_state").out == (
@@ -163,10 +164,12 @@ def test_help_and_no_master(command: Any) -> None:
     for verb in ("args", "call", "find", "info", "list", "type", "uri"):
         assert f"\trosservice {verb}\t" in command("rosservice", "-h").out
         assert command("rosservice", verb, "-h").status == 0
-    for argv in (["list"], ["info", "/a"], ["call", "/a"], ["find", "std_srvs/Empty"]):
+    assert command("rosservice", "node", "-h").status == 0
+    assert "rosservice node" not in command("rosservice", "-h").out  # nor in ROS's help
+    for argv in (["list"], ["node", "/a"], ["info", "/a"], ["call", "/a"], ["find", "std_srvs/Empty"]):
         status, out, err = command("rosservice", *argv)
         assert (status, out) == (2, "")
-        assert "no ROS master answers at http://localhost:1" in err
+        assert err == "ERROR: Unable to communicate with master!\n"
 
 
 def test_the_program(robot: Any, program: Start) -> None:

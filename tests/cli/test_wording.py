@@ -6,6 +6,7 @@ The messages are ROS's; tests/interop compares them with the real commands' outp
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -42,10 +43,16 @@ def main_of(script: str) -> Callable[[Sequence[str] | None], int]:
         ),
         ("rostopic info /nope", 1, "ERROR: Unknown topic /nope\n"),
         ("rostopic type /nope", 1, "unknown topic type [/nope]\n"),
-        ("rosnode ping nope", 1, "cannot ping [/nope]: unknown node\n"),
-        ("rosnode info nope", 1, "cannot contact [/nope]: unknown node\n"),
+        ("rosnode ping nope", 0, "cannot ping [/nope]: unknown node\n"),
+        ("rosnode info nope", 0, "cannot contact [/nope]: unknown node\n"),
         ("rosnode kill nope nada", 1, "ERROR: Unknown node(s):\n * /nope\n * /nada\n"),
         ("rosservice type nope", 1, "Unknown service [/nope]\n"),
+        ("rosservice node nope", 1, "Unknown service: /nope\n"),
+        (
+            "rosservice node",
+            2,
+            "Usage: rosservice node /service\n\nrosservice: error: service must be specified\n",
+        ),
         ("rosservice call nope", 2, "ERROR: Service [/nope] is not available.\n"),
         ("rosparam get nope", 1, "ERROR: Parameter [/nope] is not set\n"),
         ("rosparam delete nope", 1, "ERROR: parameter [/nope] is not set\n"),
@@ -89,11 +96,20 @@ def test_error_begins_with_ros_words(
         ("rosnode info /a", 1),
         ("rosservice list", 2),
         ("rosparam list", 1),
-        ("rosgraph -1", 1),
+        ("rosgraph", 0),
+        ("rosservice node /a", 2),
+        ("rosservice call /a", 2),
     ],
 )
-def test_no_master_in_ros_words(line: str, status: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_master_in_ros_words(
+    line: str, status: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Scripts that read stderr find only ROS's line; a terminal also shows minirospy's."""
     name, *words = line.split()
+    assert main_of(name)(words) == status
+    assert capsys.readouterr().err == "ERROR: Unable to communicate with master!\n"
+
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     assert main_of(name)(words) == status
     first, second = capsys.readouterr().err.splitlines()
     assert first == "ERROR: Unable to communicate with master!"

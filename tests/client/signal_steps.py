@@ -91,7 +91,7 @@ def run_node(name: str, at: int, way: Callable[[], None], notes: int) -> None:
     # work.
     shutdown._GRACE_SECONDS = shutdown._REPORT_SECONDS = 1000.0
     # Raise the limits that would hide a deadlock.
-    loop._CLOSE_SECONDS = registration._SILENT_SECONDS = registration._STILL_SILENT_SECONDS = 1000.0
+    loop.CLOSE_SECONDS = registration.SILENT_SECONDS = registration.STILL_SILENT_SECONDS = 1000.0
     signal.signal(signal.SIGINT, signal.default_int_handler)
     steps = hooks = 0
 

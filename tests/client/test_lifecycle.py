@@ -24,7 +24,7 @@ import pytest
 
 from minirospy.base.errors import RpcRefused
 from minirospy.runtime.master.master import Master
-from minirospy.runtime.rpc.master_proxy import MasterProxy
+from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
 from minirospy.runtime.transport.loop import LoopThread
 
 POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals, and no fork")
@@ -242,6 +242,132 @@ def test_a_second_signal_ends_a_program_that_goes_on(master: str, what: str, num
     assert (process.returncode, output.split(), errors) == (0, then.split(), "")
 
 
+REQUEST = {
+    # The program's code; its output from the request on; whether it is interrupted.
+    "input": ("ready(); sys.stdin.readline()", "hook finally atexit", True),
+    "a lock": (
+        "ready(); threading.Lock().acquire() and threading.Event().wait()",
+        "hook finally atexit",
+        True,
+    ),
+    "a busy loop": ("ready()\nwhile True: pass", "hook finally atexit", True),
+    "time.sleep": ("ready(); time.sleep(60)", "hook finally atexit", True),
+    "input in a loop that polls": (
+        "while not rospy.is_shutdown(): ready(); sys.stdin.readline()\nprint('after')",
+        "hook finally atexit",
+        True,
+    ),
+    "input that is saved afterwards": (
+        "try: ready(); sys.stdin.readline()\nexcept KeyboardInterrupt: time.sleep(1); print('saved')",
+        "hook saved finally atexit",
+        True,
+    ),
+    "a slow hook": (
+        "rospy.on_shutdown(lambda: (time.sleep(1), print('saved', flush=True)))\nready(); sys.stdin.readline()",
+        "hook saved finally atexit",
+        True,
+    ),
+    "a slow loop that polls": (
+        "while not rospy.is_shutdown(): ready(); time.sleep(1.5)\ntime.sleep(1); print('after')",
+        "hook after finally atexit",
+        False,
+    ),
+    "slow clean-up": (
+        "try: ready(); rospy.spin()\nfinally:\n    time.sleep(1)\n    print('cleaned')",
+        "hook cleaned finally atexit",
+        False,
+    ),
+    "its own handler": (
+        "import signal\nsignal.signal(signal.SIGINT, lambda *_: sys.exit('own'))\nready(); sys.stdin.readline()",
+        "hook finally atexit",
+        True,
+    ),
+    "the system's handler": (
+        "import signal\nsignal.signal(signal.SIGINT, signal.SIG_DFL)\nready(); time.sleep(3); print('after')",
+        "hook after finally atexit",
+        False,
+    ),
+}
+
+
+# First line of a program that is interrupted after shorter times.
+SHORT_GRACE = (
+    "from minirospy.client import shutdown; shutdown._REQUEST_GRACE_SECONDS = 0.5\n"
+    "shutdown._REQUEST_GRACE_OF_POLLS_SECONDS = {}\n"
+)
+
+
+@POSIX_ONLY
+@pytest.mark.parametrize("what", REQUEST)
+def test_request_of_another_process_interrupts_a_main_thread_that_does_not_end(
+    master: str, what: str
+) -> None:
+    body, prints, is_interrupted = REQUEST[what]
+    # A loop that polls and ends by itself has any time here, as the machine may stall.
+    grace = SHORT_GRACE.format(0.5 if is_interrupted else 1000.0)
+    process = start(grace + PROGRAM.format(textwrap.indent(body, "    ")))
+    open_input, process.stdin = process.stdin, None
+    assert open_input
+    with open_input:
+        request_shutdown(master, "/program", "user request")
+        output, errors = process.communicate(timeout=GUARD)
+    assert output.split() == ["shutdown", "request:", "user", "request", *prints.split()]
+    assert not is_known(master, "/program")
+    own = ["own"] if what == "its own handler" else []
+    assert process.returncode == len(own)
+    if is_interrupted:
+        assert errors.splitlines()[1:] == own
+        assert re.match(
+            r"shutdown: thread MainThread at <string>:\d+ has not ended: interrupting it as Ctrl-C does "
+            r"\(external shutdown request from \[/test\]: \[user request\]\)\n",
+            errors,
+        )
+    else:
+        assert errors == ""
+
+
+@POSIX_ONLY
+def test_second_node_of_the_name_interrupts_the_first(master: str) -> None:
+    process = start(SHORT_GRACE.format(0.5) + PROGRAM.format("    ready(); sys.stdin.readline()"))
+    open_input, process.stdin = process.stdin, None
+    second = start('import rospy; rospy.init_node("program"); print("ready", flush=True); rospy.spin()')
+    try:
+        output, errors = process.communicate(timeout=GUARD)
+    finally:
+        second.kill()
+        second.communicate()
+        assert open_input
+        open_input.close()
+    reason = "[/program] Reason: new node registered with same name"
+    assert output == f"shutdown request: {reason}\nhook\nfinally\natexit\n"
+    assert f"(external shutdown request from [/master]: [{reason}])" in errors
+    assert process.returncode == 0
+
+
+@POSIX_ONLY
+def test_an_interactive_session_keeps_its_variables_after_a_request(master: str) -> None:
+    """Nothing is printed there until the next line is executed."""
+    process = start(
+        "import sys; sys.ps1 = '> '\n"
+        + SHORT_GRACE.format(0.5)
+        + PROGRAM.format("    ready(); time.sleep(2)")
+    )
+    request_shutdown(master, "/program", "user request")
+    assert process.communicate(timeout=GUARD) == (
+        "shutdown request: user request\nhook\nfinally\natexit\n",
+        "",
+    )
+
+
+def request_shutdown(master: str, name: str, reason: str) -> None:
+    """Shut the node down as ``rosnode kill`` does."""
+    proxy = MasterProxy(master, "/test")
+    slave = SlaveProxy(proxy.lookup_node(name), "/test")
+    slave.shutdown(reason)
+    slave.close()
+    proxy.close()
+
+
 def read_report(process: subprocess.Popen[str]) -> str:
     """Return the line on stderr that reports what a shutdown waits for."""
     assert process.stderr
@@ -384,7 +510,7 @@ import rospy
 from minirospy.runtime.node import registration
 from std_msgs.msg import Bool
 # The limit for a master that is silent, else ten seconds: a signal, not this limit, is to end the wait.
-registration._SILENT_SECONDS = registration._STILL_SILENT_SECONDS = 1000.0
+registration.SILENT_SECONDS = registration.STILL_SILENT_SECONDS = 1000.0
 rospy.init_node("leaves")
 rospy.Publisher("t", Bool, queue_size=1)
 print("ready", flush=True)

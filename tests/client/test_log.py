@@ -200,3 +200,27 @@ sys.stdout = None
 rospy.loginfo("info")
 """
     assert run(program) == ("", "")
+
+
+NO_NUMBER = "%d format: a real number is required, not str"
+
+
+@pytest.mark.parametrize(
+    ("call", "text", "fault"),
+    [
+        ("rospy.loginfo('%d', 'x')", "%d", NO_NUMBER),
+        ("rospy.loginfo('x', 'y')", "x", "not all arguments converted during string formatting"),
+        ("rospy.loginfo('%s %s', 1)", "%s %s", "not enough arguments for format string"),
+        ("rospy.loginfo('%(a)s', {'b': 1})", "%(a)s", "'a'"),
+        ("rospy.loginfo('100%', 5)", "100%", "incomplete format"),
+        ("rospy.loginfo_once('%d', 'x')", "%d", NO_NUMBER),
+        ("rospy.loginfo_throttle(1, '%d', 'x')", "%d", NO_NUMBER),
+        ("rospy.loginfo(type('Odd', (), {'__str__': lambda self: 1 / 0})())", "<Odd>", "division by zero"),
+        ("logging.getLogger('rosout').info('%d', 'x')", "%d", NO_NUMBER),
+    ],
+)
+def test_faulty_log_line_is_printed_and_the_node_continues(call: str, text: str, fault: str) -> None:
+    """Real rospy raises TypeError, which ends a node whose error message has a fault."""
+    program = f"import logging, rospy; rospy.init_node('case')\n\n{call}\nrospy.loginfo('after')"
+    line = f"[INFO] {text} (at <string>:3: the arguments do not fit: {fault})"
+    assert run(program) == (f"{line}\n[INFO] after\n", "")

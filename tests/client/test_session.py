@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 from collections.abc import Callable, Coroutine
 from typing import cast
 
@@ -14,6 +13,7 @@ from minirospy.client import session as sessions
 from minirospy.client.session import Session, current_session, replace_session, replace_session_in_fork
 from minirospy.client.shutdown import Action
 from minirospy.runtime.transport.loop import LoopThread
+from tests.client.nudge import nudge
 
 
 @pytest.fixture(autouse=True)
@@ -86,8 +86,7 @@ def test_a_signal_while_a_call_of_the_loop_starts_waits_for_its_start(session: S
     class Loop:
         def start(self, coroutine: Coroutine[object, object, int]) -> Callable[[float | None], int]:
             coroutine.close()
-            session.signals._is_nudge = True
-            session.signals._on_signal(signal.SIGINT, None)
+            nudge(session.signals)
             was_requested.append(session.lifecycle.is_shutdown_requested)
             return lambda _: 7
 
@@ -103,9 +102,7 @@ def test_a_second_signal_while_the_loop_is_made_waits_until_it_is(
     made: list[bool] = []
 
     def make() -> None:
-        session.signals._interrupt = Action.KEYBOARD_INTERRUPT
-        session.signals._is_nudge = True
-        session.signals._on_signal(signal.SIGINT, None)
+        nudge(session.signals, Action.KEYBOARD_INTERRUPT)
         made.append(True)
 
     monkeypatch.setattr("minirospy.runtime.transport.loop.LoopThread", make)

@@ -21,6 +21,7 @@ from minirospy.client import signals
 from minirospy.client.lifecycle import Lifecycle, ROSInterruptException
 from minirospy.client.shutdown import Action, Awareness, Phase, ShutdownMachine
 from minirospy.client.signals import SignalWatchdog
+from tests.client.nudge import nudge
 
 
 @pytest.fixture
@@ -128,6 +129,54 @@ def test_a_second_signal_takes_the_place_of_the_interrupt(machine: ShutdownMachi
     assert timeline(machine, 0.5, 10.0) == [(2.0, Action.REPORT)]
 
 
+@pytest.mark.parametrize(
+    ("awareness", "interrupted_at"),
+    [
+        (Awareness.NONE, 12.0),
+        (Awareness.POLLS, 15.0),
+        (Awareness.CUT_SHORT, 15.0),
+        (Awareness.NOTIFIED, None),
+    ],
+)
+def test_request_interrupts_a_main_thread_that_goes_on(
+    machine: ShutdownMachine, awareness: Awareness, interrupted_at: float | None
+) -> None:
+    machine.main.awareness = awareness
+    machine.phase = Phase.HOOKS
+    machine.is_requested = True
+    # However long hooks take, the main thread is not interrupted meanwhile.
+    assert timeline(machine, 0.0, 9.9) == []
+    machine.phase = Phase.LEAVING
+    expected = [] if interrupted_at is None else [(interrupted_at, Action.INTERRUPT)]
+    assert timeline(machine, 10.0, 100.0) == expected
+
+
+def test_request_does_not_interrupt_a_main_thread_that_sees_it_in_time(machine: ShutdownMachine) -> None:
+    machine.main.awareness = Awareness.POLLS
+    machine.is_requested = True
+    machine.phase = Phase.LEFT
+    assert timeline(machine, 0.0, 4.9) == []
+    machine.main.awareness = Awareness.NOTIFIED
+    assert timeline(machine, 5.0, 100.0) == []
+
+
+def test_a_signal_after_a_request_shortens_the_wait(machine: ShutdownMachine) -> None:
+    machine.is_requested = True
+    machine.phase = Phase.LEFT
+    assert timeline(machine, 0.0, 0.9) == []
+    machine.signal(1.0)
+    assert timeline(machine, 1.0, 10.0) == [(1.0, Action.INTERRUPT), (3.0, Action.REPORT)]
+
+
+def test_a_signal_after_a_request_leaves_a_loop_that_polls_its_time(machine: ShutdownMachine) -> None:
+    machine.main.awareness = Awareness.POLLS
+    machine.is_requested = True
+    machine.phase = Phase.LEFT
+    machine.tick(0.0)
+    machine.signal(1.0)
+    assert timeline(machine, 1.0, 10.0) == [(3.0, Action.REPORT), (5.0, Action.INTERRUPT)]
+
+
 @pytest.fixture
 def lifecycle() -> Lifecycle:
     return Lifecycle(lambda: None)
@@ -145,14 +194,12 @@ def test_a_thread_that_was_notified_meanwhile_is_not_interrupted(
 ) -> None:
     lifecycle.signal_shutdown("test")
     # The watchdog sends the interrupt; before it arrives, the program polls is_shutdown(), and starts to clean up.
-    watchdog._interrupt = Action.INTERRUPT
-    watchdog._is_nudge = True
     if was_notified:
         assert lifecycle.poll_shutdown()
-        watchdog._on_signal(signal.SIGINT, None)
+        nudge(watchdog, Action.INTERRUPT)
     else:
         with pytest.raises(ROSInterruptException):
-            watchdog._on_signal(signal.SIGINT, None)
+            nudge(watchdog, Action.INTERRUPT)
     assert lifecycle.is_notified
 
 
@@ -161,7 +208,7 @@ def test_a_signal_waits_for_the_next_call_of_rospy(
     lifecycle: Lifecycle, watchdog: SignalWatchdog, call: str
 ) -> None:
     """Until then the program may be about to use an object that a hook would release."""
-    watchdog._on_signal(signal.SIGINT, None)
+    watchdog.on_signal(signal.SIGINT, None)
     assert not lifecycle.is_shutdown_requested
     if call == "poll_shutdown":
         assert lifecycle.poll_shutdown()
@@ -176,8 +223,7 @@ def test_a_nudge_in_a_critical_section_waits_for_its_end(
 ) -> None:
     with lifecycle.deferral:
         for _ in range(2):
-            watchdog._is_nudge = True
-            watchdog._on_signal(signal.SIGINT, None)
+            nudge(watchdog)
         assert not lifecycle.is_shutdown_requested
     assert lifecycle.is_shutdown()
 
@@ -188,8 +234,10 @@ def test_hooks_can_see_that_a_signal_has_interrupted_a_call(
 ) -> None:
     seen: list[bool] = []
     lifecycle.add_hook(lambda: seen.append(is_dispatching_signal()))
-    watchdog._is_nudge = is_nudge
-    watchdog._on_signal(signal.SIGINT, None)
+    if is_nudge:
+        nudge(watchdog)
+    else:
+        watchdog.on_signal(signal.SIGINT, None)
     # The next call of rospy is not interrupted again.
     lifecycle.deferral.poll()
     assert seen == [is_nudge]
@@ -199,12 +247,10 @@ def test_hooks_can_see_that_a_signal_has_interrupted_a_call(
 def test_a_nudge_while_a_link_is_sending_waits(lifecycle: Lifecycle) -> None:
     sending = [True]
     watchdog = SignalWatchdog(lifecycle, lambda: None, lambda: sending[0])
-    watchdog._is_nudge = True
-    watchdog._on_signal(signal.SIGINT, None)
+    nudge(watchdog)
     assert not lifecycle.is_shutdown_requested
     sending[0] = False
-    watchdog._is_nudge = True
-    watchdog._on_signal(signal.SIGINT, None)
+    nudge(watchdog)
     assert lifecycle.is_shutdown()
 
 
@@ -215,8 +261,7 @@ def test_hooks_run_once_though_signals_come_while_they_run(
 
     class Interrupted(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            watchdog._is_nudge = True
-            watchdog._on_signal(signal.SIGINT, sys._getframe())
+            nudge(watchdog, frame=sys._getframe())
 
     record = logging.LogRecord("test", logging.INFO, "", 1, "a line", None, None)
 
@@ -226,7 +271,7 @@ def test_hooks_run_once_though_signals_come_while_they_run(
             Interrupted().handle(record)
 
     lifecycle.add_hook(hook)
-    watchdog._on_signal(signal.SIGINT, None)
+    watchdog.on_signal(signal.SIGINT, None)
     lifecycle.deferral.poll()
     assert runs == [False]
     assert lifecycle.is_shutdown()
@@ -251,9 +296,7 @@ def test_a_second_signal_at_any_step_of_a_shutdown_lets_it_finish(
         nonlocal steps
         steps += 1
         if steps == at:
-            watchdog._interrupt = Action.KEYBOARD_INTERRUPT
-            watchdog._is_nudge = True
-            watchdog._on_signal(signal.SIGINT, None)
+            nudge(watchdog, Action.KEYBOARD_INTERRUPT)
 
     profile = sys.getprofile()
     while True:
@@ -292,14 +335,12 @@ def test_a_second_signal_ends_a_hook_and_the_others_run(
     ran: list[str] = []
 
     def hook() -> None:
-        watchdog._interrupt = Action.KEYBOARD_INTERRUPT
-        watchdog._is_nudge = True
-        watchdog._on_signal(signal.SIGINT, None)
+        nudge(watchdog, Action.KEYBOARD_INTERRUPT)
         ran.append("never")
 
     lifecycle.add_hook(hook)
     lifecycle.add_hook(lambda: ran.append("other"))
-    watchdog._on_signal(signal.SIGINT, None)
+    watchdog.on_signal(signal.SIGINT, None)
     lifecycle.deferral.poll()
     assert ran == ["other"]
     assert lifecycle.left.is_set()
@@ -336,8 +377,7 @@ def test_a_signal_at_any_step_of_adding_a_hook_runs_that_hook(
         nonlocal steps
         steps += 1
         if steps == at:
-            watchdog._is_nudge = True
-            watchdog._on_signal(signal.SIGINT, None)
+            nudge(watchdog)
 
     profile = sys.getprofile()
     while True:
@@ -413,7 +453,7 @@ class System:
         self.now = self._signalled if self._timeout is None else self.now + self._turn
         if not is_signalled:
             raise TimeoutError
-        self._watchdog._on_signal(signal.SIGINT, None)
+        self._watchdog.on_signal(signal.SIGINT, None)
         return bytes([signal.SIGINT])
 
     def __enter__(self) -> System:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
@@ -80,48 +81,130 @@ print(thread.is_alive(), rospy.get_time() > 1e9)
     assert run(program) == ["False True"]
 
 
-def test_error_in_simulated_time_is_logged_when_a_timer_stops() -> None:
-    program = """
-import rospy.rostime
-threading.excepthook = lambda args: print(args.exc_type.__name__, args.exc_value)
-rospy.set_param("/use_sim_time", True)
-rospy.init_node("case")
-rospy.rostime._set_rostime(rospy.Time(100000))
-timer = rospy.Timer(rospy.Duration(1), print)
-second = 100000
-while timer.is_alive():  # it may not have started
-    second -= 1
-    rospy.rostime._set_rostime(rospy.Time(second))
-    timer.join(0.05)
-"""
-    assert run(program) == ["ROSTimeMovedBackwardsException ROS time moved backwards"]
-
-
-@pytest.mark.parametrize(
-    ("statement", "lines"),
-    [
-        ("sys.exit(3)", ["Timer ends: its callback <function callback> called sys.exit(3)"]),
-        ("raise ValueError('a fault')", ["ValueError: a fault"]),
-    ],
-)
-def test_error_of_a_callback_ends_its_timer_alone(statement: str, lines: list[str]) -> None:
-    program = f"""
+LOG = """
 import logging, re, sys
-threading.excepthook = lambda args: print(f"{{args.exc_type.__name__}}: {{args.exc_value}}")
-rospy.init_node("case")
 class Handler(logging.Handler):
     def emit(self, record):
-        print(re.sub(" at 0x[0-9a-f]+", "", record.getMessage()))
-log = logging.getLogger("rosout")
-log.handlers[:] = [Handler()]
+        print(record.levelname, re.sub(" at 0x[0-9a-f]+", "", record.getMessage().replace("\\n", "|")), flush=True)
+def print_log():
+    logging.getLogger("rosout").handlers[:] = [Handler()]
+"""
+
+
+def test_timer_continues_when_simulated_time_jumps_back() -> None:
+    program = f"""
+{LOG}
+import rospy.rostime
+rospy.set_param("/use_sim_time", True)
+rospy.init_node("case")
+print_log()
+rospy.rostime._set_rostime(rospy.Time(100000))
+events = []
+called = threading.Semaphore(0)
+def callback(event):
+    events.append(event)
+    called.release()
+timer = rospy.Timer(rospy.Duration(1), callback)
+second = 100000
+while not called.acquire(timeout=0.05):  # the timer's thread may not have started
+    second -= 1000
+    rospy.rostime._set_rostime(rospy.Time(second))
+timer_starts = second
+while not called.acquire(timeout=0.05):
+    second += 1
+    rospy.rostime._set_rostime(rospy.Time(second))
+print(timer.is_alive(), events[0].current_expected.secs == events[0].current_real.secs == timer_starts)
+print((events[1].current_expected - events[0].current_expected).to_sec())
+"""
+    said = run(program)
+    assert re.fullmatch(
+        r"WARNING simulated time jumped back by \d+\.000 s: the Timer of <function callback> starts its period again",
+        said[0],
+    )
+    assert said[1:] == ["True True", "1.0"]
+
+
+def test_timer_continues_after_an_error_of_its_callback() -> None:
+    program = f"""
+{LOG}
+rospy.init_node("case")
+print_log()
+called = threading.Semaphore(0)
+def callback(event):
+    called.release()
+    raise ValueError("a fault")
+timer = rospy.Timer(rospy.Duration(0.01), callback)
+for _ in range(4):
+    called.acquire()
+print(timer.is_alive(), flush=True)
+timer.shutdown()
+timer.join()
+once = rospy.Timer(rospy.Duration(0.01), callback, oneshot=True)
+once.join()
+print(once.is_alive(), flush=True)
+rospy.signal_shutdown("")
+"""
+    said = run(program)
+    assert said[0].startswith("ERROR bad callback: <function callback>|Traceback (most recent call last):|")
+    assert said[0].endswith("|ValueError: a fault|")
+    assert said[1:3] == ["True", "False"]
+    # Counted, and logged at the shutdown.
+    assert re.fullmatch(
+        r"ERROR bad callback: <function callback>: ValueError: a fault \(\d+ more times; the first one is logged above\)",
+        said[3],
+    )
+    assert len(said) == 4
+
+
+def test_exit_in_a_callback_ends_its_timer_alone() -> None:
+    program = f"""
+{LOG}
+rospy.init_node("case")
+print_log()
 called = threading.Semaphore(0)
 other = rospy.Timer(rospy.Duration(0.01), lambda _: called.release())
 def callback(event):
-    {statement}
+    sys.exit(3)
 timer = rospy.Timer(rospy.Duration(0.01), callback)
 timer.join(30)
 for _ in range(3):
     called.acquire()
 print(timer.is_alive(), other.is_alive(), rospy.is_shutdown())
 """
-    assert run(program) == [*lines, "False True False"]
+    assert run(program) == [
+        "ERROR Timer ends: its callback <function callback> called sys.exit(3)",
+        "False True False",
+    ]
+
+
+@pytest.mark.parametrize(
+    "sleep",
+    [
+        "rospy.sleep(1)",
+        "rospy.Rate(1).sleep()",
+        "rospy.Timer(rospy.Duration(1), print, oneshot=True).join()",
+    ],
+)
+def test_sleep_without_clock_names_it_once(sleep: str) -> None:
+    program = f"""
+{LOG}
+from minirospy.base import clock
+import rospy.rostime
+clock._SILENT_SECONDS = 0.1
+rospy.set_param("/use_sim_time", True)
+rospy.init_node("case")
+print_log()
+logged = threading.Event()
+class Handler(logging.Handler):
+    def emit(self, record):
+        logged.set()
+logging.getLogger("rosout").addHandler(Handler())
+for _ in range(2):
+    threading.Thread(target=lambda: {sleep}, daemon=True).start()
+logged.wait()
+threading.Event().wait(0.5)
+"""
+    assert run(program) == [
+        "WARNING /use_sim_time is set, and no time has arrived on /clock yet: sleep(), Rate and Timer wait for it. Start the "
+        "simulator or `rosbag play --clock`; or type `rosparam set use_sim_time false`, and restart this node"
+    ]

@@ -1,4 +1,4 @@
-"""Masters, gateways and nodes of a fleet on one loop of the test: loopback only, no multicast."""
+"""Masters, gateways and nodes of a fleet on one event loop, which use only loopback and no multicast."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SECONDS = 60.0
 
 
 class Place:
-    """A master with its nodes: a robot or a control room."""
+    """A master and its nodes, which are a robot or a control room."""
 
     def __init__(self, fleet: Fleet, master: Master) -> None:
         self.fleet = fleet
@@ -44,7 +44,7 @@ class Place:
     def gateway(
         self, name: str = "", *, endpoint: str = "", listens: bool = False, **options: Any
     ) -> Gateway:
-        """Start a gateway: of a robot if it has a name, else of a control room."""
+        """Start a gateway, for a robot if it has a name, otherwise for a control room."""
         endpoint = endpoint or self.fleet.endpoint
         network = NetworkOptions(listen=(endpoint,)) if listens else NetworkOptions(connect=(endpoint,))
         options.setdefault("imports", not name)
@@ -58,19 +58,19 @@ class Place:
 
     def names(self) -> set[str]:
         """Return the topics that the master lists."""
-        return self.fleet.run(self._names())
+        return self.fleet.run(self.fetch_names())
 
     def services(self) -> set[str]:
-        return self.fleet.run(self._services())
+        return self.fleet.run(self.fetch_services())
 
-    async def _names(self) -> set[str]:
-        published, subscribed, _ = await self._state()
+    async def fetch_names(self) -> set[str]:
+        published, subscribed, _ = await self.fetch_state()
         return {name for name, _ in [*published, *subscribed]}
 
-    async def _services(self) -> set[str]:
-        return {name for name, _ in (await self._state())[2]}
+    async def fetch_services(self) -> set[str]:
+        return {name for name, _ in (await self.fetch_state())[2]}
 
-    async def _state(self) -> Any:
+    async def fetch_state(self) -> Any:
         from minirospy.runtime.rpc.async_client import AsyncRpcClient
 
         client = AsyncRpcClient()
@@ -127,18 +127,18 @@ class Fleet:
         """Return when a place's master lists these topics."""
 
         async def are_shown() -> bool:
-            return set(topics) <= await place._names()
+            return set(topics) <= await place.fetch_names()
 
         self.until(are_shown)
 
     def until_gone(self, place: Place, *topics: str) -> None:
         async def are_gone() -> bool:
-            return not set(topics) & await place._names()
+            return not set(topics) & await place.fetch_names()
 
         self.until(are_gone)
 
     def stop(self, gateway: Gateway) -> None:
-        """Close a gateway and its node, as a shutdown does."""
+        """Close a gateway and its node, as at a shutdown."""
 
         async def ending() -> None:
             await gateway.close()

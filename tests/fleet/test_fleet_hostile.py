@@ -1,4 +1,4 @@
-"""Hostile peers of a fleet, and peers that leave: no task ends, no table fills up, no data is lost permanently."""
+"""Hostile peers in a fleet, and peers that leave: no task fails, no table fills up, and no data is lost permanently."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import yaml
 
 from minirospy.base.errors import BridgeError
 from minirospy.fleet import inquiry
-from minirospy.fleet.exporter import _MAX_READERS, _MAX_WANTED, Exporter
+from minirospy.fleet.exporter import MAX_READERS, MAX_WANTED, Exporter
 from minirospy.fleet.imported_topic import ImportedTopic
 from minirospy.fleet.importer import Importer
 from minirospy.fleet.inbound import InboundTopic
@@ -26,10 +26,10 @@ from minirospy.fleet.keys import (
     topic_key,
     want_key,
 )
-from minirospy.fleet.network import _CONTROL_QUERIES, _QUERIES
+from minirospy.fleet.network import MAX_CONTROL_QUERIES, MAX_QUERIES
 from minirospy.fleet.report import Answer, as_json, lines, parse_answer
 from minirospy.fleet.rules import GatewayRules, Priority
-from minirospy.fleet.sender import _MAX_OUTLETS, Receiver, Sender
+from minirospy.fleet.sender import MAX_OUTLETS, Receiver, Sender
 from tests.waiting import until
 
 MD5 = "0123456789abcdef" * 2
@@ -79,11 +79,11 @@ def test_topics_that_end_together_are_closed_once_each() -> None:
 def test_wants_of_peers_are_limited() -> None:
     spawned: list[Any] = []
     made = exporter(spawned)
-    for number in range(_MAX_WANTED + 5):
-        made._want_changed(want_key("robot1", "0" * 16, Want(f"/t{number}", "0" * 16)), True)
-    for number in range(_MAX_READERS + 5):
-        made._want_changed(want_key("robot1", "0" * 16, Want("/t0", f"{number:016x}")), True)
-    assert (len(made._readers), len(made._readers["/t0"])) == (_MAX_WANTED, _MAX_READERS)
+    for number in range(MAX_WANTED + 5):
+        made.want_changed(want_key("robot1", "0" * 16, Want(f"/t{number}", "0" * 16)), True)
+    for number in range(MAX_READERS + 5):
+        made.want_changed(want_key("robot1", "0" * 16, Want("/t0", f"{number:016x}")), True)
+    assert (len(made.readers), len(made.readers["/t0"])) == (MAX_WANTED, MAX_READERS)
     for work in spawned:
         work.close()
 
@@ -113,11 +113,11 @@ def test_readers_that_come_and_go_leave_no_publishers_behind() -> None:
 
     sender = Sender(stub(outlet=outlet))
     flow = sender.flow(Priority.DATA)
-    for number in range(3 * _MAX_OUTLETS):
-        sender._priorities[Priority.DATA]._put(flow, f"reader{number}", b"")
-        sender._priorities[Priority.DATA]._put(flow, "all", b"")
-    assert len(there) == len(flow._outlets) == len(flow._numbers) == _MAX_OUTLETS
-    assert flow._numbers["all"] == 3 * _MAX_OUTLETS
+    for number in range(3 * MAX_OUTLETS):
+        sender.priorities[Priority.DATA].put(flow, f"reader{number}", b"")
+        sender.priorities[Priority.DATA].put(flow, "all", b"")
+    assert len(there) == len(flow.outlets) == len(flow.numbers) == MAX_OUTLETS
+    assert flow.numbers["all"] == 3 * MAX_OUTLETS
 
 
 def test_a_topic_that_is_closed_while_its_type_is_queried_is_not_published() -> None:
@@ -316,22 +316,23 @@ def test_calls_that_wait_do_not_hold_up_pings_and_reports() -> None:
         network.answer("status", hangs, is_control=True)
         await until(lambda: len(arrived) == 3)
 
-        queries = [Query() for _ in range(_QUERIES + 1)]
+        queries = [Query() for _ in range(MAX_QUERIES + 1)]
         for query in queries:
             arrived["call"](query)
-        assert await queries[-1].answer == f"the gateway is answering {_QUERIES} other queries".encode()
-        # The other queries of the burst are answered.
+        assert await queries[-1].answer == f"the gateway is answering {MAX_QUERIES} other queries".encode()
+        # The other queries in the burst are answered.
         assert not any(query.answer.done() for query in queries[:-1])
         ping = Query()
         arrived["ping"](ping)
         assert await ping.answer == b"pong"
 
-        # Pings and reports do not take the places of calls, either.
-        queries = [Query() for _ in range(_CONTROL_QUERIES + 1)]
+        # Pings and reports do not use the slots for calls, either.
+        queries = [Query() for _ in range(MAX_CONTROL_QUERIES + 1)]
         for query in queries:
             arrived["status"](query)
         assert (
-            await queries[-1].answer == f"the gateway is answering {_CONTROL_QUERIES} other queries".encode()
+            await queries[-1].answer
+            == f"the gateway is answering {MAX_CONTROL_QUERIES} other queries".encode()
         )
         await network.close()
 
@@ -347,7 +348,7 @@ def test_names_that_are_left_out_are_reported_in_one_line(
         stub(), stub(), stub(), stub(), stub(), "0" * 16, "", GatewayRules(), lambda _: None, lambda: 0
     )
     for number in range(100):
-        made._changed(topic_key(TOKEN._replace(topic=f"/t{number}")), True)
+        made.changed(topic_key(TOKEN._replace(topic=f"/t{number}")), True)
     assert [record.getMessage() for record in caplog.records] == [
         "what a gateway announces is not shown: the fleet announces more than 0 topics and services"
     ]

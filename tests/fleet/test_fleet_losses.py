@@ -1,4 +1,4 @@
-"""Failures, false data and floods in a fleet: each has the result that docs/fleet.md describes."""
+"""Failures, false data and floods in a fleet; each has the result that docs/fleet.md describes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ __all__ = ["fleet"]
 
 
 class Proxy:
-    """A TCP proxy that can stop forwarding bytes without closing connections, like a link that is cut."""
+    """A TCP proxy that can stop forwarding bytes without closing connections, like an interrupted link."""
 
     def __init__(self, fleet: Fleet, to: str) -> None:
         self._fleet = fleet
@@ -121,7 +121,7 @@ def test_a_gateway_that_ends_takes_its_robot_away_until_it_is_back(fleet: Fleet)
     fleet.until(lambda: fleet.gateways[0].importer.robots == {})  # type: ignore[union-attr]
 
     async def is_gone() -> bool:
-        return "/robot1/chat" not in {topic for topic, _ in (await control._state())[0]}
+        return "/robot1/chat" not in {topic for topic, _ in (await control.fetch_state())[0]}
 
     fleet.until(is_gone)
 
@@ -169,7 +169,7 @@ def test_a_link_that_is_cut_is_noticed_and_mended(fleet: Fleet, quick: str) -> N
     try:
         gateway_of(robot, "robot1", NetworkOptions(connect=(proxy.endpoint,), config=quick))
         found = collect(fleet, control, "/robot1/map", String)
-        # A machine that stalls for two seconds loses the link, too.
+        # A machine that stalls for two seconds also loses the link.
         fleet.until(lambda: len(found) >= 1)
 
         proxy.cut()
@@ -206,7 +206,7 @@ def serve_never(fleet: Fleet, robot: Any) -> asyncio.Event:
 
 
 async def call_never(client: Any, called: asyncio.Event) -> asyncio.Future[Any]:
-    """Return a call of /robot1/slow that has arrived; repeat one that fails earlier because the machine stalled."""
+    """Return a call to /robot1/slow that has arrived; repeat calls that fail before that because the machine has stalled."""
     from std_srvs.srv import Trigger
 
     while True:
@@ -223,9 +223,9 @@ async def call_never(client: Any, called: asyncio.Event) -> asyncio.Future[Any]:
 def test_a_robot_that_is_silent_leaves_though_zenoh_keeps_its_tokens(
     fleet: Fleet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("presence._REGULAR_SECONDS", "presence._LOST_SECONDS", "presence._ROUND_SECONDS"):
+    for name in ("presence.REGULAR_SECONDS", "presence.LOST_SECONDS", "presence.ROUND_SECONDS"):
         monkeypatch.setattr(f"minirospy.fleet.{name}", 0.2)
-    monkeypatch.setattr("minirospy.fleet.importer._PING_SECONDS", 1.0)
+    monkeypatch.setattr("minirospy.fleet.importer.PING_SECONDS", 1.0)
     slow = tmp_path / "slow.json5"
     slow.write_text("{ transport: { link: { tx: { lease: 600000 } } } }")
     robot, control = fleet.place(), fleet.place()
@@ -468,7 +468,7 @@ def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
 def answered(start: Callable[..., subprocess.Popen[str]], *words: str) -> tuple[int, str]:
     """Return the status and output of a command that has reached the fleet.
 
-    On a busy machine, connecting takes longer than the command waits.
+    Repeat the command, because on a busy machine, connecting may take longer than it waits.
     """
     while True:
         code, text = ended(start(*words))
@@ -500,7 +500,7 @@ def test_the_commands_from_start_to_kill(fleet: Fleet, start: Callable[..., subp
     gateway.kill()
 
     async def is_gone() -> bool:
-        return "/robot1/chat" not in {topic for topic, _ in (await control._state())[0]}
+        return "/robot1/chat" not in {topic for topic, _ in (await control.fetch_state())[0]}
 
     fleet.until(is_gone)
     for process in (room, router):
@@ -553,8 +553,8 @@ def test_usage_errors_are_one_line(
 def test_a_name_that_does_not_resolve_yet_is_named_once(
     fleet: Fleet, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("minirospy.fleet.network._RETRY_SECONDS", 0.05)
-    monkeypatch.setattr("minirospy.zenoh.library._CONNECT_MS", 50)
+    monkeypatch.setattr("minirospy.fleet.network.RETRY_SECONDS", 0.05)
+    monkeypatch.setattr("minirospy.zenoh.library.CONNECT_MS", 50)
     looks: list[object] = []
 
     def unresolved(_: object) -> list[str]:
@@ -621,19 +621,19 @@ def test_a_second_start_that_cannot_listen_does_not_end_the_first(
         assert code == 1
         assert "the fleet's network cannot be opened" in text
         assert "Traceback" not in text
-    # A gateway that waits for a router that does not run has not taken the name.
+    # A gateway that still waits for its router has not claimed the name.
     waiting = start(*words, "--connect", f"127.0.0.1:{free_port()}")
     until_line(waiting, "nothing of the fleet answers")
     assert running.poll() is None
 
-    # A gateway that works takes the name, and the first one prints why it exits.
+    # A gateway that is connected claims the name, and the first one prints why it exits.
     start(*words, "--listen", f"127.0.0.1:{free_port()}")
     assert until_line(running, "shutdown request").endswith("new node registered with same name\n")
     assert ended(running)[0] == 0
 
 
 def test_robot_stops_if_commands_stop_arriving(fleet: Fleet) -> None:
-    """The link is cut, and the loop of the robot's gateway is blocked: publishing zero needs neither."""
+    """The link is cut, and the event loop of the robot's gateway is blocked. Publishing zero velocity depends on neither."""
     robot, control = fleet.place(), fleet.place()
     control.gateway(listens=True)
     proxy = Proxy(fleet, fleet.endpoint)
@@ -657,7 +657,7 @@ def test_robot_stops_if_commands_stop_arriving(fleet: Fleet) -> None:
 
         task = fleet.call(lambda: asyncio.ensure_future(drive()))
         fleet.until(lambda: "/cmd_vel" in inbound and inbound["/cmd_vel"].passed > 2)
-        base.connect(gateway.node._node.uri)
+        base.connect(gateway.node.uri)
         base.until(lambda twist: twist.linear.x == 0.5)
         base.until(lambda twist: twist.linear.x == 0.5)
         released, blocked = threading.Event(), threading.Event()
@@ -666,7 +666,7 @@ def test_robot_stops_if_commands_stop_arriving(fleet: Fleet) -> None:
             blocked.set()
             released.wait()
 
-        # All loops of the test run in this thread; the receiver and the guard have their own threads.
+        # All event loops in the test run in this thread, whereas the receiver and the guard have their own threads.
         proxy.cut()
         fleet.loop.loop.call_soon_threadsafe(block)
         try:
@@ -683,7 +683,7 @@ def test_robot_stops_if_commands_stop_arriving(fleet: Fleet) -> None:
 
 
 class RawSubscriber:
-    """A robot's base without an event loop: a subscriber of /cmd_vel by XML-RPC and TCPROS."""
+    """A robot's base without an event loop: a subscriber to /cmd_vel, with raw XML-RPC and TCPROS."""
 
     def __init__(self) -> None:
         self._socket: socket.socket | None = None

@@ -1,4 +1,4 @@
-"""Velocities that arrive over the fleet and stop arriving: the messages that follow, with a clock that the test controls."""
+"""The messages that follow if velocities over the fleet stop arriving, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -86,8 +86,8 @@ class Robot:
 
     def wake(self) -> None:
         """Let the guard read the clock."""
-        self.stream._guard.arm(_nothing, float("-inf"))
-        wait_until(lambda: _nothing not in self.stream._guard._deadlines)
+        self.stream.guard.arm(_nothing, float("-inf"))
+        wait_until(lambda: _nothing not in self.stream.guard.deadlines)
 
 
 def _nothing() -> None:
@@ -105,7 +105,7 @@ def test_stream_that_ends_is_followed_by_a_zero_once(caplog: pytest.LogCaptureFi
     robot.wake()
     wait_until(lambda: robot.published == [1, 2, 3, 0])
     wait_until(lambda: "/cmd_vel is stopped: no command came for 0.5 s" in caplog.text)
-    # It drives on as soon as commands arrive again.
+    # The robot moves again as soon as commands arrive.
     robot.send(4, 5)
     robot.now += 1
     robot.wake()
@@ -121,7 +121,7 @@ def test_single_velocities_and_streams_that_end_with_zero_are_left_alone() -> No
     robot.wake()
     robot.stream.close()
     assert robot.published == [1, 2, 3, 4, 0]
-    assert not robot.stream._guard._deadlines
+    assert not robot.stream.guard.deadlines
 
 
 def test_stream_is_stopped_when_its_topic_is_closed() -> None:
@@ -130,7 +130,7 @@ def test_stream_is_stopped_when_its_topic_is_closed() -> None:
     robot.stream.close()
     robot.stream.close()
     assert robot.published == [1, 2, 0]
-    assert not robot.stream._guard._deadlines
+    assert not robot.stream.guard.deadlines
 
 
 def test_command_at_the_last_moment_goes_on() -> None:

@@ -1,5 +1,5 @@
 # ruff: noqa: E501
-"""The error messages of real roslaunch and minirospy for broken launch files: both contain the words that a script may match."""
+"""The error messages of real roslaunch and minirospy for broken launch files both contain the words that scripts may match."""
 
 from __future__ import annotations
 
@@ -44,6 +44,8 @@ FAULTS = {
     '<remap from="a b" to="c"/>': "remap from [a b] is not a valid ROS name",
     '<group clear_params="true"/>': "'ns' attribute must be set in order to use 'clear_params'",
     '<machine name="m"/>': "<machine> tag is missing required attribute: 'address'",
+    '<machine name="m" address="a"><env name="E" value="1"/></machine>': "<machine>: <env> tag is not supported since ROS Fuerte",
+    '<param name="p" value="1" type="float"/>': "Unknown type 'float'",
     "</group>": "Invalid roslaunch XML syntax: mismatched tag",
     '<param name="p" value="a & b"/>': "Invalid roslaunch XML syntax: not well-formed (invalid token)",
     "</launch><launch>": "Invalid roslaunch XML syntax: junk after document element",

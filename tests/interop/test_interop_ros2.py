@@ -221,7 +221,7 @@ class Scene:
         """Wait until the ROS 1 graph fulfils a condition."""
 
         async def wait() -> None:
-            while not condition(await fetch(self.node._node.master)):
+            while not condition(await fetch(self.node.call_master)):
                 await asyncio.sleep(0.05)
 
         self.run(asyncio.wait_for(wait(), LIMIT))

@@ -30,6 +30,7 @@ from command_table import (
     WITHOUT_MASTER,
     WRONG,
     compare,
+    more_words,
     other_words,
     page,
     unexpected,
@@ -102,6 +103,8 @@ def test_the_table(scene: str, tmp_path: Path) -> None:
 
     assert not different, different
     assert other_words(row for rows in sections.values() for row in rows) == OTHER_WORDS
+    # Scripts look for ROS's line at the end of stderr.
+    assert more_words(sections["Without a master"]) == set()
     assert verdicts(page(sections)) == verdicts(PAGE.read_text())
 
 

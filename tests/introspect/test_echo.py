@@ -14,8 +14,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from minirospy.base.errors import DeserializationError, MessageException, NotFoundError, UsageError
 from minirospy.introspect.echo import Echo, Filter, fill_message
-from minirospy.introspect.messages import MessageClasses
-from minirospy.introspect.streams import Received
+from minirospy.introspect.messages import MessageClasses, Received
 from minirospy.introspect.topics import TopicField
 
 

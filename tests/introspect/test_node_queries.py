@@ -21,7 +21,7 @@ LIMIT = 60.0
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wait for silent nodes. A test of a limit sets it after this."""
-    for name in ("_QUERY_SECONDS", "_AGAIN_SECONDS", "_REFUSED_SECONDS"):
+    for name in ("QUERY_SECONDS", "AGAIN_SECONDS", "REFUSED_SECONDS"):
         monkeypatch.setattr(node_queries, name, LIMIT)
 
 
@@ -55,7 +55,7 @@ def queried(scene: Callable[[Nodes, NodeQueries[str, str]], Awaitable[None]]) ->
             await asyncio.wait_for(scene(nodes, queries), LIMIT)
         finally:
             await queries.close()
-        assert not queries._tasks
+        assert not queries.tasks
 
     asyncio.run(run())
 
@@ -75,7 +75,7 @@ def test_each_node_is_queried_once_and_forgotten_when_it_has_gone() -> None:
 
 
 def test_a_node_that_hangs_is_queried_once_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(node_queries, "_AGAIN_SECONDS", 0.0)
+    monkeypatch.setattr(node_queries, "AGAIN_SECONDS", 0.0)
 
     async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
         nodes.silent.add("a")
@@ -111,7 +111,7 @@ def test_answer_of_a_removed_node_is_discarded() -> None:
         await until(lambda: nodes.queried)
         await queries.look([], 0.0)
         nodes.may_answer.set()
-        await until(lambda: not queries._tasks)
+        await until(lambda: not queries.tasks)
         assert not queries.found
 
         nodes.dead.add("moved")
@@ -139,9 +139,9 @@ def test_a_node_that_failed_is_queried_again_after_a_pause() -> None:
         nodes.dead.add("a")
         await queries.look(["a"], LIMIT)
         await queries.look(["a"], LIMIT)
-        await until(lambda: not queries._tasks)
+        await until(lambda: not queries.tasks)
         assert nodes.queried == ["a"]
-        queries._not_before["a"] -= node_queries._AGAIN_SECONDS
+        queries.not_before["a"] -= node_queries.AGAIN_SECONDS
         nodes.dead.clear()
         await queries.look(["a"], LIMIT)
         await until(lambda: queries.found)
@@ -151,8 +151,8 @@ def test_a_node_that_failed_is_queried_again_after_a_pause() -> None:
 
 
 def test_a_node_that_refuses_is_queried_again_soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(node_queries, "_REFUSED_SECONDS", 0.5)
-    monkeypatch.setattr(node_queries, "_AGAIN_SECONDS", 10.0)
+    monkeypatch.setattr(node_queries, "REFUSED_SECONDS", 0.5)
+    monkeypatch.setattr(node_queries, "AGAIN_SECONDS", 10.0)
 
     async def scene(loop: ManualLoop) -> None:
         nodes = Nodes()
@@ -183,12 +183,12 @@ def test_a_node_that_refuses_is_queried_again_soon(monkeypatch: pytest.MonkeyPat
 
 
 def test_a_query_that_takes_too_long_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(node_queries, "_QUERY_SECONDS", 0.0)
+    monkeypatch.setattr(node_queries, "QUERY_SECONDS", 0.0)
 
     async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
         nodes.silent.add("a")
         await queries.look(["a"], LIMIT)
-        assert "a" in queries._not_before
+        assert "a" in queries.not_before
 
     queried(scene)
 
@@ -196,7 +196,7 @@ def test_a_query_that_takes_too_long_has_failed(monkeypatch: pytest.MonkeyPatch)
 def test_many_nodes_that_do_not_answer_keep_a_new_one_waiting_for_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(node_queries, "_AGAIN_SECONDS", 0.0)
+    monkeypatch.setattr(node_queries, "AGAIN_SECONDS", 0.0)
 
     async def scene(nodes: Nodes, queries: NodeQueries[str, str]) -> None:
         dead = [f"dead{number}" for number in range(3 * MAX_CONCURRENT)]
@@ -234,7 +234,7 @@ def test_a_service_that_cannot_be_reached_is_not_reported(caplog: pytest.LogCapt
 
         queries = NodeQueries(answer, ErrorReporter(logging.getLogger("test"), "the query"))
         await queries.look(["/dead"], LIMIT)
-        assert "/dead" in queries._not_before
+        assert "/dead" in queries.not_before
         await queries.close()
 
     asyncio.run(asyncio.wait_for(run(), LIMIT))

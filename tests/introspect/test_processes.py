@@ -30,14 +30,14 @@ def test_processes_that_have_ended_are_left_out() -> None:
     assert program.pid in loads.look([program.pid])
     program.communicate()
     assert loads.look([program.pid, 0, -1, 1 << 40]).keys() <= {0}
-    assert program.pid not in loads._known
+    assert program.pid not in loads.known
 
 
 def test_process_with_a_reused_id_starts_from_zero() -> None:
     loads = ProcessLoads()
     loads.look([os.getpid()])
     # As psutil does if the process id now belongs to another process.
-    loads._known[os.getpid()]._create_time = 1.0  # type: ignore[attr-defined]
-    loads._known[os.getpid()]._ident = (os.getpid(), 1.0)  # type: ignore[attr-defined]
+    loads.known[os.getpid()]._create_time = 1.0  # type: ignore[attr-defined]
+    loads.known[os.getpid()]._ident = (os.getpid(), 1.0)  # type: ignore[attr-defined]
     assert loads.look([os.getpid()])[os.getpid()].cpu is None
-    assert loads._known[os.getpid()] == psutil.Process()
+    assert loads.known[os.getpid()] == psutil.Process()

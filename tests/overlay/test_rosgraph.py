@@ -17,9 +17,18 @@ import rosgraph.xmlrpc
 import rostopic
 
 
-def test_myargv_has_the_rule_of_rospy() -> None:
+def test_myargv_drops_every_argument_with_an_assignment() -> None:
     words = ["prog", "a:=b", "--flag:=x", "http://h:=1", "_p:=1", "__name:=n", "-v"]
-    assert rosgraph.myargv(words) == ["prog", "--flag:=x", "http://h:=1", "-v"]
+    assert rosgraph.myargv(words) == ["prog", "-v"]
+
+
+def test_local_processes_ignore_an_address_on_the_command_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", ["prog", "__ip:=192.0.2.1"])
+    monkeypatch.delenv("MINIROSPY_LOCAL", raising=False)
+    assert rosgraph.network.get_host_name() == "192.0.2.1"
+    monkeypatch.setenv("MINIROSPY_LOCAL", "1")
+    assert rosgraph.network.get_address_override() == "localhost"
+    assert rosgraph.network.get_bind_address() == "127.0.0.1"
 
 
 def test_the_graph_as_edges(master: str) -> None:
@@ -159,3 +168,23 @@ def test_master_of_a_command_line_is_the_first_and_is_complete() -> None:
     for argument in ("__master:=", "__master:=a:=b"):
         with pytest.raises(ValueError, match="improperly specified"):
             get_master_uri(environment, [argument])
+
+
+def test_a_program_replaces_the_master_that_is_called(master: str) -> None:
+    client = rosgraph.Master("/tester")
+    assert client.is_online()
+    client.handle.getPid = lambda caller_id: (1, "", [caller_id])
+    assert client.getPid() == ["/tester"]
+    del client.handle
+    assert client.getPid() > 0
+    client.handle = ServerProxy("http://localhost:1")
+    assert not client.is_online()
+
+
+def test_a_master_changes_its_uri_and_its_caller(master: str) -> None:
+    client = rosgraph.Master("/tester", "http://localhost:1")
+    assert not client.is_online()
+    client._reinit(master)
+    client.caller_id = "/other"
+    client.registerService("/serve", "rosrpc://localhost:3", "http://localhost:1")
+    assert client.getSystemState()[2] == [["/serve", ["/other"]]]

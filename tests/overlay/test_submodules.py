@@ -43,9 +43,17 @@ def test_module_that_is_listed_as_missing_is_missing(module: str) -> None:
 
 
 LOADED = {
+    "catkin": ["find_in_workspaces", "workspace"],
+    "cv_bridge": ["boost", "core"],
+    "diagnostic_updater": ["_diagnostic_status_wrapper", "_publisher"],
+    "rospkg": ["distro"],
+    "sensor_msgs": ["msg", "srv", "point_cloud2"],
+    "std_msgs": ["msg"],
+    "tf2_msgs": ["msg", "srv"],
+    "tf2_py": ["_tf2"],
     "rosbag": ["bag", "migration", "rosbag_main"],
     "rosgraph": ["roslogging", "xmlrpc"],
-    "roslib": ["manifest", "stacks"],
+    "roslib": ["manifest", "message", "names", "stacks"],
     "rosmaster": [
         "exceptions",
         "main",
@@ -69,6 +77,31 @@ def test_submodules_come_with_their_package(package: str) -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.stdout.split() == [f"{package}.{name}" for name in LOADED[package]]
     assert done.stderr.endswith(f"AttributeError: module {package!r} has no attribute 'nope'\n")
+
+
+@pytest.mark.parametrize(
+    ("program", "output"),
+    [
+        ("import rospy, xml\nprint(xml.etree.ElementTree.fromstring('<a/>').tag)", "a"),
+        ("import rosgraph, xml.dom\nprint(xml.dom.minidom.parseString('<a/>').documentElement.tagName)", "a"),
+        ("import rospy, logging\nprint(logging.handlers.DEFAULT_TCP_LOGGING_PORT)", "9020"),
+        ("import rospy, xmlrpc\nprint(xmlrpc.client.Fault(1, 'x').faultCode)", "1"),
+        ("import rospy, xml\nprint(hasattr(xml, 'nope'))", "False"),
+        ("import std_msgs.msg\nprint(std_msgs.msg._String.String._type)", "std_msgs/String"),
+        (
+            "import gazebo_msgs.msg\nprint(gazebo_msgs.msg._ModelState.ModelState._type)",
+            "gazebo_msgs/ModelState",
+        ),
+        (
+            "import sensor_msgs.msg, geometry_msgs\nprint(geometry_msgs.msg.Point._type)",
+            "geometry_msgs/Point",
+        ),
+    ],
+)
+def test_modules_come_with_an_import_of_ros(program: str, output: str) -> None:
+    """Programs use submodules that only ROS's own modules have imported."""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.stdout.strip(), done.stderr) == (output, "")
 
 
 def test_importing_submodules_prints_nothing() -> None:

@@ -1,7 +1,8 @@
 """Compare every public name and signature of rospy and similar modules in real ROS and minirospy: write three pages of docs.
 
 docs/compatibility/rospy.md compares rospy; docs/compatibility/modules.md rosgraph, rosnode, rostopic and similar modules;
-docs/compatibility/tf.md tf2_ros, tf and PyKDL.
+docs/compatibility/tf.md tf2_ros, tf and PyKDL. The modules are all that minirospy's overlay has and real ROS, too. Also writes
+minirospy/ros/passed_on.py: the names that stars bring in real ROS (`os`, `rospy`).
 
     .venv/bin/python tests/referee/compare_surface.py            write the pages
     .venv/bin/python tests/referee/compare_surface.py --check    exit status 1 if one would change
@@ -13,6 +14,7 @@ under both.
 from __future__ import annotations
 
 import argparse
+import functools
 import importlib
 import importlib.util
 import inspect
@@ -22,135 +24,53 @@ import pkgutil
 import re
 import subprocess
 import sys
+import textwrap
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-ROSPY = [
-    "rospy",
-    "rospy.client",
-    "rospy.core",
-    "rospy.names",
-    "rospy.rostime",
-    "rospy.timer",
-    "rospy.topics",
-    "rospy.service",
-    "rospy.msproxy",
-    "rospy.exceptions",
-    "rospy.msg",
-]
-AROUND = [
-    "rosgraph",
-    "rosgraph.masterapi",
-    "rosgraph.names",
-    "rosgraph.network",
-    "rosgraph.rosenv",
-    "rosgraph.roslogging",
-    "rosgraph.xmlrpc",
-    "rosgraph.impl.graph",
-    "rosnode",
-    "rostopic",
-    "rosservice",
-    "rosparam",
-    "rosmsg",
-    "rosmaster.exceptions",
-    "rosmaster.master_api",
-    "rosmaster.paramserver",
-    "rosmaster.util",
-    "rosmaster.validators",
-    "roswtf.environment",
-    "roswtf.model",
-    "roswtf.rules",
-    "rosclean",
-    "roslib",
-    "roslib.gentools",
-    "roslib.srvs",
-    "roslib.message",
-    "roslib.names",
-    "roslib.packages",
-    "roslib.rosenv",
-    "roslib.scriptutil",
-    "roslib.launcher",
-    "roslib.exceptions",
-    "genpy",
-    "genpy.base",
-    "genpy.message",
-    "genpy.rostime",
-    "genpy.dynamic",
-    "genmsg",
-    "genmsg.base",
-    "genmsg.names",
-    "genmsg.srvs",
-    "genmsg.msgs",
-    "genmsg.msg_loader",
-    "genmsg.gentools",
-    "catkin.find_in_workspaces",
-    "catkin.terminal_color",
-    "rospkg",
-    "rospkg.os_detect",
-    "message_filters",
-    "sensor_msgs.point_cloud2",
-    "angles",
-    "topic_tools",
-    "cv_bridge",
-    "cv_bridge.core",
-    "image_geometry",
-    "image_geometry.cameramodels",
-    "laser_geometry",
-    "laser_geometry.laser_geometry",
-    "camera_calibration_parsers",
-    "resource_retriever",
-    "rosbag",
-    "rosbag.bag",
-    "rosbag.migration",
-    "dynamic_reconfigure",
-    "dynamic_reconfigure.client",
-    "dynamic_reconfigure.encoding",
-    "dynamic_reconfigure.server",
-    "dynamic_reconfigure.parameter_generator_catkin",
-    "diagnostic_updater",
-    "bondpy.bondpy",
-    "interactive_markers.interactive_marker_server",
-    "interactive_markers.menu_handler",
-]
-"""The modules of the second page."""
-FRAMES = [
-    "tf2_py",
-    "tf2_ros",
-    "tf2_ros.buffer",
-    "tf2_ros.buffer_client",
-    "tf2_ros.buffer_interface",
-    "tf2_ros.static_transform_broadcaster",
-    "tf2_ros.transform_broadcaster",
-    "tf2_ros.transform_listener",
-    "tf2_geometry_msgs",
-    "tf2_geometry_msgs.tf2_geometry_msgs",
-    "tf2_sensor_msgs",
-    "tf2_sensor_msgs.tf2_sensor_msgs",
-    "tf2_kdl",
-    "tf2_kdl.tf2_kdl",
-    "tf",
-    "tf.broadcaster",
-    "tf.listener",
-    "tf.transformations",
-    "tf_conversions",
-    "tf_conversions.posemath",
-    "PyKDL",
-]
-"""The modules of the third page."""
+try:
+    from minirospy.ros import overlay_modules
+except ImportError:  # in real ROS's interpreter
+    overlay_modules = None  # type: ignore[assignment]
 
 REAL_PYTHON = "/usr/bin/python3"
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-OF_ROS = (
-    "rospy", "genpy", "rosgraph", "roscpp", "std_msgs", "rosgraph_msgs", "minirospy", "rosnode", "rostopic", "rosservice",
-    "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "rosbag", "message_filters", "sensor_msgs",
-    "angles", "tf2_py", "tf2_ros", "tf2", "_tf2", "tf", "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_kdl", "tf_conversions",
-    "PyKDL",
-    "rosparam", "rosmsg", "rosclean", "roslib", "genmsg", "catkin", "rospkg", "message_filters",
-    "diagnostic_updater", "bondpy", "interactive_markers",
-    "sensor_msgs", "angles", "cv_bridge", "dynamic_reconfigure", "image_geometry", "laser_geometry", "camera_calibration_parsers",
-    "resource_retriever", "topic_tools",
-)  # fmt: skip
+OF_THE_C_CODE = ("_tf2", "tf2", "minirospy")  # homes of classes that no emulated module is named after
+
+
+@functools.cache
+def emulated_modules() -> tuple[str, ...]:
+    """Return the modules that minirospy offers under the names of ROS's packages, without generated messages.
+
+    In real ROS's interpreter the list comes from the environment, as the first process found it.
+    """
+    if LISTED in os.environ:
+        return tuple(os.environ[LISTED].split())
+    return tuple(sorted(name for name in overlay_modules.modules() if not name.startswith("RPi")))
+
+
+LISTED = "COMPARED_MODULES"
+"""The variable that gives :func:`emulated_modules` to the other interpreter."""
+
+
+@functools.cache
+def of_ros() -> frozenset[str]:
+    """Return the packages whose functions and classes are compared."""
+    return frozenset(
+        {*(name.partition(".")[0] for name in emulated_modules()), *OF_THE_C_CODE, "std_msgs", "roscpp"}
+    )
+
+
+def page_of(module: str) -> str:
+    """Return the page that lists a module: rospy, tf or modules."""
+    package = module.partition(".")[0]
+    if package == "rospy":
+        return "rospy"
+    return "tf" if package == "PyKDL" or re.fullmatch("tf|tf2_.*|tf_.*", package) else "modules"
+
+
 REASONS = {
     "LoggingIdentical": "bookkeeping inside rospy's log functions",
     "LoggingOnce": "bookkeeping inside rospy's log functions",
@@ -240,7 +160,6 @@ REASONS = {
         ),
         "FdoDetect recognizes it by os-release",
     ),
-    "cvtColorForDisplay": "for the window of image_view",
     **dict.fromkeys(("LINEDEBUG", "id"), "the generator's inside"),
     "ForkingXMLRPCServer": "a server that forks: not on every system",
     "isstring": "a leftover of Python 2",
@@ -265,6 +184,9 @@ REASONS = {
     ),
 }
 """Name of real rospy -> the reason why it is not offered: only rospy itself uses it."""
+
+LEFT_OUT: list[tuple[str, str, str]] = []
+"""(module or start of it, names or "*", the reason why they are not offered)."""
 
 MEMBERS_INSIDE = {
     "acquire_impl": "rospy's inside",
@@ -315,14 +237,6 @@ MEMBERS_INSIDE = {
 Description = dict[str, dict[str, Any]]
 
 
-PACKAGES = (
-    "rosgraph", "rosnode", "rostopic", "rosservice", "rosparam", "rosmsg", "rosclean", "roslib", "genpy", "genmsg", "catkin",
-    "rospkg", "roslaunch", "rosmaster", "roswtf", "rostest", "rosunit", "rospy", "actionlib", "rosbag", "dynamic_reconfigure",
-    "topic_tools", "message_filters",
-)  # fmt: skip
-"""The packages whose submodules and private names are listed."""
-
-
 def private_names(not_only_own: bool = False) -> dict[str, list[str]]:
     """Return submodule -> its own functions and classes whose names start with an underscore, or all of its names."""
     found = {}
@@ -342,10 +256,13 @@ def private_names(not_only_own: bool = False) -> dict[str, list[str]]:
 
 
 def submodules() -> list[str]:
-    """Return the importable modules of :data:`PACKAGES`, without generated messages."""
+    """Return the importable modules of the emulated packages, without generated messages."""
     found = []
-    for package in PACKAGES:
-        path = getattr(importlib.import_module(package), "__path__", [])
+    for package in sorted({name.partition(".")[0] for name in emulated_modules()}):
+        try:
+            path = getattr(importlib.import_module(package), "__path__", [])
+        except ImportError:  # in real ROS: not installed
+            continue
         names = [module.name for module in pkgutil.walk_packages(path, f"{package}.", lambda name: None)]
         found += [package, *names]
     kept = [name for name in found if not re.search(r"\.(msg|srv|cfg)(\.|$)|__main__", name)]
@@ -353,23 +270,179 @@ def submodules() -> list[str]:
 
 
 def describe() -> Description:
-    """Return module -> name -> its home module and what it is, for the rospy of this interpreter."""
-    return {
-        module: {
+    """Return module -> name -> its home module and what it is, for the modules that this interpreter has."""
+    found: Description = {}
+    for module in emulated_modules():
+        try:
+            imported = importlib.import_module(module)
+        except ImportError:
+            continue
+        found[module] = {
             name: value
-            for name in dir(importlib.import_module(module))
-            if not name.startswith("_") and (value := describe_value(getattr(sys.modules[module], name)))
+            for name in sorted({*dir(imported), *getattr(imported, "__all__", ())})
+            if not name.startswith("_") and (value := describe_value(getattr(imported, name)))
         }
-        for module in (*ROSPY, *AROUND, *FRAMES)
-    }
+    return found
+
+
+def stars() -> dict[str, list[str]]:
+    """Return module -> the names that `from MODULE import *` brings, for the modules that this interpreter has."""
+    found = {}
+    for module in emulated_modules():
+        names: dict[str, object] = {}
+        try:
+            exec(f"from {module} import *", names)
+        except ImportError:
+            continue
+        found[module] = sorted(name for name in names if not name.startswith("__"))
+    return found
+
+
+def origins() -> dict[str, dict[str, list[str]]]:
+    """Return module without ``__all__`` -> name that its star brings from elsewhere -> the places that also have it."""
+    places = [*emulated_modules(), *STANDARD]
+    homes: dict[int, list[str]] = {}
+    kept = []
+    for place in places:
+        try:
+            variables = vars(importlib.import_module(place))
+        except ImportError:
+            continue
+        for name, value in variables.items():
+            homes.setdefault(id(value), []).append(f"{place}:{name}")
+            kept.append(value)  # so that its id is not given to another object
+    found: dict[str, dict[str, list[str]]] = {}
+    for module, names in stars().items():
+        imported = sys.modules[module]
+        if hasattr(imported, "__all__"):
+            continue
+        found[module] = {}
+        for name in names:
+            value = getattr(imported, name)
+            if inspect.ismodule(value):
+                found[module][name] = [value.__name__]
+            elif (
+                (home := getattr(value, "__module__", ""))
+                and home != module
+                and not isinstance(value, (int, str))
+            ):
+                own = f"{home}:{getattr(value, '__name__', name)}"
+                found[module][name] = [own, *homes.get(id(value), [])]
+            elif not (home == module and (inspect.isroutine(value) or inspect.isclass(value))):
+                found[module][name] = [each for each in homes.get(id(value), []) if each.endswith(f":{name}")]
+    return found
+
+
+ELSEWHERE = {
+    "_hashlib:openssl_md5": "hashlib:md5",
+    "_thread:allocate_lock": "threading:Lock",
+    "_thread:lock": "threading:Lock",
+    "distutils.spawn:find_executable": "shutil:which",
+    "imp:reload": "importlib:reload",
+    "genericpath:isdir": "os.path:isdir",
+    "genericpath:isfile": "os.path:isfile",
+    "posix:urandom": "os:urandom",
+}
+"""Place that is not on every system or in every Python -> one that is."""
+NOT_EVERYWHERE = (
+    "cv2",
+    "gnupg",
+    "Cryptodome",
+    "tzlocal",
+    "roslz4",
+    "imp",
+    "distutils",
+    "pwd",
+    "fcntl",
+    "termios",
+    "curses",
+)
+"""Modules that a star does not bring: not all of minirospy's systems have them."""
+
+
+def resolve(place: str) -> object:
+    """Return what `module` or `module:name` means here; None if it does not exist."""
+    module, _, name = place.partition(":")
+    try:
+        found: object = importlib.import_module(module)
+    except ImportError:
+        return None
+    return getattr(found, name, None) if name else found
+
+
+def passed_on() -> str:
+    """Return the text of minirospy/ros/passed_on.py: what stars bring in real ROS, and here from other modules."""
+    lines = []
+    for module, names in described_by(REAL_PYTHON, "--origins").items():
+        by_place: dict[str, list[str]] = {}
+        own = overlay_modules.listed(overlay_modules.modules()[module])
+        for name, places in names.items():
+            if name in own:
+                continue
+            for place in places:
+                place = re.sub(r"^(\w+\.(?:msg|srv))\._\w+:", r"\1:", ELSEWHERE.get(place, place))  # noqa: PLW2901
+                place = re.sub(r"^_(io|heapq|bisect|queue|functools):", r"\1:", place)  # noqa: PLW2901
+                start, _, inner = place.partition(":")
+                if start == module or start.partition(".")[0] in NOT_EVERYWHERE:
+                    continue
+                if start in overlay_modules.modules() and inner:
+                    if inner not in overlay_modules.exported(overlay_modules.modules()[start]):
+                        continue
+                elif resolve(place) is None and place != "builtins:None":
+                    continue
+                key, found = (start, inner) if inner else ("", start)
+                by_place.setdefault(key, []).append(name if name == found else f"{name}={found}")
+                break
+        if by_place:
+            lines.append(f'    "{module}": {{')
+            for place, found_names in sorted(by_place.items()):
+                lines += wrapped(place, sorted(found_names))
+            lines.append("    },")
+    return PASSED_ON_HEAD + "\n".join([*lines, "}", ""])
+
+
+def wrapped(place: str, names: list[str]) -> list[str]:
+    """Return the lines of one entry, as ruff formats them."""
+    words = " ".join(names)
+    if len(words) + len(place) < 90:
+        return [f'        "{place}": "{words}",']
+    parts = textwrap.wrap(words, 90)
+    first = [f'            "{part} "' for part in parts[:-1]]
+    return [f'        "{place}": (', *first, f'            "{parts[-1]}"', "        ),"]
+
+
+PASSED_ON = Path(__file__).resolve().parents[2] / "minirospy" / "ros" / "passed_on.py"
+PASSED_ON_HEAD = '''"""Names that a star (`from rosnode import *`) brings in real ROS because its modules have no ``__all__``.
+
+Generated by `tests/referee/compare_surface.py` from a real ROS 1: do not edit.
+"""
+
+from __future__ import annotations
+
+__all__ = ["PASSED_ON"]
+
+# fmt: off
+# Module -> module that has the names ("" if the names are modules) -> the names, or NAME=NAME_THERE.
+PASSED_ON = {
+'''
+
+
+STANDARD = (
+    "threading", "queue", "io", "math", "itertools", "functools", "operator", "collections", "xmlrpc.client", "xmlrpc.server",
+    "http.server", "urllib.parse", "urllib.request", "subprocess", "socketserver", "errno", "shutil", "copy", "importlib",
+    "xml.dom", "xml.dom.minidom", "xml.sax.saxutils", "xml.etree.ElementTree", "hashlib", "argparse", "optparse", "os",
+    "os.path", "time", "socket", "select", "yaml", "numpy", "builtins", "string", "datetime", "logging", "__future__",
+)  # fmt: skip
+"""Modules of Python and of others whose names ROS's modules import one by one."""
 
 
 def describe_value(value: Any) -> dict[str, Any] | None:
-    """Return the parts of a value that are compared; None if it is not rospy's own."""
+    """Return the parts of a value that are compared; None if it is not of ROS."""
     if isinstance(value, (bool, int, float, str)):
         return {"home": "", "is": repr(value)}
     home = getattr(value, "__module__", None) or ""
-    if inspect.isclass(value) and (home.startswith(OF_ROS) or value.__name__ == "NullHandler"):
+    is_of_ros = home.partition(".")[0] in of_ros()
+    if inspect.isclass(value) and (is_of_ros or value.__name__ == "NullHandler"):
         members = {
             name: parameters(member)
             for name in dir(value)
@@ -378,7 +451,7 @@ def describe_value(value: Any) -> dict[str, Any] | None:
         }  # fmt: skip
         refuses = {"refuses": True} if getattr(value, "_refuses", False) else {}
         return {"home": home, "is": parameters(value), "members": members, "class": True, **refuses}
-    if callable(value) and (home.startswith(OF_ROS) or home == "logging" or inspect.ismethod(value)):
+    if callable(value) and (is_of_ros or home == "logging" or inspect.ismethod(value)):
         return {"home": home, "is": parameters(value)}
     return None
 
@@ -434,25 +507,40 @@ def shown(value: Any) -> str:
     return f"({', '.join(words)})"
 
 
-def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Return (name, real signature, state, note) of a module's names; of those that it only re-exports, the missing ones."""
+def reason_for(module: str, name: str) -> str:
+    """Return the reason why a name is not offered; an empty string if there is none."""
+    if name in REASONS:
+        return REASONS[name]
+    owner = name.partition(".")[0]
+    return next(
+        (
+            reason
+            for start, names, reason in LEFT_OUT
+            if module.startswith(start) and (names == "*" or {name, owner} & set(names.split()))
+        ),
+        MEMBERS_INSIDE.get(name.partition(".")[2], ""),
+    )
+
+
+def rows_of(
+    module: str, real: dict[str, Any], ours: dict[str, Any], star: Iterable[str] = ()
+) -> list[tuple[str, str, str, str]]:
+    """Return (name, real signature, state, note) of a module's names; of those that it only re-exports, the missing ones.
+
+    ``star`` has the names that `from MODULE import *` brings in real ROS only.
+    """
     rows = []
 
     for name, is_real in sorted(real.items(), key=lambda item: item[0].lower()):
         is_ours = ours.get(name)
-        listed_at_home = is_real["home"] != module and is_real["home"] in (*ROSPY, *AROUND, *FRAMES)
-        if is_ours is None and listed_at_home and name not in REASONS:
+        listed_at_home = is_real["home"] != module and is_real["home"] in emulated_modules()
+        reason = reason_for(module, name)
+        if is_ours is None and listed_at_home and not reason and name not in star:
             continue
 
         if is_ours is None:
-            rows.append(
-                (
-                    name,
-                    shown(is_real["is"]),
-                    "left out" if name in REASONS else "missing",
-                    REASONS.get(name, ""),
-                )
-            )
+            state = "left out" if reason else "missing"
+            rows.append((name, shown(is_real["is"]), state, reason))
             continue
 
         if is_ours.get("refuses"):
@@ -471,21 +559,35 @@ def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tup
         for member, signature in is_real.get("members", {}).items():
             at = f"{name}.{member}"
             if member not in is_ours.get("members", {}):
-                rows.append((at, shown(signature), "left out" if member in MEMBERS_INSIDE else "missing",
-                             MEMBERS_INSIDE.get(member, "")))  # fmt: skip
+                reason = reason_for(module, at)
+                rows.append((at, shown(signature), "left out" if reason else "missing", reason))
                 continue
             theirs = is_ours["members"][member]
             state = compare(signature, theirs)
             rows.append((at, shown(signature), state, "" if state == "same" else f"ours: `{shown(theirs)}`"))
 
+    for name in star:
+        if name not in real:
+            reason = reason_for(module, name)
+            rows.append((name, "", "left out" if reason else "missing", reason))
     return rows
 
 
-def page(title: str, modules: list[str], real: Description, ours: Description) -> str:
-    """Return a page's text."""
+Stars = dict[str, list[str]]
+
+
+def page(title: str, name: str, described: tuple[Description, Description], both: tuple[Stars, Stars]) -> str:
+    """Return a page's text, from the descriptions and stars of real ROS and ours."""
+    real, ours = described
+    of_page = [module for module in ours if page_of(module) == name]
+    modules = [module for module in of_page if module in real]
+    unknown = [module for module in of_page if module not in real]
     tables, counts = [], Counter[str]()
     for module in modules:
-        rows = rows_of(module, real[module], ours[module])
+        lacking = sorted({*both[0].get(module, ())} - {*both[1].get(module, ())})
+        rows = rows_of(module, real[module], ours[module], lacking)
+        if not rows:
+            continue
         counts.update(state for _, _, state, _ in rows)
         lines = [f"| `{name}` | `{signature}` | {state} | {note} |" for name, signature, state, note in rows]
         lines = [line.replace("| `` |", "| |") for line in lines]
@@ -507,8 +609,19 @@ takes too. *left out*: an inside that nothing else has a use for. Names that a m
 another are listed once, where they are at home. The `__module__` of a class, which its repr shows, names ours. What the functions
 do is compared by the programs in `tests/referee/cases`; each name called with nothing, None, wrong types and the normal case, by
 `tests/interop/test_interop_called_names.py`, whose differences are in `called_names.json` next to it, each with its reason.
+`from MODULE import *` brings here all that it brings in real ROS, such as `os` and `rospy`, except the names in the tables.
 
-""" + "\n".join(tables)
+""" + "\n".join([*tables, *not_compared(unknown)])
+
+
+def not_compared(modules: list[str]) -> list[str]:
+    """Return the section on the modules that the real ROS of the comparison lacks."""
+    if not modules:
+        return []
+    return [
+        "## Modules that are not compared\n\nThe real ROS that this page is generated from does not have "
+        f"{', '.join(f'`{module}`' for module in modules)}.\n"
+    ]
 
 
 def submodule_tables(real: dict[str, list[str]], ours: dict[str, list[str]]) -> str:
@@ -565,7 +678,13 @@ NOT_OFFERED = {
 
 
 def described_by(python: str, option: str = "--describe") -> dict[str, Any]:
-    done = subprocess.run([python, __file__, option], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [python, "-W", "ignore", __file__, option],
+        env={**os.environ, LISTED: " ".join(emulated_modules())},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     if done.returncode:
         sys.exit(f"{python}: {done.stderr.strip()}")
     description: dict[str, Any] = json.loads(done.stdout)
@@ -586,34 +705,41 @@ def main() -> int:
         "--private", action="store_true", help="print this interpreter's private names, as JSON"
     )
     parser.add_argument("--all-private", action="store_true", help="print those of other modules as well")
+    parser.add_argument("--stars", action="store_true", help="print what each module's star brings, as JSON")
+    parser.add_argument("--origins", action="store_true", help="print where these names come from, as JSON")
     options = parser.parse_args()
+    if options.stars or options.origins:
+        print(json.dumps(stars() if options.stars else origins()))
+        return 0
     if options.describe:
         print(json.dumps(describe()))
         return 0
     if options.private or options.all_private:
         print(json.dumps(private_names(options.all_private)))
         return 0
-    real, ours = described_by(REAL_PYTHON), described_by(sys.executable)
+    pythons = REAL_PYTHON, sys.executable
+    described = described_by(pythons[0]), described_by(pythons[1])
+    both = described_by(pythons[0], "--stars"), described_by(pythons[1], "--stars")
     submodule_text = submodule_tables(
         described_by(REAL_PYTHON, "--private"), described_by(sys.executable, "--all-private")
     )
+    folder = DOCS / "compatibility"
     pages = {
-        DOCS / "compatibility" / "rospy.md": page("rospy and minirospy, name by name", ROSPY, real, ours),
-        DOCS / "compatibility" / "modules.md": page(
-            "rosgraph, rosnode, rostopic and their kin and minirospy, name by name", AROUND, real, ours
+        folder / f"{name}.md": page(f"{title} and minirospy, name by name", name, described, both)
+        for name, title in (
+            ("rospy", "rospy"),
+            ("modules", "rosgraph, rosnode, rostopic and similar modules"),
+            ("tf", "tf2_ros, tf and PyKDL"),
         )
-        + "\n"
-        + submodule_text,
-        DOCS / "compatibility" / "tf.md": page(
-            "tf2_ros, tf and PyKDL and minirospy, name by name", FRAMES, real, ours
-        ),
     }
+    pages[folder / "modules.md"] += "\n" + submodule_text
+    pages[PASSED_ON] = passed_on()
     status = 0
 
     for path, text in pages.items():
         if not options.check:
             path.write_text(text)
-            print(path.name, *text.split("\n\n")[2:3])
+            print(path.name, *text.split("\n\n")[2:3] if path.suffix == ".md" else ())
         elif not path.exists() or path.read_text() != text:
             print(f"{path} is not up to date: run {sys.executable} {__file__}", file=sys.stderr)
             status = 1

@@ -23,6 +23,7 @@ from minirospy.base.errors import BridgeError, DeserializationError
 from minirospy.core.graph.goals import GoalState
 from minirospy.introspect.snapshot import Snapshot
 from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, GoalError
+from minirospy.ros2.action_codecs import empty_message
 from minirospy.ros2.action_links import ActionLink, action_links
 from minirospy.ros2.action_messages import (
     GoalId,
@@ -34,7 +35,6 @@ from minirospy.ros2.action_messages import (
     status_and_body,
     statuses_message,
 )
-from minirospy.ros2.actions import empty_message
 from minirospy.ros2.bridge import Ros2Bridge, Ros2Options
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.links import BRIDGE_PREFIX, Direction
@@ -136,7 +136,7 @@ def test_rules_name_actions_and_their_fields() -> None:
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Send no request before the server is reachable."""
-    monkeypatch.setattr("minirospy.ros2.reach._MAX_SECONDS", LIMIT)
+    monkeypatch.setattr("minirospy.ros2.reach.MAX_SECONDS", LIMIT)
 
 
 def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any]) -> None:
@@ -203,8 +203,8 @@ async def end_of(goal: Any) -> tuple[GoalState, list[int]]:
 
 @pytest.mark.usefixtures("master")
 def test_a_goal_waits_until_responses_of_the_server_arrive(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros2.action_to_ros2._REACH_SECONDS", 0.01)
-    monkeypatch.setattr("minirospy.ros2.reach._AGAIN_SECONDS", 0.01)
+    monkeypatch.setattr("minirospy.ros2.action_to_ros2.REACH_SECONDS", 0.01)
+    monkeypatch.setattr("minirospy.ros2.reach.AGAIN_SECONDS", 0.01)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         side.offered = SEND_GOAL
@@ -439,7 +439,7 @@ def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
 
 def test_server_of_rclpy_is_destroyed_once_results_are_sent(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sending a result takes several rounds of the executor: destroying the server earlier leaves its client waiting."""
-    monkeypatch.setattr("minirospy.ros2.rclpy_actions._CLOSE_SECONDS", LIMIT)
+    monkeypatch.setattr("minirospy.ros2.rclpy_actions.CLOSE_SECONDS", LIMIT)
     order: list[str] = []
     tasks: queue.Queue[Callable[[], object] | None] = queue.Queue()
 
@@ -507,7 +507,7 @@ def test_a_goal_that_is_accepted_too_late_is_cancelled(monkeypatch: pytest.Monke
     ["", "/", "/x", ".a/b", "os.path/x", "std_srvs/a.b", "a b/c", "a/\x00", "A_msgs/B", "a__b/C", "a_/B"],
 )
 def test_a_type_that_is_not_a_name_is_never_imported(type_: str) -> None:
-    for found in (RclpySide._class, RclpySide._service_class, RclpySide._action_class):
+    for found in (RclpySide.message_class, RclpySide.service_class, RclpySide.action_class):
         with pytest.raises(TypesDiffer):
             found(type_)
 
@@ -525,14 +525,14 @@ def test_only_packages_of_interfaces_are_imported(tmp_path: Path, monkeypatch: p
 
     for type_ in ("plain_tool/Fly", "fly_msgs/Fly", "antigravity/Fly", "this/Fly", "nothing_of_the_name/Fly"):
         with pytest.raises(TypesDiffer):
-            RclpySide._class(type_)
+            RclpySide.message_class(type_)
     assert not imported
     assert "antigravity" not in sys.modules
 
     (tmp_path / "fly_msgs" / "fly_msgs_s__rosidl_typesupport_c.so").write_text("")
     with (tmp_path / "fly_msgs" / "msg" / "__init__.py").open("a") as file:
         file.write("class Fly:\n    get_fields_and_field_types = lambda: {}\n")
-    assert RclpySide._class("fly_msgs/Fly").__name__ == "Fly"
+    assert RclpySide.message_class("fly_msgs/Fly").__name__ == "Fly"
     assert imported == {"fly_msgs"}
     for name in ("fly_msgs.msg", "fly_msgs"):
         sys.modules.pop(name)

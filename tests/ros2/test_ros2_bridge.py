@@ -25,12 +25,12 @@ from minirospy.core.idl.load import message_class
 from minirospy.core.tf2.statics import StaticTransforms
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.introspect.snapshot import Snapshot, fetch
-from minirospy.ros2.bridge import Ros2Bridge, Ros2Options, _Passing
+from minirospy.ros2.bridge import Ros2Bridge, Ros2Options, TopicPassing
+from minirospy.ros2.interface import Accept, Ros2Goal
 from minirospy.ros2.layouts import TypesDiffer
 from minirospy.ros2.link_table import Pair
 from minirospy.ros2.links import BRIDGE_PREFIX, Direction, Link, Ros2End, Ros2Topic, links, marker
 from minirospy.ros2.parameter_values import Value
-from minirospy.ros2.rclpy_actions import Accept, Ros2Goal
 from minirospy.ros2.rclpy_parameters import ParameterStore
 from minirospy.ros2.rules import BUILT_IN, Rules, parse_rules, snake_case
 from minirospy.ros2.side import large_message_settings
@@ -554,7 +554,7 @@ def test_messages_from_ros2_are_not_sent_back() -> None:
 
 @pytest.mark.usefixtures("master")
 def test_publishers_that_do_not_answer_keep_no_topic_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros2.bridge._QUERY_SECONDS", 1.0)
+    monkeypatch.setattr("minirospy.ros2.bridge.QUERY_SECONDS", 1.0)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         topics = [f"/dead{number}" for number in range(40)]
@@ -562,7 +562,7 @@ def test_publishers_that_do_not_answer_keep_no_topic_waiting(monkeypatch: pytest
             uri = f"http://127.0.0.1:{silent.getsockname()[1]}/"
             async with Node("dead", rosout=False) as dead:
                 for topic in topics:
-                    await dead._node.master("registerPublisher", topic, "std_msgs/String", uri)
+                    await dead.call_master("registerPublisher", topic, "std_msgs/String", uri)
             await node.advertise("/live", raw("std_msgs/String"))
             side.graph = {topic: Ros2Topic(subscribers=(STRING,)) for topic in [*topics, "/live"]}
             await asyncio.wait_for(bridge.look(), 60.0)
@@ -606,7 +606,7 @@ def test_link_that_cannot_be_opened_leaves_nothing_open() -> None:
         side.subscribe = subscribe  # type: ignore[method-assign]
         await bridge.look()
         assert list(bridge.topics.refused.values()) == ["no room"]
-        assert "/t" not in (await fetch(node._node.master)).publishers
+        assert "/t" not in (await fetch(node.call_master)).publishers
         assert subscription.topic == "/t"
 
     bridged(scene)
@@ -654,7 +654,7 @@ def test_static_transforms_over_the_limit_are_reported(
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         link = Link("/tf_static", Direction.TO_ROS2, "tf2_msgs/TFMessage", "tf2_msgs/TFMessage", True)
-        passing = _Passing(bridge, link, cast("Any", None))
+        passing = TopicPassing(bridge, link, cast("Any", None))
         for _ in range(3):
             assert passing._with_statics(transforms("a", "b")) == transforms("a")
 
@@ -665,7 +665,7 @@ def test_static_transforms_over_the_limit_are_reported(
 
 @pytest.mark.usefixtures("master")
 def test_types_that_peers_make_up_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.introspect.type_texts._MAX_NAMES", 10)
+    monkeypatch.setattr("minirospy.introspect.type_texts.MAX_NAMES", 10)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         texts = bridge._texts

@@ -15,7 +15,7 @@ from minirospy.ros2.parameter_values import Value
 from minirospy.ros2.rclpy_actions import ActionClient, ActionServer
 from minirospy.ros2.rclpy_calls import Calls
 from minirospy.ros2.rclpy_parameters import NodeParameters, ParameterServer
-from minirospy.ros2.side import _Publisher, _Subscription
+from minirospy.ros2.side import TopicPublisher, TopicSubscription
 
 
 def test_a_server_is_reached_by_the_parameters_of_its_own_process(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -53,7 +53,7 @@ def test_a_server_is_reached_by_the_parameters_of_its_own_process(monkeypatch: p
 
 def test_parameters_are_requested_until_the_first_response(monkeypatch: pytest.MonkeyPatch) -> None:
     """A node that has not discovered the client yet answers, but the response is lost."""
-    monkeypatch.setattr("minirospy.ros2.rclpy_parameters._AGAIN_SECONDS", 0.01)
+    monkeypatch.setattr("minirospy.ros2.rclpy_parameters.AGAIN_SECONDS", 0.01)
     sent: list[tuple[bytes, Future[bytes]]] = []
 
     class Client:
@@ -129,8 +129,8 @@ def test_ends_of_rclpy_are_destroyed_in_the_executors_thread(monkeypatch: pytest
     calls = Calls(node, executor)
     class_: Any = SimpleNamespace(Impl=SimpleNamespace(FeedbackMessage=None))
     ends: list[Any] = [
-        _Publisher(calls, node, node.create_publisher()),
-        _Subscription(calls, node, class_, "/t", print, cast("Any", None)),
+        TopicPublisher(calls, node, node.create_publisher()),
+        TopicSubscription(calls, node, class_, "/t", print, cast("Any", None)),
         calls.client("/s", class_),
         calls.server("/s", class_, cast("Any", None)),
         ActionClient(calls, "/a", class_),

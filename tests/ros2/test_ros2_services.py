@@ -70,7 +70,7 @@ def test_renamed_service_types_find_their_partner() -> None:
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Send no request before the server is reachable."""
-    monkeypatch.setattr("minirospy.ros2.reach._MAX_SECONDS", LIMIT)
+    monkeypatch.setattr("minirospy.ros2.reach.MAX_SECONDS", LIMIT)
 
 
 def bridged(
@@ -303,7 +303,7 @@ def test_call_waits_longer_for_a_busy_server_than_a_probe(monkeypatch: pytest.Mo
         port = server.sockets[0].getsockname()[1]
         async with server, Node("caller", rosout=False) as node:
             uri = f"rosrpc://127.0.0.1:{port}"
-            await node._node.master("registerService", "/late", uri, "http://127.0.0.1:1")
+            await node.call_master("registerService", "/late", uri, "http://127.0.0.1:1")
             with pytest.raises(ServiceException, match="cannot be reached"):
                 await service_header(node, "/late")
             assert await call_raw(node, "/late", "*", b"") == b"done"

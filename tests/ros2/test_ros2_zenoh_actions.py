@@ -56,7 +56,7 @@ SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wait longer than a machine may stall."""
-    for module, name in (("zenoh_actions", "_CLOSE_SECONDS"), ("zenoh_parameters", "_SECONDS")):
+    for module, name in (("zenoh_actions", "CLOSE_SECONDS"), ("zenoh_parameters", "ANSWER_SECONDS")):
         monkeypatch.setattr(f"minirospy.ros2.{module}.{name}", LIMIT)
 
 

@@ -15,7 +15,7 @@ from minirospy import Node
 from minirospy.aio.raw import raw_class
 from minirospy.core.idl.load import message_class
 from minirospy.core.wire.tcpros import InterfaceType
-from minirospy.ros2.bridge import Ros2Bridge, _ToRos2
+from minirospy.ros2.bridge import PassingToRos2, Ros2Bridge
 from minirospy.ros2.links import Direction
 from tests.ros2.ros2_definitions import typestore
 from tests.ros2.test_ros2_zenoh import LIMIT, RmwNode, domain, endpoint, node, zenoh
@@ -96,7 +96,7 @@ class Ros1:
         """Return whether the bridge's subscription is connected."""
         for link, passing in self.bridge.topics.links.items():
             if link.topic == topic and link.direction is Direction.TO_ROS2:
-                assert isinstance(passing, _ToRos2)
+                assert isinstance(passing, PassingToRos2)
                 return bool(passing._subscription and passing._subscription.headers)
         return False
 

@@ -31,11 +31,11 @@ def clock() -> Clock:
 def guard(clock: Clock) -> Iterator[StopGuard]:
     guard = StopGuard(clock)
     yield guard
-    for stop in list(guard._deadlines):
+    for stop in list(guard.deadlines):
         guard.disarm(stop)
     # An earlier deadline wakes the thread, which then exits.
     guard.arm(_nothing, float("-inf"))
-    wait_until(lambda: guard._thread is None)
+    wait_until(lambda: guard.thread is None)
 
 
 def _nothing() -> None:
@@ -57,7 +57,7 @@ def test_silent_item_is_stopped_once_in_another_thread(guard: StopGuard, clock: 
     guard.arm(stop, clock.now)
     assert called.wait(60)
     assert threads == ["stop-guard"]
-    wait_until(lambda: guard._thread is None)
+    wait_until(lambda: guard.thread is None)
     assert threads == ["stop-guard"]
 
 
@@ -106,4 +106,4 @@ def test_nothing_is_driven_without_a_thread(guard: StopGuard, monkeypatch: pytes
         patched.setattr(threading.Thread, "start", refuse)
         with pytest.raises(BridgeError, match="nothing is driven: no thread"):
             guard.arm(_nothing, 0.0)
-    assert not guard._deadlines
+    assert not guard.deadlines

@@ -280,7 +280,7 @@ def test_silent_connection_is_closed_after_10_seconds(caplog: pytest.LogCaptureF
         async with graph("/n") as (_, (node,)):
             with socket.create_connection(("127.0.0.1", node.tcpros_port)) as peer:
                 peer.setblocking(False)
-                await until(lambda: node._listener._handshakes)
+                await until(lambda: node.listener.handshakes)
                 await clock.advance(9.9)
                 assert is_open(peer)
                 await clock.advance(0.2)

@@ -37,15 +37,15 @@ class Running:
     """A bridge and other nodes of the same graph, on one loop."""
 
     def __init__(self, options: BridgeOptions, **parts: Any) -> None:
-        self._loop = LoopThread("test-bridge")
+        self.loop = LoopThread("test-bridge")
         self._options = options
         self._parts = parts
-        self._nodes: list[Node] = []
+        self.nodes: list[Node] = []
         self._clients: list[Client | RosbridgeClient] = []
         try:
             self.bridge: Bridge = self.run(self._start())
         except BaseException:
-            self._loop.close()
+            self.loop.close()
             raise
 
     @property
@@ -53,7 +53,7 @@ class Running:
         return self.bridge.listeners["foxglove"].port
 
     def run(self, work: Coroutine[object, object, _T]) -> _T:
-        return self._loop.run(work, 60.0)
+        return self.loop.run(work, 60.0)
 
     def call(self, function: Callable[[], _T]) -> _T:
         """Call a function on the loop."""
@@ -67,7 +67,7 @@ class Running:
         async def start() -> Node:
             node = Node(name, rosout=False)
             await node.start()
-            self._nodes.append(node)
+            self.nodes.append(node)
             return node
 
         return self.run(start())
@@ -92,7 +92,7 @@ class Running:
         for client in self._clients:
             client.close()
         self.run(self._close())
-        self._loop.close()
+        self.loop.close()
 
     async def _start(self) -> Bridge:
         node = Node("bridge", rosout=False)
@@ -104,12 +104,12 @@ class Running:
             await bridge.close()
             await node.close()
             raise
-        self._nodes.append(node)
+        self.nodes.append(node)
         return bridge
 
     async def _close(self) -> None:
         await self.bridge.close()
-        for node in reversed(self._nodes):
+        for node in reversed(self.nodes):
             await node.close()
         left = asyncio.all_tasks() - {asyncio.current_task()}
         assert not [task for task in left if _is_of_the_bridge(task)], left
@@ -135,7 +135,7 @@ class Client:
         self.socket: ClientConnection = self._stack.enter_context(opening)
         self.channels: dict[str, dict[str, Any]] = {}
         self.services: dict[str, dict[str, Any]] = {}
-        self._kept: list[dict[str, Any] | bytes] = []
+        self.kept: list[dict[str, Any] | bytes] = []
 
     def send(self, **fields: Any) -> None:
         self.socket.send(json.dumps(fields))
@@ -145,11 +145,11 @@ class Client:
 
     def next(self, op: str, accepts: Callable[[dict[str, Any]], bool] = lambda _: True) -> dict[str, Any]:
         """Return the next JSON message with this op that ``accepts`` accepts."""
-        return self._next(lambda each: isinstance(each, dict) and each["op"] == op and accepts(each))  # type: ignore[return-value]
+        return self.next_accepted(lambda each: isinstance(each, dict) and each["op"] == op and accepts(each))  # type: ignore[return-value]
 
     def next_binary(self, opcode: int) -> bytes:
         """Return the next binary message with this opcode."""
-        return self._next(lambda each: isinstance(each, bytes) and each[0] == opcode)  # type: ignore[return-value]
+        return self.next_accepted(lambda each: isinstance(each, bytes) and each[0] == opcode)  # type: ignore[return-value]
 
     def channel(self, topic: str) -> int:
         """Return a topic's channel once it is advertised."""
@@ -169,10 +169,10 @@ class Client:
     def close(self) -> None:
         self._stack.close()
 
-    def _next(self, accepts: Callable[[dict[str, Any] | bytes], bool]) -> dict[str, Any] | bytes:
-        for number, each in enumerate(self._kept):
+    def next_accepted(self, accepts: Callable[[dict[str, Any] | bytes], bool]) -> dict[str, Any] | bytes:
+        for number, each in enumerate(self.kept):
             if accepts(each):
-                return self._kept.pop(number)
+                return self.kept.pop(number)
         while True:
             data = self.socket.recv(timeout=30)
             each = json.loads(data) if isinstance(data, str) else data
@@ -180,7 +180,7 @@ class Client:
                 self._learn(each)
             if accepts(each):
                 return each
-            self._kept.append(each)
+            self.kept.append(each)
 
     def _learn(self, fields: dict[str, Any]) -> None:
         for kind, table in (("channels", self.channels), ("services", self.services)):
@@ -199,22 +199,22 @@ class RosbridgeClient:
         options = {"max_size": None, **_PATIENT_CLIENT, **options}
         opening = connect(f"ws://127.0.0.1:{port}{path}", compression=None, **options)
         self.socket: ClientConnection = self._stack.enter_context(opening)
-        self._kept: list[dict[str, Any]] = []
+        self.kept: list[dict[str, Any]] = []
 
     def send(self, **fields: Any) -> None:
         self.socket.send(json.dumps(fields))
 
     def next(self, op: str, **fields: Any) -> dict[str, Any]:
         """Return the next message with this op and these fields."""
-        for number, each in enumerate(self._kept):
+        for number, each in enumerate(self.kept):
             if _has(each, op, fields):
-                return self._kept.pop(number)
+                return self.kept.pop(number)
         while True:
             data = self.socket.recv(timeout=30)
             found: dict[str, Any] = json.loads(data) if isinstance(data, str) else cbor2.loads(data)
             if _has(found, op, fields):
                 return found
-            self._kept.append(found)
+            self.kept.append(found)
 
     def call(self, service: str, args: object = None, **options: Any) -> dict[str, Any]:
         """Return the response to a service call."""

@@ -203,9 +203,9 @@ def test_shedding_does_not_choose_again_within_itself() -> None:
     assert account.total == 60
     first.set(70)
     assert order == ["first starts", "first ends"] * 2
-    assert not account._holders
+    assert not account.holders
     piece = bytes(LARGE_PIECE)
     account.hold((piece, piece))
-    assert list(account._holders.values()) == [2]
+    assert list(account.holders.values()) == [2]
     account.release((piece, piece))
-    assert not account._holders
+    assert not account.holders

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def test_diagnostics_name_clients_and_warn_of_drops(
     run_bridge: Callable[..., Running], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bridge_module, "_DIAGNOSTICS_SECONDS", 0.05)
+    monkeypatch.setattr(bridge_module, "DIAGNOSTICS_SECONDS", 0.05)
     bridge = run_bridge(diagnostics=True, limits=Limits(queue=500_000, silent_seconds=1000.0))
     publisher = bridge.publisher(bridge.node("camera"), "/image", UInt8MultiArray, queue_size=1000)
     monitor = bridge.node("monitor")

@@ -425,17 +425,17 @@ def test_restarted_publisher_is_connected_again(bridge: Running) -> None:
     assert text_of(client.next_binary(1))[1] == "first"
 
     async def restart() -> None:
-        bridge.bridge.graph._max_refresh_interval = 1000.0
+        bridge.bridge.graph.max_refresh_interval = 1000.0
         await node.close()
         again = Node("talker", rosout=False)
         await again.start()
-        bridge._nodes.append(again)
+        bridge.nodes.append(again)
         second = await again.advertise("/chatter", String, latch=True)
         await second.publish("second")
 
     bridge.run(restart())
     while True:
-        each = client._next(lambda each: isinstance(each, bytes) or each["op"] == "advertise")
+        each = client.next_accepted(lambda each: isinstance(each, bytes) or each["op"] == "advertise")
         if isinstance(each, bytes):
             assert text_of(each)[1] == "second"
             break
@@ -518,7 +518,7 @@ def test_faults_of_one_message_are_reported_up_to_a_limit(bridge: Running) -> No
     client.send(op="subscribe", subscriptions=[{"id": 1, "channelId": 999_999}] * 2000)
     client.send(op="getParameters", parameterNames=["/none"], id="behind")
     texts = []
-    while (fields := client._next(lambda each: isinstance(each, dict)))["op"] != "parameterValues":  # type: ignore[call-overload]
+    while (fields := client.next_accepted(lambda each: isinstance(each, dict)))["op"] != "parameterValues":  # type: ignore[call-overload]
         if fields["op"] == "status":  # type: ignore[call-overload]
             texts.append(fields["message"])  # type: ignore[call-overload]
     assert texts[:99] == ["Channel 999999 is not available; ignoring subscription 1"] * 99

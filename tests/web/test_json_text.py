@@ -41,7 +41,7 @@ def outcome(load: Any, text: str) -> str:
 
 @pytest.fixture(autouse=True)
 def _small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(json_text, "_PIECE", 8)
+    monkeypatch.setattr(json_text, "PIECE_NUMBERS", 8)
 
 
 @given(VALUES, st.sampled_from([None, 0, 3]), st.booleans())

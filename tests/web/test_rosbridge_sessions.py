@@ -439,7 +439,7 @@ def test_unadvertised_topic_lasts_for_the_timeout(run_bridge: Callable[..., Runn
     client.synchronize()
 
     async def unadvertised() -> None:
-        await until(lambda: "/x" not in bridge.bridge.graph._publishers)
+        await until(lambda: "/x" not in bridge.bridge.graph.publishers)
 
     bridge.run(asyncio.wait_for(unadvertised(), 30))
 
@@ -544,7 +544,7 @@ def test_status_level_selects_what_is_sent(bridge: Running) -> None:
     client.send(op="jump")
     client.send(op="set_level", level="error")
     client.synchronize()
-    assert not [each for each in client._kept if each["op"] == "status"]
+    assert not [each for each in client.kept if each["op"] == "status"]
 
 
 def test_globs_hide_topics_and_services(run_bridge: Callable[..., Running]) -> None:
@@ -746,7 +746,7 @@ def test_operation_of_a_client_that_has_left_is_never_started(bridge: Running) -
         session.ended()
 
     async def settle() -> None:
-        await asyncio.gather(*bridge.bridge.graph._tasks, return_exceptions=True)
+        await asyncio.gather(*bridge.bridge.graph.tasks, return_exceptions=True)
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

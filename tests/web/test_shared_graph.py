@@ -31,7 +31,7 @@ def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running,
             await asyncio.sleep(0)
         publication.close()
         # Raise the tasks' exceptions.
-        await asyncio.wait_for(asyncio.gather(*graph._tasks), 30)
+        await asyncio.wait_for(asyncio.gather(*graph.tasks), 30)
         assert "/short" not in graph.node._published
 
     bridge.run(advertise_and_close())
@@ -40,13 +40,13 @@ def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running,
 def test_silent_nodes_do_not_delay_queries_of_others(
     bridge: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("minirospy.web.foxglove.channels._SECONDS", 1.0)
+    monkeypatch.setattr("minirospy.web.foxglove.channels.TYPE_SECONDS", 1.0)
     bridge.publisher(bridge.node("talker"), "/chatter", String)
     with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
 
         async def register() -> None:
-            master = bridge.bridge.node._node.master
+            master = bridge.bridge.node.call_master
             for number in range(20):
                 uri = f"http://{address}/"
                 await master("registerPublisher", f"/t{number}", "odd_msgs/Odd", uri)
@@ -83,7 +83,7 @@ def test_service_whose_node_answers_late_is_offered(bridge: Running) -> None:
         address = f"127.0.0.1:{server.getsockname()[1]}"
 
         async def register() -> None:
-            master = bridge.bridge.node._node.master
+            master = bridge.bridge.node.call_master
             await master("registerService", "/late", f"rosrpc://{address}", f"http://{address}/")
 
         bridge.run(register())

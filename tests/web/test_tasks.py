@@ -156,7 +156,7 @@ def test_watch_of_the_fleets_robots_goes_on(
         await snapshot.wait()
         await made.close()
 
-    monkeypatch.setattr("minirospy.fleet.importer._LOOK_SECONDS", 0.01)
+    monkeypatch.setattr("minirospy.fleet.importer.LOOK_SECONDS", 0.01)
     asyncio.run(run())
     assert len(reported(caplog)) == 1
 
@@ -176,7 +176,7 @@ def test_query_of_the_fleet_that_fails_is_no_answer_of_any_robot() -> None:
 def test_robot_that_cannot_be_shown_does_not_affect_others(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("minirospy.fleet.importer._AGAIN_SECONDS", 0.01)
+    monkeypatch.setattr("minirospy.fleet.importer.AGAIN_SECONDS", 0.01)
 
     async def run() -> None:
         made = importer(asyncio.ensure_future)

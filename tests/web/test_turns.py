@@ -284,3 +284,27 @@ def test_new_clients_start_at_the_same_tag_if_none_waits() -> None:
         machine.iterate()
     # The client that needs less goes first: the time that it used before it was idle does not count.
     assert machine.done[:2] == ["good", "idle"]
+
+
+def test_known_client_goes_before_new_ones_that_have_had_a_slice() -> None:
+    """250 clients that start to flood the server at once do not delay a client that has sent short requests before."""
+    machine = Machine()
+    machine.join("good", 0.002)
+    for _ in range(10):
+        machine.send("good", 1)
+        machine.now += 0.05
+    for number in range(250):
+        machine.join(f"bad{number}", 0.001)
+        machine.send(f"bad{number}", 100_000)
+    while len(set(machine.done)) < 251:
+        machine.iterate()
+
+    waits = []
+    for _ in range(20):
+        machine.send("good", 1)
+        before = len(machine.done)
+        while machine.left["good"]:
+            machine.iterate()
+        waits.append(machine.done[before:].index("good"))
+        machine.iterate()
+    assert max(waits) <= 12

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let requests wait longer for an image than a machine may stall."""
-    monkeypatch.setattr("minirospy.web.video.pages._SNAPSHOT_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.web.video.pages.SNAPSHOT_SECONDS", 60.0)
 
 
 def image(encoding: str, array: np.ndarray[Any, Any]) -> Image:
@@ -281,9 +281,9 @@ def test_client_that_leaves_early_leaves_no_subscription(camera: Running, path: 
     exchange: Any = Mock(request=request, is_open=False)
 
     async def serve() -> None:
-        bridge._video.handlers[path](exchange)
-        await asyncio.gather(*bridge.graph._tasks)
+        bridge.video.handlers[path](exchange)
+        await asyncio.gather(*bridge.graph.tasks)
 
     camera.run(serve())
-    assert not bridge._video._feeds
+    assert not bridge.video.feeds
     assert "/camera/image" not in bridge.graph.topics

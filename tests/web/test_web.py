@@ -228,7 +228,7 @@ def test_client_that_answers_pings_stays_connected(run_bridge: Callable[..., Run
     client.socket.ping().wait(30)
     (connection,) = bridge.bridge.listeners["foxglove"].connections
     # From now on, the connection sends nothing without a request.
-    liveness = connection._liveness
+    liveness = connection.liveness
     heard = liveness.received
     wait_until(lambda: liveness.received > heard)
     assert_alive(client)
@@ -475,7 +475,7 @@ def test_message_rate_is_held_back_and_nothing_is_lost(run_bridge: Callable[...,
     bridge = run_bridge(limits=Limits(messages_a_second=50))
     start_time, all_sent = time.monotonic(), threading.Event()
     client, other = bridge.client(), bridge.client()
-    bridge._loop.post(all_sent.wait)
+    bridge.loop.post(all_sent.wait)
     for number in range(120):
         client.send(op="getParameters", parameterNames=["/none"], id=str(number))
     all_sent.set()
@@ -569,14 +569,14 @@ def connected(
     connection.received(HANDSHAKE.encode())
     loop.iterate()
     pipe.reset_mock()
-    framed = connection._framed
+    framed = connection.framed
 
     def counted(frame: Frame) -> None:
         loop.frames += 1
         loop.now += seconds_of_frame
         framed(frame)
 
-    connection._framed = counted  # type: ignore[method-assign]
+    connection.framed = counted  # type: ignore[method-assign]
     return loop, connection, pipe
 
 
@@ -605,10 +605,10 @@ def test_frames_of_any_kind_count_toward_the_rate(kind: str) -> None:
     pipe.pause.assert_called()
     pipe.resume.assert_not_called()
     loop.now += 1.0
-    connection._go_on()
+    connection.go_on()
     assert loop.frames == 8000
     loop.now += 1.0
-    connection._go_on()
+    connection.go_on()
     assert loop.frames == 10_000
     pipe.resume.assert_called()
 
@@ -618,9 +618,9 @@ def test_clients_with_more_rights_have_more_of_the_loop_and_longer_messages(
     grant: Grant, weight: float
 ) -> None:
     _, connection, _ = connected(Limits(), 0.0, grant)
-    assert connection._turn.weight == weight
-    new = Connection(connection._site, Mock(is_full=False), "127.0.0.1", connection._loop)
-    assert new._turn.weight < 1.0
+    assert connection.turn.weight == weight
+    new = Connection(connection.site, Mock(is_full=False), "127.0.0.1", connection.loop)
+    assert new.turn.weight < 1.0
     connection.received(b"\x81\xff" + (65_537).to_bytes(8, "big") + bytes(4))
     connection.received(bytes(100))
     assert connection.is_open is (grant is not Grant.READ)
@@ -772,12 +772,12 @@ def test_clients_are_pinged_before_they_are_disconnected() -> None:
     loop.iterate()
 
     loop.now = 1000.0
-    connection._ping()
+    connection.ping()
     loop.iterate()
     assert pipe.write.call_args.args[0][-1].endswith(b"minirospy")
     pipe.close.assert_not_called()
     loop.now = 1020.0
-    connection._ping()
+    connection.ping()
     pipe.close.assert_called_once_with(flush=False)
 
 
@@ -839,7 +839,7 @@ def test_encrypted_connections_are_served(run_bridge: Callable[..., Running], tm
     bridge = run_bridge(certificate=str(certificate), key=str(key))
     context = ssl.create_default_context(cafile=str(certificate))
     bridge.publisher(bridge.node("talker"), "/t", UInt8MultiArray, latch=True)
-    publisher = bridge.publisher(bridge._nodes[-1], "/big", UInt8MultiArray, latch=True)
+    publisher = bridge.publisher(bridge.nodes[-1], "/big", UInt8MultiArray, latch=True)
     data = bytes(range(256)) * 20_000
     bridge.run(publisher.publish(data=data))
     client = bridge.client(scheme="wss", ssl=context)

@@ -289,6 +289,61 @@ def test_a_compiler_is_not_needed(scene: Scene) -> None:
     assert scene.build()["cpp"].plan.skipped == ("talker", "cpp_lib")
 
 
+def test_minirospys_program_stands_in_for_a_compiled_one(scene: Scene) -> None:
+    folder = scene.package(
+        "joy",
+        "include(CheckIncludeFiles)\ncheck_include_files(linux/joystick.h FOUND)\n"
+        "if(FOUND)\nadd_executable(joy_node a.cpp)\nendif()",
+    )
+    scene.package(
+        "tf2_ros",
+        "add_executable(${PROJECT_NAME}_x a.cpp)\nadd_executable(unknown a.cpp)\n"
+        "set_target_properties(${PROJECT_NAME}_x PROPERTIES OUTPUT_NAME static_transform_publisher)",
+    )
+    reports = scene.build()
+    assert reports["joy"].stand_ins == "joy_node"
+    assert reports["tf2_ros"].stand_ins == "static_transform_publisher"
+
+    program = scene.devel / "lib" / "tf2_ros" / "static_transform_publisher"
+    done = subprocess.run([sys.executable, program], capture_output=True, text=True, check=False)
+    assert "Usage: static_transform_publisher x y z" in done.stdout
+    assert catkin_make(["-C", str(scene.root), "install"]) == 0
+    installed = scene.root / "install" / "lib" / "tf2_ros" / program.name
+    assert installed.read_bytes() == program.read_bytes()
+    assert os.access(installed, os.X_OK)
+
+    file = folder / "CMakeLists.txt"
+    file.write_text(file.read_text().replace("joy_node", "other_node"))
+    assert scene.build()["joy"].stand_ins == ""
+    assert not (scene.devel / "lib" / "joy" / "joy_node").exists()
+
+
+def test_minirospys_module_stands_in_for_a_compiled_one(scene: Scene) -> None:
+    setup = (
+        "from distutils.core import setup\nfrom catkin_pkg.python_setup import generate_distutils_setup\n"
+        "setup(**generate_distutils_setup(packages=['{}'], package_dir={{'': 'src'}}))"
+    )
+    scene.package(
+        "tf2_py",
+        "catkin_python_setup()\nadd_library(tf2_py a.cpp)\n"
+        'set_target_properties(tf2_py PROPERTIES OUTPUT_NAME tf2 PREFIX "_" SUFFIX ".so")',
+        files={"setup.py": setup.format("tf2_py"), "src/tf2_py/__init__.py": "from ._tf2 import *\n"},
+    )
+    scene.package(
+        "cv_bridge",
+        "catkin_python_setup()\nadd_library(${PROJECT_NAME}_boost a.cpp)",
+        files={"setup.py": setup.format("cv_bridge"), "src/cv_bridge/__init__.py": "here = 1\n"},
+    )
+    reports = scene.build()
+    assert reports["tf2_py"].stand_ins == "tf2_py._tf2"
+    assert reports["cv_bridge"].stand_ins == "cv_bridge.boost.cv_bridge_boost"
+    code = (
+        "import cv_bridge, tf2_py\nfrom cv_bridge.boost.cv_bridge_boost import getCvType\n"
+        "print(cv_bridge.here, getCvType('bgr8'), hasattr(tf2_py.BufferCore, 'lookup_transform_core'))"
+    )
+    assert python(scene, code) == "1 16 True\n"
+
+
 # --- mistakes
 
 

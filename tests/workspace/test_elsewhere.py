@@ -19,15 +19,15 @@ from minirospy.workspace.packages import Packages, built_in_roots
 OVERLAY = Path(elsewhere.__file__).parents[1] / "overlay"
 TABLE = sorted(
     {
-        *elsewhere._CPP,
-        *elsewhere._INSTEAD,
-        *elsewhere._QT_PLUGINS,
-        *elsewhere._QT_LIBRARIES,
+        *elsewhere.CPP,
+        *elsewhere.INSTEAD,
+        *elsewhere.QT_PLUGINS,
+        *elsewhere.QT_LIBRARIES,
     }
 )
 
 
-@pytest.mark.parametrize("name", [*TABLE, *elsewhere._MESSAGES])
+@pytest.mark.parametrize("name", [*TABLE, *elsewhere.MESSAGES])
 def test_advice_is_one_line_that_names_what_to_type(name: str) -> None:
     text = advice(name)
     assert "\n" not in text
@@ -38,7 +38,7 @@ def test_advice_is_one_line_that_names_what_to_type(name: str) -> None:
 def test_plug_ins_with_a_view_have_programs() -> None:
     plug_ins = {each.package or each.command for each in WINDOWS}
     assert plug_ins <= set(Packages.below(*built_in_roots()).names())
-    assert plug_ins & {*elsewhere._QT_PLUGINS, *elsewhere._QT_LIBRARIES} <= {"rqt_gui"}
+    assert plug_ins & {*elsewhere.QT_PLUGINS, *elsewhere.QT_LIBRARIES} <= {"rqt_gui"}
 
 
 def test_unknown_names_have_no_advice() -> None:

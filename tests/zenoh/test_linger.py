@@ -55,8 +55,8 @@ def test_links_of_a_router_do_not_linger(monkeypatch: pytest.MonkeyPatch) -> Non
         return found[-1]
 
     monkeypatch.setattr(LingerRemover, "look", looked)
-    monkeypatch.setattr("minirospy.fleet.network._LINGER_SECONDS", 0.05)
-    monkeypatch.setattr("minirospy.zenoh.linger._LOOKS", 10_000)
+    monkeypatch.setattr("minirospy.fleet.network.LINGER_SECONDS", 0.05)
+    monkeypatch.setattr("minirospy.zenoh.linger.LOOKS", 10_000)
 
     async def run() -> None:
         endpoint = f"tcp/127.0.0.1:{free_port()}"

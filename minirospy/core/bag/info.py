@@ -30,10 +30,10 @@ __all__ = [
     "value_of",
 ]
 
-_NUMPY_PAYS = 100_000
+NUMPY_PAYS = 100_000
 """Number of times above which numpy computes the median faster than Python, including the import of numpy."""
 
-_BLOCK = 1 << 16  # number of times that numpy processes together
+BLOCK = 1 << 16  # number of times that numpy processes together
 
 
 class Topic(NamedTuple):
@@ -241,7 +241,7 @@ def _frequency(times: list[array[int]]) -> float | None:
     count = sum(map(len, times))
     if count < 2:
         return None
-    median = (_median_by_numpy if count > _NUMPY_PAYS else _median)(times)
+    median = (_median_by_numpy if count > NUMPY_PAYS else _median)(times)
     return 1.0 / median if median > 0.0 else None
 
 
@@ -262,10 +262,10 @@ def _median_by_numpy(times: list[array[int]]) -> float:
     joined.sort()
     periods = joined.view(np.float64)
     last = 0.0
-    for start in range(0, len(joined), _BLOCK):
-        block = joined[start : start + _BLOCK]
+    for start in range(0, len(joined), BLOCK):
+        block = joined[start : start + BLOCK]
         stamps = block // 10**9 + (block % 10**9) / 1e9
-        periods[start : start + _BLOCK] = np.diff(stamps, prepend=last)
+        periods[start : start + BLOCK] = np.diff(stamps, prepend=last)
         last = float(stamps[-1])
 
     periods = periods[1:]

@@ -26,7 +26,7 @@ from minirospy.core.bag.records import ChunkInfo, Connection
 __all__ = ["ChunkedReader", "open_bag"]
 
 # Maximum bytes of overlapping chunks that stay decompressed in memory; beyond that, some chunks are read again
-_CACHE_SIZE = 64 * 1024 * 1024
+CACHE_SIZE = 64 * 1024 * 1024
 
 _END_OF_TIME = 1 << 64
 
@@ -207,7 +207,7 @@ class _Run:
 class _Merge:
     """Merges chunks that may overlap into blocks of messages in time order.
 
-    Each chunk is a run of sorted messages. The data of pending runs stays in memory up to _CACHE_SIZE; beyond that it is
+    Each chunk is a run of sorted messages. The data of pending runs stays in memory up to CACHE_SIZE; beyond that it is
     discarded and read again later, so that even a bag whose chunks all overlap needs no more memory.
     """
 
@@ -286,7 +286,7 @@ class _Merge:
 
         self._loaded[run.position] = data, found
         self._size += _weight(data, found)
-        while self._size > _CACHE_SIZE and len(self._loaded) > 2:
+        while self._size > CACHE_SIZE and len(self._loaded) > 2:
             _, dropped = self._loaded.popitem(last=False)
             self._size -= _weight(*dropped)
         return data, found

@@ -96,7 +96,7 @@ class Registry:
     def __init__(self, shares: Shares | None = None) -> None:
         """Create an empty registry; ``shares`` limits how many bytes the nodes on each host and port may use."""
         self.changes = 0  # increases whenever publishers, subscribers or services may have changed
-        self._shares = shares or registry_limits.new_shares()
+        self.shares = shares or registry_limits.new_shares()
         self._nodes: dict[str, _NodeEntry] = {}
         self._publishers: dict[str, dict[str, str]] = {}
         self._subscribers: dict[str, dict[str, str]] = {}
@@ -197,17 +197,17 @@ class Registry:
     @property
     def is_small(self) -> bool:
         """Return whether the number of all registrations is small."""
-        return self._shares.total < _FEW_BYTES
+        return self.shares.total < _FEW_BYTES
 
     @property
     def is_large(self) -> bool:
         """Return whether a list of all registrations would use so much memory that only one should be built at a time."""
-        return self._shares.total > _MANY_BYTES
+        return self.shares.total > _MANY_BYTES
 
     @property
     def is_crowded(self) -> bool:
         """Return whether only the memory reserved for nodes with few registrations is left."""
-        return self._shares.total > self._shares.shared * 7 // 8
+        return self.shares.total > self.shares.shared * 7 // 8
 
     def node_uri(self, node: str) -> str | None:
         """Return the URI of a node's Slave API."""
@@ -319,9 +319,9 @@ class Registry:
         cost = node_cost(node, uri) if is_new else 0
         cost += name_cost(name, kind, kinds) + self._cost_of_text(name, kind, text)
         holder = entry.holder if entry and not is_new else holder_of(uri)
-        excess = self._shares.excess(holder, cost) if cost > 0 else None
+        excess = self.shares.excess(holder, cost) if cost > 0 else None
         if excess:
-            raise RegistryFullError(registry_limits.describe(excess, self._shares))
+            raise RegistryFullError(registry_limits.describe(excess, self.shares))
         if not is_new:
             return ()
 
@@ -342,7 +342,7 @@ class Registry:
 
     def _count(self, entry: _NodeEntry, size: int) -> None:
         entry.size += size
-        self._shares.add(entry.holder, size)
+        self.shares.add(entry.holder, size)
 
     def _count_for(self, node: str, size: int) -> None:
         self._count(self._nodes[node], size)

@@ -16,7 +16,7 @@ MAX_PUBLISHERS = 1000  # maximum publishers of one topic that a node connects to
 # New publishers to connect to at a time, and seconds between these groups, so that not all refusals arrive together
 _CONNECTS_AT_ONCE, _CONNECT_PAUSE = 100, 0.01
 
-_FIRST_DELAY = 0.1
+FIRST_DELAY = 0.1
 _MAX_DELAY = 8.0
 
 
@@ -83,4 +83,4 @@ class SubscriptionPlan:
             return None
         failures = self._failures[uri]
         self._failures[uri] = failures + 1
-        return Connect(uri, min(_FIRST_DELAY * 2**failures, _MAX_DELAY))
+        return Connect(uri, min(FIRST_DELAY * 2**failures, _MAX_DELAY))

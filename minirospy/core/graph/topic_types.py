@@ -13,8 +13,8 @@ from minirospy.core.graph.registry_limits import text_cost
 
 __all__ = ["TopicTypes"]
 
-_MAX_OLD = 10_000  # maximum number of unregistered topics whose types are stored
-_MAX_OLD_BYTES = 4 * 1024 * 1024  # maximum total bytes of these types in memory
+MAX_OLD = 10_000  # maximum unregistered topics whose types are stored
+_MAX_OLD_BYTES = 4 * 1024 * 1024  # memory limit for these types
 
 _TYPE_BYTES = 100  # approximate bytes for a type without its string
 
@@ -91,7 +91,7 @@ class TopicTypes:
         self._old[topic] = None
         self._old_bytes += text_cost(topic) + _size_of(type_)
 
-        while len(self._old) > _MAX_OLD or self._old_bytes > _MAX_OLD_BYTES:
+        while len(self._old) > MAX_OLD or self._old_bytes > _MAX_OLD_BYTES:
             oldest = next(iter(self._old))
             self._remove_old(oldest, self._types.pop(oldest).text)
 

@@ -42,8 +42,12 @@ def load_package(
     parts = ("", "Request", "Response") if kind == "srv" else ("",)
     modules = {name + part: f"{module}._{name}" for name in names.split() for part in parts}
 
+    inner = {path.rpartition(".")[2] for path in modules.values()}
+
     def load(name: str) -> object:
         if name not in modules:
+            if name in inner:
+                return importlib.import_module(f"{module}.{name}")
             raise AttributeError(f"module {module!r} has no attribute {name!r}")
         value: object = getattr(importlib.import_module(modules[name]), name)
         setattr(sys.modules[module], name, value)

@@ -23,7 +23,7 @@ _HEAD = struct.Struct("<4I")
 _STAMP = struct.Struct("<2I")
 _BODY = struct.Struct("<7d")
 _BLOCK = 64  # number of messages in a block; a layout drops expired messages in blocks of this size
-_MAX_MESSAGES = 16_384
+MAX_MESSAGES = 16_384
 _MAX_LAYOUTS = 16_384
 _MAX_SAME_LENGTH = 8
 
@@ -130,7 +130,7 @@ class Layout:
         del self._arrivals[:count]
         self._dropped += count
 
-        is_full = len(self._arrivals) >= _MAX_MESSAGES
+        is_full = len(self._arrivals) >= MAX_MESSAGES
         return [
             offsets.child
             for offsets, moves in zip(self._offsets, moves_on, strict=True)

@@ -41,7 +41,7 @@ MAX_FRAME = 1024 * 1024 * 1024  # bytes; a longer frame is rejected as invalid
 
 SPLIT = 1 << 31  # bit in the length which means that the size of the array at the end follows
 
-_FIRST_CLAIM = 16 * 1024 * 1024
+FIRST_CLAIM = 16 * 1024 * 1024
 _LENGTH = struct.Struct("<I")
 _TWO_LENGTHS = struct.Struct("<II")
 
@@ -256,7 +256,7 @@ class FrameReader:
         if length > self._limit:
             raise WireError(f"a message of {length} bytes is over the limit of {self._limit}")
         self._wanted = length
-        self._large = bytearray(min(length, _FIRST_CLAIM))
+        self._large = bytearray(min(length, FIRST_CLAIM))
         self._filled = self._end - at
         self._large[: self._filled] = self._small[at : self._end]
         self._start = self._end = 0

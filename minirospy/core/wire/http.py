@@ -356,11 +356,11 @@ def serialize_error(status: int, text: str) -> bytes:
 
 def _parse_head(data: bytes) -> HttpHead:
     # Cache short heads, because the heads from one client differ only in the length.
-    return _short_head(data) if len(data) <= _SHORT_HEAD else _read_head(data)
+    return short_head(data) if len(data) <= _SHORT_HEAD else _read_head(data)
 
 
 @lru_cache(maxsize=256)
-def _short_head(data: bytes) -> HttpHead:
+def short_head(data: bytes) -> HttpHead:
     return _read_head(data)
 
 

@@ -22,8 +22,8 @@ __all__ = ["HEAD", "Recovered", "pack_in_steps", "parse_journal", "serialize_rec
 
 HEAD = b"minirospy journal 1\n"
 
-_STEP_ITEMS = 500
-_STEP_BYTES = 65536
+STEP_ITEMS = 500
+STEP_BYTES = 65536
 # Msgpack's type bytes for a long string and for long bytes, which precede a 4-byte length
 _TEXT_32, _BINARY_32 = b"\xdb", b"\xc6"
 
@@ -62,7 +62,7 @@ def _pack_in_steps(value: object, packer: msgpack.Packer) -> Iterator[bytes]:
     elif type(value) is dict:
         packer.pack_map_header(len(value))
         items = chain.from_iterable(value.items())
-    elif (type(value) is str or type(value) is bytes) and len(value) > _STEP_BYTES:
+    elif (type(value) is str or type(value) is bytes) and len(value) > STEP_BYTES:
         yield from _pack_long(value, packer)
         return
     else:
@@ -74,7 +74,7 @@ def _pack_in_steps(value: object, packer: msgpack.Packer) -> Iterator[bytes]:
             yield from _pack_in_steps(item, packer)
         else:
             packer.pack(item)
-        if number % _STEP_ITEMS == _STEP_ITEMS - 1 or len(packer.getbuffer()) > _STEP_BYTES:
+        if number % STEP_ITEMS == STEP_ITEMS - 1 or len(packer.getbuffer()) > STEP_BYTES:
             yield _taken(packer)
 
 
@@ -92,7 +92,7 @@ def _pack_long(value: str | bytes, packer: msgpack.Packer) -> Iterator[bytes]:
 
 
 def _slices(value: str | bytes) -> Iterator[str | bytes]:
-    return (value[at : at + _STEP_BYTES] for at in range(0, len(value), _STEP_BYTES))
+    return (value[at : at + STEP_BYTES] for at in range(0, len(value), STEP_BYTES))
 
 
 def _encoded(value: str | bytes) -> bytes:

@@ -17,19 +17,19 @@ from minirospy.base.errors import RpcProtocolError
 __all__ = ["MAX_DEPTH", "DateTime", "Reader", "read_document"]
 
 MAX_DEPTH = 64
-_MAX_ELEMENTS = 1_000_000  # maximum per document; parsing this many takes some seconds
+MAX_ELEMENTS = 1_000_000  # per document; parsing this many takes some seconds
 
 _MIB = 1024 * 1024
-_MAX_MEMORY = 64 * _MIB  # maximum bytes in memory of all long strings in one document
+MAX_MEMORY = 64 * _MIB  # memory limit for all long strings in one document
 
-_MAX_WIDE = 16 * _MIB
+MAX_WIDE = 16 * _MIB
 """Maximum size in bytes of a string with a character beyond U+00FF: each of its characters then uses 2 or 4 bytes, and the
 string is copied.
 """
 
-_MAX_TOKEN = 65536  # maximum size in bytes of a tag, a comment or similar
+MAX_TOKEN = 65536  # bytes in a tag, a comment or similar
 
-_MAX_SCALAR = 2048  # maximum number of characters in a number, a boolean or a date
+MAX_SCALAR = 2048  # characters in a number, a boolean or a date
 
 _LONG_TEXT = 16  # number of 8-KiB pieces above which a string counts as long
 
@@ -101,7 +101,7 @@ class Reader:
         self._names: list[str] = []
         self._values: list[list[object]] = []
         self._depth = 0
-        self._left = _MAX_ELEMENTS
+        self._left = MAX_ELEMENTS
         self._tag: str
         # The number of bytes fed, and the memory that the long strings use.
         self._fed = 0
@@ -127,8 +127,8 @@ class Reader:
             raise RpcProtocolError(f"not XML-RPC: {error}") from error
         self._fed += len(data)
         # Limit incomplete tags and comments, because the parser scans them again each time more data arrives.
-        if not is_last and self._fed - self._parser.CurrentByteIndex > _MAX_TOKEN:
-            raise RpcProtocolError(f"a tag or comment of more than {_MAX_TOKEN} bytes")
+        if not is_last and self._fed - self._parser.CurrentByteIndex > MAX_TOKEN:
+            raise RpcProtocolError(f"a tag or comment of more than {MAX_TOKEN} bytes")
         if len(self._text) - _LONG_TEXT > len(self._joined) >> _GROWTH_SHIFT:
             self._join_text()
 
@@ -148,7 +148,7 @@ class Reader:
             raise RpcProtocolError(f"a value is nested deeper than {MAX_DEPTH} levels")
         self._left -= 1
         if self._left < 0:
-            raise RpcProtocolError(f"more than {_MAX_ELEMENTS} elements")
+            raise RpcProtocolError(f"more than {MAX_ELEMENTS} elements")
 
         if not self.root:
             self.root = tag
@@ -188,8 +188,8 @@ class Reader:
         if self._binary:
             self._binary.write(read(text))
             return self._binary.getvalue()
-        if tag not in ("string", "base64") and len(text) > _MAX_SCALAR:
-            raise RpcProtocolError(f"a value of type {tag} has more than {_MAX_SCALAR} characters")
+        if tag not in ("string", "base64") and len(text) > MAX_SCALAR:
+            raise RpcProtocolError(f"a value of type {tag} has more than {MAX_SCALAR} characters")
         return read(text)
 
     def _end_value(self) -> None:
@@ -237,10 +237,10 @@ class Reader:
         memory = width * (len(joined) + len(more))
         self._memory += memory - self._width * len(joined)
         self._width = width
-        if self._memory > _MAX_MEMORY:
-            raise RpcProtocolError(f"a value of more than {_MAX_MEMORY // _MIB} MiB in memory", status=413)
-        if width > 1 and memory > _MAX_WIDE:
-            most = _MAX_WIDE // _MIB
+        if self._memory > MAX_MEMORY:
+            raise RpcProtocolError(f"a value of more than {MAX_MEMORY // _MIB} MiB in memory", status=413)
+        if width > 1 and memory > MAX_WIDE:
+            most = MAX_WIDE // _MIB
             raise RpcProtocolError(f"a text of wide characters of more than {most} MiB in memory", status=413)
 
         # Python appends in place if a local variable is the only reference to a string.

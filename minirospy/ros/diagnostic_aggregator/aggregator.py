@@ -113,7 +113,7 @@ class Aggregator:
         self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._analyze, queue_size=1000)
 
     def publish(self) -> None:
-        """Publish the tree."""
+        """Publish the tree and its overall level."""
         now = rospy.get_time()
         with self._lock:
             statuses = self._tree.report(now) + self._other.report(now)
@@ -139,7 +139,7 @@ class Aggregator:
             self._warned.add(names)
 
     def _add(self, request: AddDiagnosticsRequest) -> AddDiagnosticsResponse:
-        """Create analyzers from another namespace; use them until the bond with the requesting node breaks."""
+        """Create analyzers from the parameters in another namespace, until the bond with the requesting node breaks."""
         namespace: str = request.load_namespace
         if not namespace.startswith("/"):
             return AddDiagnosticsResponse(

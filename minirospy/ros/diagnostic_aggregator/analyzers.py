@@ -1,4 +1,4 @@
-"""Analyzers: decide which statuses they accept, and what they report. Pure: times are arguments, in seconds.
+"""Analyzers, which select statuses and report on them. Pure: times are arguments, in seconds.
 
 A tree of analyzers is built from parameters. Source: http://wiki.ros.org/diagnostic_aggregator, and the output of ROS's
 aggregator_node.
@@ -46,7 +46,7 @@ class Item:
 
     @classmethod
     def of(cls, status: DiagnosticStatus, now: float, log: Log) -> Item:
-        """Create an item from a status. Report an invalid level and replace it by ERROR."""
+        """Create an item from a status. If its level is invalid, log an error and use ERROR instead."""
         level = status.level
         if level not in _MESSAGES:
             log.error(
@@ -67,7 +67,7 @@ class Item:
 
 
 class Analyzer(Protocol):
-    """A node in the analyzer tree."""
+    """A node in the tree of analyzers."""
 
     path: str
     name: str
@@ -117,7 +117,7 @@ class _Items:
         was_stale = self._last_level == STALE and now - self._last_change > self._timeout
         if header.level != self._last_level:
             self._last_level, self._last_change = header.level, now
-        # Also omit an empty header after it has been stale for longer than the timeout.
+        # Also omit the header if it has no items and has been stale for longer than the timeout.
         if self._discard_stale and not items and was_stale:
             return []
         return [header, *(item.status(self.path, item.name in old) for item in items)]
@@ -147,7 +147,7 @@ class GenericAnalyzer(_Items):
             return _words(params.get(key, []), log)
 
         prefixes = words("find_and_remove_prefix")
-        # Both parameters apply, as in ROS.
+        # Both parameters apply, as they do in ROS.
         self._starts = prefixes + words("startswith")
         self._removed = [_shown(word) for word in prefixes + words("remove_prefix")]
         self._names = words("name")
@@ -246,7 +246,7 @@ class OtherAnalyzer(_Items):
 
 
 class AnalyzerGroup:
-    """A group of analyzers with a header. Parameters: path, analyzers (a namespace per analyzer, with its type)."""
+    """A group of analyzers with a header. Parameters: path, and analyzers, which has one namespace per analyzer."""
 
     def __init__(self, base_path: str, params: Params, namespace: str, now: float, log: Log) -> None:
         """Create the analyzers and report errors; ``is_complete`` is False if one of them cannot be created."""
@@ -356,7 +356,7 @@ def strip_prefix(name: str, prefix: str) -> str:
     if not prefix:
         return name
     at = name.rfind("/") + 1
-    # As in ROS, keep the prefix if it also occurs earlier in the name.
+    # Keep the prefix if it also occurs earlier in the name, as ROS does.
     if name.find(prefix) == at:
         name = name[:at] + name[at + len(prefix) :]
     if at and name[at:].startswith(":"):

@@ -1,7 +1,7 @@
 """Encoding and decoding images for the transports compressed and compressedDepth. Pure.
 
-A CompressedImage's format names the original encoding: ``rgb8; jpeg compressed bgr8``. compressedDepth has 12 bytes before
-its PNG: an enum, and the two floats that convert 32-bit depths to 16 bits: inverse = A / depth + B.
+A CompressedImage's format names the original encoding: ``rgb8; jpeg compressed bgr8``. In compressedDepth, 12 bytes
+precede the PNG: an enum, and the two floats that convert 32-bit depths to 16 bits: inverse = A / depth + B.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Settings:
 def compressed(image: Image, settings: Settings) -> CompressedImage:
     """Encode an image as JPEG or PNG.
 
-    Raise CodecError for another format, or an encoding that does not have 8 or 16 bits per channel.
+    Raise CodecError if the settings have another format, or the image's encoding does not have 8 or 16 bits per channel.
     """
     kind = settings.format
     if kind not in ("jpeg", "png"):
@@ -90,7 +90,7 @@ def uncompressed(message: CompressedImage) -> Image:
         kinds = {1: "mono8", 3: "bgr8", 4: "bgra8"}
         encoding = kinds[channels] if pixels.dtype == "uint8" else f"16UC{channels}"
     elif encoding in _COLORS and channels in (3, 4):
-        # OpenCV decodes to BGR; if the format does not contain "bgr", the encoder had swapped red and blue.
+        # OpenCV decodes to BGR. If the format does not contain "bgr", the encoder has swapped red and blue.
         bits = "16" if pixels.dtype == "uint16" else "8"
         order = "bgr" if "compressed bgr" in rest else "rgb"
         pixels = _converted(pixels, order + ("a" if channels == 4 else "") + bits, encoding)

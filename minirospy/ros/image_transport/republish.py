@@ -2,8 +2,8 @@
 
     republish IN_TRANSPORT in:=IN_BASE_TOPIC [OUT_TRANSPORT] out:=OUT_BASE_TOPIC
 
-If OUT_TRANSPORT is omitted, the image is published with all transports: raw on the base topic, the others below it. The
-parameters are those of ROS's plug-ins, below the output topic (``OUT/compressed/jpeg_quality``) or private
+If OUT_TRANSPORT is omitted, the image is published with all transports: raw on the base topic, the others in its
+namespace. The parameters are those of ROS's plug-ins, below the output topic (``OUT/compressed/jpeg_quality``) or private
 (``~compressed/jpeg_quality``).
 """
 
@@ -79,7 +79,7 @@ def main() -> int:
 
 
 def _warn_without_library() -> None:
-    """Warn if the image library is missing. Without a subscriber no image is encoded, so no other message would report it."""
+    """Warn if the image library is missing. Nothing else would report this, because no image is encoded without a subscriber."""
     try:
         require_library()
     except ValueError as error:

@@ -1,6 +1,6 @@
 """Joysticks connected to this machine: on Linux through /dev/input/js* and its protocol, elsewhere through pygame-ce.
 
-Source of the protocol: https://www.kernel.org/doc/html/latest/input/joydev/joystick-api.html.
+Protocol: https://www.kernel.org/doc/html/latest/input/joydev/joystick-api.html.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class Device(Protocol):
 def open_device(path: str, feedback_path: str = "") -> Device:
     """Open a joystick by its path. On systems other than Linux, only the number in the path is used.
 
-    ``feedback_path``: on Linux, the motors' event device, if it is not the joystick's own. Raise DeviceError if the joystick
-    cannot be opened.
+    ``feedback_path``: on Linux, the event device that controls the motors, if it is not the joystick's own. Raise
+    DeviceError if the joystick cannot be opened.
     """
     if sys.platform == "linux" or os.path.exists(path):
         return LinuxDevice(path, feedback_path)
@@ -78,8 +78,8 @@ class LinuxDevice:
         self._feedback_path = feedback_path or event_device(path)
         self._motors: Rumble | None = None
         try:
-            # The first events report the state. After the first open() they may report the state at the last close(),
-            # so open twice.
+            # The first events report the current state, but after the first open() they may report the state at the
+            # last close(), so open the device twice.
             os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
@@ -155,7 +155,7 @@ def find_by_name(folder: Path = _FOLDER) -> Iterator[tuple[str, str]]:
 
 
 class PygameDevice:
-    """A joystick that SDL reads; as on Linux, its hats are additional axes after the others.
+    """A joystick read through SDL. As on Linux, its hats are additional axes after the others.
 
     Raise DeviceError if the joystick cannot be opened.
     """
@@ -230,7 +230,7 @@ class PygameDevice:
 def state_events(
     before: Sequence[tuple[int, int, int]], after: Sequence[tuple[int, int, int]]
 ) -> list[Event]:
-    """Return the events that change one state to the next; initial events if ``before`` is empty."""
+    """Return the events that lead from one state to the next; if ``before`` is empty, return the initial events."""
     if not before:
         return [Event(kind | EVENT_INIT, number, value) for kind, number, value in after]
     return [Event(*each) for old, each in zip(before, after, strict=True) if old != each]

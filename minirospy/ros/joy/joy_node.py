@@ -24,11 +24,12 @@ from minirospy.ros.joy.rumble import RumbleError
 
 __all__ = ["JoyNode", "Motors", "main"]
 
-_LOOK_SECONDS = 0.2  # seconds; maximum delay until the node detects a shutdown
+_LOOK_SECONDS = 0.2  # seconds; maximum delay before the node notices a shutdown
 
 _RETRY_SECONDS = 1.0
 _DIAGNOSTIC_SECONDS = 1.0
-_RUMBLE_SECONDS = 0.5  # interval at which motors are restarted: half the time for which a device runs them
+# seconds after which motors are restarted: half the time for which a device runs them
+_RUMBLE_SECONDS = 0.5
 
 
 def main() -> int:
@@ -108,7 +109,7 @@ class JoyNode:
                 device.close()
 
     def _open(self) -> Device | None:
-        """Wait until the device can be opened, and return it. Return None at shutdown."""
+        """Wait until the device can be opened, and return it; return None at shutdown."""
         is_first = True
         while not rospy.is_shutdown():
             try:

@@ -1,4 +1,4 @@
-"""The publishing rules of joy_node: converts events and times to messages. Pure: the clock is an argument, in seconds.
+"""joy_node's rules for publishing, which convert events and times to messages. Pure: the clock is an argument, in seconds.
 
 Source: http://wiki.ros.org/joy. Button events are published immediately. Axis events, and a device's initial events, are
 published after ``coalesce_interval``. With ``autorepeat_rate`` the state is republished while no event occurs.
@@ -81,7 +81,7 @@ class Joystick:
         self._published(now + _FIRST_SECONDS)
 
     deadline: float | None
-    """The time at which to publish the state if no event occurs, or None if it is not published then."""
+    """The time at which to publish the state if no event occurs; None if it is not to be published without an event."""
 
     def handle(self, event: Event, now: float) -> bool:
         """Process an event; return whether to publish the state immediately. Raise ValueError if the event's type is unknown."""

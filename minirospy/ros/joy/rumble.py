@@ -1,4 +1,4 @@
-"""A joystick's motors on Linux: uses its event device's force feedback, with the kernel's structures.
+"""Runs a joystick's motors on Linux, through the force feedback of its event device, with the kernel's structures.
 
 Source: https://www.kernel.org/doc/html/latest/input/ff.html, linux/input.h.
 """

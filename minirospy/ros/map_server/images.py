@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = ["MAX_CELLS", "ImageError", "Pixels", "read_image"]
 
-# Cells in a map: a message is at most 4 GiB, which is also the size of 2**30 pixels with four channels.
+# maximum number of cells in a map: a message has at most 4 GiB, which is also the size of 2**30 pixels with 4
+# channels
 MAX_CELLS = 2**30
 
 _HEADER_NUMBER = re.compile(rb"(?:\s|#[^\n]*\n)*(\d+)")
@@ -142,7 +143,7 @@ def _has_alpha(image: Image.Image) -> bool:
     if image.mode in ("LA", "RGBA", "PA", "La", "RGBa"):
         return True
     transparency = image.info.get("transparency")
-    # SDL_image keeps palette indices if a single color is transparent.
+    # SDL_image keeps palette indices if exactly one color is transparent.
     return isinstance(transparency, bytes) and not (
         set(transparency) <= {0, 255} and transparency.count(0) < 2
     )

@@ -27,7 +27,7 @@ _USAGE = """Usage:
 
 
 class SaverOptions(NamedTuple):
-    """The files' name without suffix; the lowest occupancy of an occupied cell, and the highest of a free cell."""
+    """The files' name without suffix, the lowest occupancy of an occupied cell, and the highest of a free cell."""
 
     name: str = "map"
     occupied: int = 65

@@ -127,7 +127,7 @@ def load_map(settings: MapSettings) -> OccupancyGrid:
 
 
 class MapServer:
-    """Offers the map with two latched topics and two services. Raise MapError if the map cannot be loaded."""
+    """Serves a map on two latched topics and through two services. Raise MapError if the map cannot be loaded."""
 
     def __init__(self, settings: MapSettings) -> None:
         self._frame_id = str(rospy.get_param("~frame_id", "map"))
@@ -142,7 +142,8 @@ class MapServer:
 
     def _show(self, settings: MapSettings) -> None:
         grid = load_map(settings)
-        # In simulated time, wait for the first time from the simulation; otherwise the map would be stamped with 0.
+        # In simulated time, wait for the first time from the simulation; otherwise, the map would have a zero time
+        # stamp.
         while not rospy.Time.now() and not rospy.is_shutdown():
             time.sleep(_CLOCK_SECONDS)
         grid.info.map_load_time = rospy.Time.now()

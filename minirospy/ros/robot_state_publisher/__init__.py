@@ -1,9 +1,9 @@
-"""Nodes for robot descriptions that publish joint states and the frames of links, using only the public node API.
+"""Nodes that publish a robot's joint states and the frames of its links, using only the public node API.
 
 Source: http://wiki.ros.org/robot_state_publisher, http://wiki.ros.org/joint_state_publisher.
 """
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# These modules import ROS 1 messages, but in a sourced ROS 2 its packages of the same names would be found first.
+# These modules import ROS 1 messages. In a sourced ROS 2, its packages of the same names would be found first.
 prefer_ros1()

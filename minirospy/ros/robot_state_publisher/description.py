@@ -1,4 +1,4 @@
-"""Reads the parameter robot_description, in the order in which ROS's nodes search namespaces."""
+"""Reads the parameter robot_description, searching namespaces in the same order as ROS's nodes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class DescriptionError(MinirospyError):
 
 
 def robot_of_parameter(name: str = NAME) -> Robot:
-    """Return the robot in a parameter, searching from the node's namespace upwards.
+    """Build the robot from the description in a parameter, searching from the node's namespace upwards.
 
     Raise DescriptionError if there is none, or if it is invalid.
     """

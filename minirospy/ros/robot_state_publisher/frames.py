@@ -24,7 +24,7 @@ class LinkPose(NamedTuple):
 
 
 class RobotFrames:
-    """A robot's frames: moving ones and fixed ones, both ordered by joint name.
+    """A robot's moving and fixed frames, each ordered by joint name.
 
     Planar joints are treated as fixed, as in KDL. Floating joints have no frame, because a JointState cannot contain
     their pose.
@@ -47,11 +47,11 @@ class RobotFrames:
         return (LinkPose(each.joint.parent, each.joint.child, each.pose()) for each in self._fixed)
 
     def moving(self, positions: Mapping[str, float]) -> Iterator[LinkPose]:
-        """Yield the poses of links whose joints have a given position, or mimic such a joint."""
+        """Yield the poses of links whose joints have a given position, or mimic a joint that has one."""
         known = {
             name: position if math.isfinite(position) else math.nan for name, position in positions.items()
         }
-        # A joint may mimic a joint that itself mimics another.
+        # Repeat, because a joint may mimic a joint that itself mimics another.
         waiting = {name: mimic for name, mimic in self._mimics.items() if name not in known}
         while found := [name for name, mimic in waiting.items() if mimic.joint in known]:
             for name in found:

@@ -17,11 +17,14 @@ NAMES = (
     "robot_description", "rate", "dependent_joints", "use_mimic_tags", "use_smallest_joint_limits", "source_list", "zeros",
     "delta", "publish_default_positions", "publish_default_velocities", "publish_default_efforts",
 )  # fmt: skip
-"""The parameters to read: the private one, or the one in the node's namespace; both are read for zeros."""
+"""The parameters to read. A private parameter takes precedence over the one in the node's namespace; for zeros, both are read."""
 
 
 class JointParameters(NamedTuple):
-    """``rate`` is in messages per second, ``delta`` in radians or metres per message; ``sources`` are topics."""
+    """The parsed parameters.
+
+    ``rate`` is in messages per second, ``delta`` in radians or metres per message; ``sources`` are topics.
+    """
 
     description: str
     options: JointOptions
@@ -31,7 +34,7 @@ class JointParameters(NamedTuple):
 
 
 def read_parameters(param: Callable[[str, object], object], zeros: Sequence[object]) -> JointParameters:
-    """Return the parameters; ``param(name, default)`` returns a value, ``zeros`` are the trees named zeros, private one first.
+    """Return the parameters. ``param(name, default)`` returns a value; ``zeros`` are the values of zeros, the private one first.
 
     Raise JointError if a parameter is invalid.
     """
@@ -59,7 +62,10 @@ def read_parameters(param: Callable[[str, object], object], zeros: Sequence[obje
 
 
 def _zero(zeros: Sequence[object], joint: str) -> float | None:
-    """Return a joint's zero position, from the first tree that contains the joint. Slashes in its name separate tree levels."""
+    """Return a joint's zero position from the first tree that contains the joint.
+
+    Slashes in the joint's name separate tree levels.
+    """
     for tree in zeros:
         value: object = tree
         for part in joint.split("/"):

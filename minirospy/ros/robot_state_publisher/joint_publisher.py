@@ -1,4 +1,4 @@
-"""joint_state_publisher: publishes joint_states from a description's joints, their zeros, and other nodes' joint states.
+"""joint_state_publisher: publishes joint_states, from a description's joints, their zeros, and joint states from other nodes.
 
 Parameters, private or in the node's namespace: robot_description, rate (10 Hz), dependent_joints
 (``{joint: {parent, factor, offset}}``), use_mimic_tags, use_smallest_joint_limits (true), source_list (topics), zeros
@@ -49,13 +49,13 @@ def param(name: str, default: object = None) -> object:
 
 
 class JointPublisher:
-    """Publishes the joint states, and follows the topics in source_list. Raise JointError if the parameters are invalid.
+    """Publishes the joint states, and subscribes to the topics in source_list. Raise JointError if the parameters are invalid.
 
     ``on_update`` is called after each message from a source.
     """
 
     def __init__(self, on_update: Callable[[], object] = lambda: None) -> None:
-        # Read both trees: a zero that is missing in the private tree may be in the other tree.
+        # Read both trees, because a joint that is missing in the private tree may be in the other.
         zeros = [rospy.get_param(key, {}) for key in ("~zeros", "zeros")]
         found = read_parameters(param, zeros)
         self.lock = threading.Lock()

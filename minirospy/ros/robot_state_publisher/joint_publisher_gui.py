@@ -1,6 +1,6 @@
-"""joint_state_publisher_gui with terminal sliders: joint_state_publisher with keys that set the joints.
+"""joint_state_publisher_gui for the terminal: joint_state_publisher with sliders, which the user moves with keys.
 
-If there is no terminal, as in roslaunch, it publishes the zeros and the joint states from its sources.
+Without a terminal, as in roslaunch, it publishes the zeros and the joint states from its sources.
 Source: http://wiki.ros.org/joint_state_publisher_gui.
 """
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["main"]
 
 _QUIT = ("q", "\x04")
-_OTHER_LINES = 6  # screen lines without sliders: the frame, the hint and the shell prompt
+_OTHER_LINES = 6  # number of screen lines without sliders: the frame, the hint and the shell prompt
 
 
 def main() -> int:

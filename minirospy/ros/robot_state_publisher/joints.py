@@ -28,12 +28,12 @@ _SETTLED = ("fixed", "floating", "planar")
 
 
 class JointError(MinirospyError):
-    """The joints cannot be determined; the message is one line that names the joint and the reason."""
+    """The joints cannot be determined. The message is one line that names the joint and the reason."""
 
 
 @dataclass
 class FreeJoint:
-    """An adjustable joint, in radians or metres; values that are None are not published."""
+    """An adjustable joint, in radians or metres. Values that are None are not published."""
 
     lower: float
     upper: float
@@ -105,7 +105,7 @@ class JointStates:
     def _rule(self, name: str, dependent: Mapping[str, Dependent]) -> Dependent:
         """Return a joint's dependency on an adjustable joint. Raise JointError if the dependencies form a cycle."""
         if name not in dependent:
-            # The joint has no limits; the warning has been logged.
+            # The joint has no limits and was omitted with a warning, so its parent "" does not exist.
             return Dependent("")
 
         rule = dependent[name]
@@ -131,7 +131,7 @@ class JointStates:
         velocities: Sequence[float],
         efforts: Sequence[float],
     ) -> None:
-        """Set joints from another node's JointState; if a list is shorter, the remaining values stay unchanged."""
+        """Set joints from another node's JointState. If one of its lists is shorter, the remaining values stay unchanged."""
         for number, name in enumerate(names):
             joint = self.free.get(name)
             if joint is None:

@@ -1,4 +1,4 @@
-"""Sliders for joints, moved by keys: the selection, the effect of each key, and the lines to show. Pure.
+"""Sliders for joints, moved with keys: the selected slider, the effect of each key, and the lines to show. Pure.
 
 Source: http://wiki.ros.org/joint_state_publisher_gui, which has the same sliders, Center and Randomize.
 """
@@ -19,7 +19,7 @@ _MOVES = {"up": -1, "down": 1, "k": -1, "j": 1}
 
 
 class Row(NamedTuple):
-    """A joint's line: its name, its bar, its position with the limits, and whether it is selected."""
+    """A joint's line: the name, the bar, the position with the limits, and whether the joint is selected."""
 
     name: str
     bar: str
@@ -28,7 +28,7 @@ class Row(NamedTuple):
 
 
 class Sliders:
-    """The adjustable joints, one of which is selected. ``random_`` is the source of random positions."""
+    """The adjustable joints, one of which is selected. ``random_`` generates random positions."""
 
     def __init__(self, joints: Mapping[str, FreeJoint], random_: random.Random | None = None) -> None:
         self._joints = joints

@@ -28,7 +28,7 @@ _AHEAD = rospy.Duration(0, 500_000_000)
 
 _OLD = rospy.Duration(30)
 _CONNECT_SECONDS = 0.5
-# seconds for which tf_prefix is cached; ROS queries the master for each message instead
+# seconds to cache tf_prefix; ROS instead queries the master for each message
 _PREFIX_SECONDS = 1.0
 
 
@@ -50,7 +50,7 @@ def main(name: str = "robot_state_publisher") -> int:
 
 
 def _warn_of(robot: Robot) -> None:
-    """Log warnings, in ROS's words, about features of a robot that frames cannot represent."""
+    """Log warnings, worded as in ROS, about features of a robot that frames cannot represent."""
     if robot.links[robot.root].inertial:
         rospy.logwarn(
             "The root link %s has an inertia specified in the URDF, but KDL does not support a root link with an inertia.  "
@@ -114,7 +114,7 @@ class StatePublisher:
         last = min((self._published.get(name, rospy.Time()) for name in state.name), default=now)
         if not self._ignores_stamps and stamp < min(last, now) + self._period:
             return
-        # If a joint is named twice, the first position is used, as in ROS.
+        # If a joint is named twice, use the first position, as ROS does.
         positions = dict(zip(reversed(state.name), reversed(state.position), strict=True))
         for name in self._frames.unknown(positions):
             rospy.logwarn_throttle(10, f'Joint state with name: "{name}" was received but not found in URDF')

@@ -1,6 +1,6 @@
-"""The one place that names rosbag's migration of messages, which few need: its modules are imported when they are.
+"""Finds rosbag's migration of messages; its modules are imported only if they are used.
 
-Its folder, with `rosbag/migration.py`, can be deleted; then its verbs and programs are missing.
+No other module names them. If their folder and `rosbag/migration.py` are deleted, the verbs and programs are missing.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ def migration_verbs() -> tuple[Verb, ...]:
 
 
 def migration_scripts() -> dict[str, Callable[[list[str]], int]]:
-    """Return the programs that migrate, by their names."""
+    """Return the programs that migrate messages, by name."""
     module = _module("scripts")
     return module.SCRIPTS if module else {}
 
 
 def _module(name: str) -> ModuleType | None:
-    """Return a module of the migration; None if that has been deleted."""
+    """Return a module of the migration, or None if it has been deleted."""
     try:
         return importlib.import_module(f"{_MIGRATION}.{name}")
     except ModuleNotFoundError as error:

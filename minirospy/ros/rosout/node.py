@@ -41,19 +41,22 @@ _log = logging.getLogger(__name__)
 _LOG_BYTES = 100 * 1024 * 1024
 
 _MAX_BYTES = 256 * 1024
-"""Bytes; longer messages are dropped, so that no node can fill the memory of the master's process."""
+"""Maximum size of a message in bytes.
+
+Longer messages are dropped, so that no node can fill the memory of the master's process.
+"""
 
 _MAX_SUBSCRIBERS = 200
 """Maximum number of subscribers to /rosout_agg, because each may have a message of maximum size queued."""
 
 _LARGE, _MAX_LARGE = 16 * 1024, 100
-"""Bytes, messages: a subscriber with this many queued messages receives no larger messages until it has read some."""
+"""Size in bytes, and number of messages. If a subscriber has this many queued messages, larger messages are not sent to it."""
 
-_STEP_LETTERS = 1024  # characters of text written per step; escaping one may take a microsecond
+STEP_LETTERS = 1024  # characters of text written per step; escaping one may take a microsecond
 
 
 class RosoutNode:
-    """Runs on the loop that starts it; republishes each message with unchanged bytes."""
+    """Republishes each log message with unchanged bytes, on the event loop that starts the node."""
 
     def __init__(
         self, environment: Environment, log_file: Path | None, omits_topics: Callable[[], bool]
@@ -92,7 +95,7 @@ class RosoutNode:
             self.node.make_subscription(
                 "/rosout",
                 type_,
-                InTurns(self._on_message, self._turns.start, _MAX_BYTES, self._on_left_out),
+                InTurns(self.on_message, self._turns.start, _MAX_BYTES, self._on_left_out),
             )
         )
         await self._serve_loggers()
@@ -100,7 +103,7 @@ class RosoutNode:
     async def close(self) -> None:
         """Unregister from the master. Idempotent."""
         await self.node.close()
-        # A pending read completes when its connection is closed.
+        # A pending read completes once its connection is closed.
         while self._turns:
             await asyncio.sleep(0)
         self._limited_log.close()
@@ -143,14 +146,14 @@ class RosoutNode:
             )
         )
 
-    def _on_message(self, frame: Frame, header: Header) -> Steps[None]:
+    def on_message(self, frame: Frame, header: Header) -> Steps[None]:
         assert self._aggregated
         body = bytes(frame)
         whole = serialize_frame(body)
         for link in self._aggregated.links:
             if len(whole) <= _LARGE or link.waiting < _MAX_LARGE:
                 link.send(whole)
-            # Yield to the loop: there may be many messages, and a large one takes time.
+            # Yield to the event loop, because there may be many messages, and a large one takes time.
             yield None
         if self._file:
             yield from self._write(self._file, body)
@@ -177,10 +180,10 @@ class RosoutNode:
         )
 
         parts: list[str] = []
-        # A message may have several lines, as in the real log file; the other fields may not.
+        # Keep line breaks in the message, as the real log file does, but not in the other fields.
         for text, keep in ((head, ""), (message.msg, "\n\t")):
-            for at in range(0, len(text), _STEP_LETTERS):
-                parts.append(escaped(text[at : at + _STEP_LETTERS], keep))
+            for at in range(0, len(text), STEP_LETTERS):
+                parts.append(escaped(text[at : at + STEP_LETTERS], keep))
                 if at:
                     yield None
         file.text("".join(parts))

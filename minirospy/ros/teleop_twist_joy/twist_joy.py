@@ -49,7 +49,7 @@ class TeleopOptions:
 
 
 def read_options(parameters: Mapping[str, object]) -> TeleopOptions:
-    """Return the options from the private parameters; a parameter with the wrong type gets its default, as in roscpp."""
+    """Return the options from the private parameters. As in roscpp, a parameter with the wrong type gets its default."""
     linear = _directions(parameters, "linear", "x", 1, 1.0)
     angular = _directions(parameters, "angular", "yaw", 0, None)
     return TeleopOptions(
@@ -91,7 +91,7 @@ class JoyTeleop:
         self._has_stopped = False
 
     def velocity(self, axes: Sequence[float], buttons: Sequence[int]) -> Velocity | None:
-        """Return the velocity to publish: once a zero velocity after the buttons are released, then None."""
+        """Return the velocity to publish. After the buttons are released, return zero velocity once, then None."""
         if self._is_held(buttons, self._options.enable_turbo_button):
             return self._moving(axes, is_fast=True)
         if self._is_held(buttons, self._options.enable_button):

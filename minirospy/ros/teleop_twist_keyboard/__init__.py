@@ -1,7 +1,6 @@
-"""The ROS package teleop_twist_keyboard: Twists from terminal keys. Source: http://wiki.ros.org/teleop_twist_keyboard."""
+"""The ROS package teleop_twist_keyboard, which converts keys to Twists. Source: http://wiki.ros.org/teleop_twist_keyboard."""
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# Its modules import ROS 1 messages, and if ROS 2 is sourced, its packages of the same names would be imported
-# instead.
+# Its modules import ROS 1 messages. If ROS 2 is sourced, its packages of the same names would be found first.
 prefer_ros1()

@@ -46,7 +46,7 @@ e/c : increase/decrease only angular speed by 10%
 CTRL-C to quit
 """
 
-_HELP_EVERY = 15  # speed changes between repetitions of the help text
+_HELP_EVERY = 15  # number of speed changes after which the help text is printed again
 
 _QUIT = "\x03"
 
@@ -115,7 +115,7 @@ class KeyTeleop:
         return f"currently:\tspeed {self._speed}\tturn {self._turn} "
 
     def press(self, key: str) -> list[str] | None:
-        """Process a key ("": no key before the timeout); return the lines to print, or None if there is nothing to publish."""
+        """Process a key, or "" after the timeout; return the lines to print, or None if there is nothing to publish."""
         if key in _MOVES:
             self._direction = _MOVES[key]
             return []
@@ -210,7 +210,7 @@ class _Output:
 
 
 def main() -> int:
-    """Run the node until Ctrl-C; return the exit status: 1 without a terminal, or for an invalid parameter."""
+    """Run the node until Ctrl-C; return the exit status, 1 without a terminal or for an invalid parameter."""
     if sys.stdin is None or not sys.stdin.isatty():
         print(
             "teleop_twist_keyboard: ERROR: keys come from a terminal, which standard input is not: "

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 __all__ = ["PIXELS", "Canvas", "Color"]
 
-PIXELS = 500  # width and height of the canvas
+PIXELS = 500  # width and height of the canvas, in pixels
 
 
 class Color(NamedTuple):
@@ -22,13 +22,13 @@ class Color(NamedTuple):
 
 
 class Canvas:
-    """The pixels; (x, y) is a pixel's centre, y increases downwards."""
+    """The pixels; (x, y) is a pixel's centre, and y increases downwards."""
 
     def __init__(self, background: Color) -> None:
         self.pixels: NDArray[np.uint8] = np.empty((PIXELS, PIXELS, 3), np.uint8)
         """The colours by row and column."""
         self.marks: NDArray[np.bool_] = np.empty((PIXELS, PIXELS), np.bool_)
-        """Whether a pen has drawn on a pixel, by row and column."""
+        """True for each pixel on which a pen has drawn, by row and column."""
         self.background = background
         self.version = 0  # incremented on each change
         self.fill(background)
@@ -43,7 +43,7 @@ class Canvas:
     def stroke(
         self, start: tuple[float, float], end: tuple[float, float], color: Color, width: float
     ) -> None:
-        """Draw a straight line with square ends that extend ``width`` / 2 beyond its end points; clip it to the canvas."""
+        """Draw a straight line whose square ends extend ``width`` / 2 beyond its end points, clipped to the canvas."""
         (x0, y0), (x1, y1) = start, end
         length = math.hypot(x1 - x0, y1 - y0)
         along_x, along_y = ((x1 - x0) / length, (y1 - y0) / length) if length else (1.0, 0.0)

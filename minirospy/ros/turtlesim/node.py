@@ -1,4 +1,4 @@
-"""turtlesim_node: receives velocities and service calls, publishes the turtles' poses and colours, draws them in a terminal.
+"""turtlesim_node: receives velocities and service calls, publishes turtles' poses and colours, and draws them in a terminal.
 
 Parameters: ~background_r, ~background_g, ~background_b (69, 86, 255; read when the canvas is cleared), ~headless (false: draw
 if stdin and stdout are a terminal). Source: http://wiki.ros.org/turtlesim.
@@ -42,7 +42,7 @@ from minirospy.ros.turtlesim.world import BACKGROUND, STEP_SECONDS, Reading, Vel
 
 __all__ = ["Simulator", "main"]
 
-_LATE_SECONDS = 0.2  # seconds; a node that was suspended for longer skips the missed steps
+_LATE_SECONDS = 0.2  # seconds; if the node was suspended for longer, it skips the missed steps
 
 _T = TypeVar("_T")
 
@@ -75,7 +75,7 @@ def _has_terminal() -> bool:
 
 
 def _background() -> Color:
-    """Return the background colour from the parameters; ROS's default replaces a value that is not an integer."""
+    """Return the background colour from the parameters. If a value is not an integer, use ROS's default instead."""
     values = [rospy.get_param(f"~background_{part}", usual) for part, usual in BACKGROUND._asdict().items()]
     chosen = [
         value & 255 if isinstance(value, int) and not isinstance(value, bool) else usual
@@ -93,7 +93,7 @@ class Simulator:
             if not rospy.has_param(f"~background_{part}"):
                 rospy.set_param(f"~background_{part}", usual)
         self.world = World(_background())
-        # Serialises changes to the set of turtles; meanwhile the world continues to step.
+        # Serialises changes to the set of turtles; the world continues to step in the meantime.
         self._changing = threading.Lock()
         self._ends: dict[str, _Ends] = {}
         self._services: list[rospy.Service[object]] = []
@@ -165,7 +165,8 @@ class Simulator:
         with self._changing:
             with self.lock:
                 self.world.remove_all()
-            # Reuse the topics of a turtle with the same name, so that their subscribers receive every message.
+            # Reuse the topics of an earlier turtle with the same name, so that their subscribers receive every
+            # message.
             first = self._add(self.world.spawn_first)
             for name in set(self._ends) - {first}:
                 self._remove(name)
@@ -176,7 +177,7 @@ class Simulator:
         def spawn() -> str:
             spaces = {rospy.resolve_name(name) for name in self.world.names}
             if request.name and rospy.resolve_name(request.name) in spaces:
-                # The new name may be another spelling of an existing one: /turtle1.
+                # The new name may be another spelling of an existing name, such as /turtle1.
                 raise WorldError(f"A turtled named [{request.name}] already exists")
             return self.world.spawn(request.name, request.x, request.y, request.theta)
 

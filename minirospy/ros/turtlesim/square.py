@@ -15,7 +15,7 @@ __all__ = ["Order", "Square"]
 
 _SIDE_METRES = 2.0
 _NEAR_METRES, _NEAR_RADIANS = 0.1, 0.01
-_STILL = 0.0001  # metres or radians per second; a slower turtle counts as stopped
+_STILL = 0.0001  # metres or radians per second; below this, the turtle counts as stopped
 
 
 class Order(NamedTuple):
@@ -39,7 +39,10 @@ class Square:
         self._is_stopping = False
 
     def step(self, pose: Pose, linear: float, angular: float) -> tuple[Order | None, list[str]]:
-        """Return the velocity for a turtle at ``pose`` with these velocities (None: no change), and the lines to log."""
+        """Return the velocity to command, or None for no change, and the lines to log.
+
+        The turtle is at ``pose``, and moves with the velocities ``linear`` and ``angular``.
+        """
         if self._goal is None:
             self._goal, lines = _new_goal(_ahead(pose))
             return self._go(pose), lines

@@ -23,11 +23,11 @@ _QUIT = "q"
 _USUAL_SCALE = 2.0
 
 DIRECTIONS = {"up": (1.0, 0.0), "down": (-1.0, 0.0), "left": (0.0, 1.0), "right": (0.0, -1.0)}
-"""Key -> signs of (forward motion, turn to the left)."""
+"""The signs of (forward motion, turn to the left) by key."""
 
 
 def main() -> int:
-    """Run the node until q or Ctrl-C; return the exit status: 1 without a terminal."""
+    """Run the node until q or Ctrl-C; return the exit status, 1 without a terminal."""
     if sys.stdin is None or not sys.stdin.isatty():
         print(
             "turtle_teleop_key: ERROR: keys come from a terminal, which standard input is not: "
@@ -50,7 +50,7 @@ def main() -> int:
 def _run() -> None:
     linear, angular = _scale("scale_linear"), _scale("scale_angular")
     publisher = rospy.Publisher("turtle1/cmd_vel", Twist, queue_size=1)
-    # Set up the terminal before the help is shown, because the setup discards earlier input.
+    # Set up the terminal before showing the help, because the setup discards earlier input.
     with Keys(end=_QUIT) as keys:
         print(_HELP, flush=True)
         while not rospy.is_shutdown():

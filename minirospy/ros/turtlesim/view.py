@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 __all__ = ["Picture", "Screen"]
 
 _PERIOD_SECONDS = 0.1
-_LINES_BESIDE = 4  # terminal lines reserved for the log and the picture's frame
+_LINES_BESIDE = 4  # number of terminal lines reserved for the log and the picture's frame
 
 _ROWS = range(8, 41)
-"""Allowed number of rows: fewer rows show too little, more rows take too much CPU time."""
+"""Allowed numbers of rows: with fewer rows, too little is visible; more rows take too much CPU time."""
 
 _ARROWS, _ASCII_ARROWS = "→↗↑↖←↙↓↘", ">/^\\</v\\"
 _STYLES = ("bright_green", "bright_yellow", "bright_red", "bright_cyan", "bright_magenta", "bright_white")
@@ -33,7 +33,7 @@ _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 
 
 class Picture:
-    """The current picture of a world, for rich: pen lines as dots, turtles as arrows, each turtle's pose below."""
+    """The current picture of a world, for rich: pen lines as dots, turtles as arrows, and each turtle's pose below."""
 
     def __init__(self, world: World) -> None:
         self._canvas = world.canvas
@@ -73,7 +73,7 @@ class Picture:
         )
 
     def _turtles(self, rows: int, *, is_ascii: bool) -> dict[tuple[int, int], tuple[str, str]]:
-        """Return each turtle's arrow and style by row and column; the last turtle in a cell wins."""
+        """Return each turtle's arrow and style by row and column. If several turtles are in a cell, the last one is shown."""
         arrows = _ASCII_ARROWS if is_ascii else _ARROWS
         found = {}
         for index, pose in enumerate(self._poses.values()):
@@ -86,7 +86,7 @@ class Picture:
 def cells(canvas: Canvas, rows: int, *, is_ascii: bool = False) -> tuple[list[str], list[list[Color]]]:
     """Return the canvas as ``rows`` lines with 2 * ``rows`` characters, and the mean line colour in each character."""
     dots = _blocks(canvas.marks, 4 * rows, 4 * rows) > 0
-    # A character has four rows with two dots each.
+    # A Braille character has four rows with two dots each.
     dots = dots.reshape(rows, 4, 2 * rows, 2)
     codes = (dots * _DOTS[None, :, None, :]).sum(axis=(1, 3))
     marked = "*" if is_ascii else ""
@@ -144,7 +144,7 @@ class Screen:
 
         console = Console(file=own_output())
         if console.is_dumb_terminal:
-            # A dumb terminal cannot move the cursor back.
+            # Draw nothing, because a dumb terminal cannot move the cursor back.
             self._ended.set()
         self._live = Live(console=console, auto_refresh=False)
         if not self._ended.is_set():

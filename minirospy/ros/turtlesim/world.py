@@ -1,4 +1,4 @@
-"""The turtles' world: input commands, teleports and pens; output poses, colours and wall hits. Pure: no sockets, no clock.
+"""The turtles' world. Its inputs are commands, teleports and pens, its outputs poses, colours and wall hits. Pure.
 
 Lengths are in metres, angles in radians; the origin is the lower left corner. Source: http://wiki.ros.org/turtlesim, and the
 behaviour of turtlesim 0.10.2.
@@ -16,7 +16,7 @@ from minirospy.ros.turtlesim.canvas import PIXELS, Canvas, Color
 
 __all__ = ["BACKGROUND", "SIZE", "STEP_SECONDS", "Pen", "Pose", "Reading", "Velocity", "World", "WorldError"]
 
-BACKGROUND = Color(69, 86, 255)  # used if the parameters set no other colour
+BACKGROUND = Color(69, 86, 255)  # background if the parameters set no other colour
 
 STEP_SECONDS = 0.016  # seconds between two steps
 
@@ -35,7 +35,7 @@ SIZE = _float32((PIXELS - 1) / _PIXELS_PER_METRE)
 
 
 class WorldError(MinirospyError):
-    """The world refuses a request."""
+    """The world rejects a request."""
 
 
 class Velocity(NamedTuple):
@@ -143,12 +143,12 @@ class World:
         self.canvas.fill(background)
 
     def remove_all(self) -> None:
-        """Remove all turtles; the next one without a name is turtle1 again."""
+        """Remove all turtles; the next turtle without a name is turtle1 again."""
         self._turtles.clear()
         self._last_number = 0
 
     def spawn(self, name: str, x: float, y: float, theta: float) -> str:
-        """Add a turtle; return its name, a generated one if ``name`` is empty.
+        """Add a turtle; return its name, which is generated if ``name`` is empty.
 
         Raise WorldError if the name is in use or invalid.
         """
@@ -164,7 +164,7 @@ class World:
         return name
 
     def spawn_first(self) -> str:
-        """Add a turtle without a name in the middle; return its name."""
+        """Add a turtle with a generated name in the middle; return its name."""
         return self.spawn("", SIZE / 2, SIZE / 2, 0.0)
 
     def kill(self, name: str) -> None:

@@ -12,7 +12,7 @@ from minirospy.runtime.rpc.async_client import AsyncRpcClient
 __all__ = ["find_dead"]
 
 _MAX_CONCURRENT = 50
-_SECONDS = 3.0
+SILENCE_SECONDS = 3.0
 
 
 async def find_dead(rpc: AsyncRpcClient, nodes: Mapping[str, str]) -> AsyncIterator[tuple[str, str]]:
@@ -36,7 +36,7 @@ async def find_dead(rpc: AsyncRpcClient, nodes: Mapping[str, str]) -> AsyncItera
 
 async def _is_dead(rpc: AsyncRpcClient, uri: str) -> bool:
     try:
-        await rpc.call(uri, "getPid", "/master", timeout=_SECONDS)
+        await rpc.call(uri, "getPid", "/master", timeout=SILENCE_SECONDS)
     except RpcUnreachable as error:
         return isinstance(error.__cause__, ConnectionRefusedError)
     except RpcError:

@@ -27,8 +27,8 @@ __all__ = ["RETRY_SECONDS", "Journal", "JournalBusyError", "Left", "boot_id"]
 
 _log = logging.getLogger(__name__)
 
-_COMPACT_BYTES = 1024 * 1024
-_COMPACT_FACTOR = 4
+COMPACT_BYTES = 1024 * 1024
+COMPACT_FACTOR = 4
 _STEP_RECORDS = 200
 
 RETRY_SECONDS = 30.0  # seconds before writing the journal again after a failure
@@ -280,7 +280,7 @@ class Journal:
     def _switch_to(self, file: int, size: int) -> None:
         self._file = file
         self._size = size
-        self._compact_at = max(_COMPACT_BYTES, _COMPACT_FACTOR * size)
+        self._compact_at = max(COMPACT_BYTES, COMPACT_FACTOR * size)
         self._stored.clear()
         self.trouble = ""
 

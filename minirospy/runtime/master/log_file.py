@@ -19,7 +19,7 @@ from minirospy.base.escape import escaped
 
 __all__ = ["LogFile", "LogFileHandler"]
 
-_SECONDS = 0.5
+FLUSH_SECONDS = 0.5
 # Maximum number of characters to collect, because writing megabytes in one call would block the master
 _MAX_PENDING = 64 * 1024
 
@@ -65,7 +65,7 @@ class LogFile(LogFileHandler):
         if self._pending > _MAX_PENDING:
             self._write_out()
         elif self._timer is None:
-            self._timer = asyncio.get_running_loop().call_later(_SECONDS, self._time_is_up)
+            self._timer = asyncio.get_running_loop().call_later(FLUSH_SECONDS, self._time_is_up)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Add a record. Thread-safe."""

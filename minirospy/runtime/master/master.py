@@ -46,9 +46,9 @@ _log = logging.getLogger(__name__)
 _CHECK_SECONDS = 3.0
 _CHECK_TRIES = 3
 _MAX_CONCURRENT_CHECKS = 100
-_QUICK_CHECK_SECONDS = 1.0
+QUICK_CHECK_SECONDS = 1.0
 _TOUCH_SECONDS = 30.0
-_LOCK_SECONDS = 3.0
+LOCK_SECONDS = 3.0
 # Seconds between attempts to lock the journal: the system may release a killed master's port before the journal's
 # lock
 _LOCK_PAUSE = 0.02
@@ -61,8 +61,8 @@ _COLLECT = (2000, 5, 1_000_000_000)
 collected automatically.
 """
 
-_SWEEP_SECONDS = 10.0  # seconds between the checks for dead nodes if the master is nearly full
-_MAX_FORGOTTEN_PER_ITERATION = 20  # maximum number of dead nodes to forget per loop iteration
+SWEEP_SECONDS = 10.0  # between the checks for dead nodes if the master is nearly full
+_MAX_FORGOTTEN_PER_ITERATION = 20  # dead nodes to forget per loop iteration
 
 _OWN_NODE = "/rosout"
 
@@ -104,7 +104,7 @@ class Master(MasterApi):
         self._journal: Journal | None = None
         self._same_host = same_host
         self._owns_process = owns_process
-        self._server = RpcServer(
+        self.server = RpcServer(
             self.serve,
             bind_host=bind_host,
             port=port,
@@ -112,10 +112,10 @@ class Master(MasterApi):
             access=access,
             known_as=_names_of(host, bind_host) if same_host else (),
         )
-        self._notifier = Notifier(self, self._server.turns, timeout, same_host=same_host)
+        self.notifier = Notifier(self, self.server.turns, timeout, same_host=same_host)
         self._replaced = RateLimitedLogger(_log, 10)
-        self._checking: asyncio.Task[None] | None = None
-        self._touching: asyncio.TimerHandle | None = None
+        self.checking: asyncio.Task[None] | None = None
+        self.touching: asyncio.TimerHandle | None = None
         self._collecting: asyncio.TimerHandle | None = None
         self._sweeping: asyncio.Task[None] | None = None
         self.stopped = asyncio.Event()  # set when the master is requested to stop
@@ -123,7 +123,7 @@ class Master(MasterApi):
     @property
     def port(self) -> int:
         """The port that the master listens on."""
-        return self._server.port
+        return self.server.port
 
     @property
     def uri(self) -> str:
@@ -146,12 +146,12 @@ class Master(MasterApi):
     async def start(self) -> None:
         """Bind the port, recover a killed master's state, and serve. Raise OSError if the port cannot be bound."""
         # Bind the port first: of two masters that start together, the one that gets the port also gets the journal.
-        self._server.listen()
+        self.server.listen()
         try:
             nodes = await self._open_journal() if self._journal_path else {}
-            await self._server.start()
+            await self.server.start()
         except BaseException:
-            await self._server.close()
+            await self.server.close()
             if self._journal:
                 self._journal.close()
             raise
@@ -159,7 +159,7 @@ class Master(MasterApi):
             return_large_blocks()
             self._collect()
         if nodes:
-            self._checking = asyncio.ensure_future(self._check(nodes))
+            self.checking = asyncio.ensure_future(self._check(nodes))
         self._sweeping = asyncio.ensure_future(self._sweep())
 
     async def close(self, *, keep_journal: bool = False) -> None:
@@ -167,14 +167,14 @@ class Master(MasterApi):
 
         With ``keep_journal`` the next master continues this session.
         """
-        for task in (self._checking, self._sweeping):
+        for task in (self.checking, self._sweeping):
             if task:
                 task.cancel()
                 await asyncio.gather(task, return_exceptions=True)
-        for timer in (self._touching, self._collecting):
+        for timer in (self.touching, self._collecting):
             if timer:
                 timer.cancel()
-        await close_all([self._server.close, self._notifier.close, self._replaced.close])
+        await close_all([self.server.close, self.notifier.close, self._replaced.close])
         self.record = nothing
         if self._journal:
             if keep_journal:
@@ -184,7 +184,7 @@ class Master(MasterApi):
 
     def attach(self, node: Node) -> None:
         """Notify ``node``, which runs on this loop, of publishers directly, without an XML-RPC call."""
-        self._notifier.here[node.uri] = node.publishers_changed
+        self.notifier.here[node.uri] = node.publishers_changed
 
     def serve(self, method: str, args: Sequence[object]) -> object:
         """Return the response to one call from a client, possibly already serialized.
@@ -220,7 +220,7 @@ class Master(MasterApi):
         if isinstance(action, NodeShutdown):
             self.parameters.unsubscribe_node(action.name, action.uri)
             self._replaced.warning("another node took the name %s: %s is stopped", action.name, action.uri)
-        self._notifier.send(action)
+        self.notifier.send(action)
 
     def publisher_uris(self, topic: str) -> list[str]:
         """Return the URIs of a topic's publishers."""
@@ -236,7 +236,7 @@ class Master(MasterApi):
 
     def defer(self, uri: str, topic: str) -> None:
         """See :meth:`Notifier.defer`."""
-        self._notifier.defer(uri, topic)
+        self.notifier.defer(uri, topic)
 
     def stop(self) -> None:
         """Request the master to stop."""
@@ -269,8 +269,8 @@ class Master(MasterApi):
                 "services": self.registry.count_services(),
                 "parameters": len(parameters),
                 "calls": min(self.calls, 2**31 - 1),
-                "clients": self._server.clients,
-                "refused": self._server.refused,
+                "clients": self.server.clients,
+                "refused": self.server.refused,
                 "journal": self._journal_line(),
             },
         ]
@@ -292,7 +292,7 @@ class Master(MasterApi):
         journal = self._journal = Journal(
             self._journal_path,
             lambda: changes_to(self.registry, self.parameters),
-            start_steps=self._server.turns.start,
+            start_steps=self.server.turns.start,
         )
         busy: JournalBusyError | None = None
         try:
@@ -318,7 +318,7 @@ class Master(MasterApi):
                 f"{journal.trouble}; set ROS_HOME (it is tried again every {RETRY_SECONDS:.0f} s)"
             )
         self.record, self.store = journal.append, journal.store
-        self._touch()
+        self.touch()
         return self.registry.nodes()
 
     async def _take_up(self, left: Left) -> None:
@@ -366,18 +366,18 @@ class Master(MasterApi):
             gc.collect()
         self._collecting = asyncio.get_running_loop().call_later(_COLLECT_SECONDS, self._collect)
 
-    def _touch(self) -> None:
+    def touch(self) -> None:
         assert self._journal
         self._journal.touch()
         # An unchanged graph triggers no writes, so a failed write would never be retried.
         self._journal.retry()
-        self._touching = asyncio.get_running_loop().call_later(_TOUCH_SECONDS, self._touch)
+        self.touching = asyncio.get_running_loop().call_later(_TOUCH_SECONDS, self.touch)
 
     # --- the nodes of a master that was killed
 
     async def _anybody_lives(self, nodes: Mapping[str, str]) -> bool:
         rpc = AsyncRpcClient(same_host=self._same_host)
-        calls = [_lives(rpc, name, uri, _QUICK_CHECK_SECONDS) for name, uri in nodes.items()]
+        calls = [_lives(rpc, name, uri, QUICK_CHECK_SECONDS) for name, uri in nodes.items()]
         try:
             return any(await asyncio.gather(*calls))
         finally:
@@ -411,7 +411,7 @@ class Master(MasterApi):
         Otherwise they would stay full, because this master, like rosmaster, keeps a killed node's registrations.
         """
         while True:
-            await asyncio.sleep(_SWEEP_SECONDS)
+            await asyncio.sleep(SWEEP_SECONDS)
             if not self.registry.is_crowded:
                 continue
             rpc, count = AsyncRpcClient(same_host=self._same_host), 0
@@ -420,7 +420,7 @@ class Master(MasterApi):
                     self.parameters.unsubscribe_node(name, uri)
                     actions = self.registry.forget(name, uri)
                     self.record("gone", name, uri)
-                    self._server.turns.start(self.notify_in_steps(actions))
+                    self.server.turns.start(self.notify_in_steps(actions))
                     count += 1
                     if count % _MAX_FORGOTTEN_PER_ITERATION == 0:
                         await asyncio.sleep(0)
@@ -438,7 +438,7 @@ async def _lock(journal: Journal) -> None:
     """Lock the journal; if another process has locked it, retry for a moment. The caller has bound the port."""
     from minirospy.runtime.master.journal import JournalBusyError
 
-    end = time.monotonic() + _LOCK_SECONDS
+    end = time.monotonic() + LOCK_SECONDS
     while True:
         try:
             journal.lock()

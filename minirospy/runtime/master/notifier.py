@@ -26,19 +26,19 @@ __all__ = ["Notifier", "State"]
 _log = logging.getLogger(__name__)
 
 _MASTER = "/master"
-_MAX_CONCURRENT_CALLS = 200
-_CALLS_TO_SUSPECTS = 50
+MAX_CONCURRENT_CALLS = 200
+CALLS_TO_SUSPECTS = 50
 _MAX_SUSPECTS = 10000
 _LONG_LIST = 200
 _SECONDS_PER_PUBLISHER = 50e-6
 _TICK = 0.001
-_HOLD_SECONDS = 0.02
+HOLD_SECONDS = 0.02
 _HOLD_TICK = 0.01
 
 _SECONDS_PER_TURN = 0.003  # time limit in seconds per loop iteration for starting calls
 
 # Maximum pending parameter notifications per node; beyond that, one notification per subscribed key replaces them
-_MAX_PARAMETERS = 32
+MAX_PARAMETERS = 32
 
 # maximum total size in bytes of large calls in progress; further ones are queued
 _LARGE_BYTES = 32 * 1024 * 1024
@@ -92,18 +92,18 @@ class Notifier:
         self._state = state
         self._turns = turns
         self._timeout = timeout
-        self._rpc = AsyncRpcClient(same_host=same_host, max_answer=_MAX_ANSWER)
+        self.rpc = AsyncRpcClient(same_host=same_host, max_answer=_MAX_ANSWER)
 
         self.here: dict[str, Callable[[str, list[str]], object]] = {}
         """Dict from the URI of a node on this loop to the function to call with a topic and its publishers, instead of an
         XML-RPC call.
         """
-        self._nodes: dict[str, _Backlog] = {}
+        self.nodes: dict[str, _Backlog] = {}
         # Dict from (URI, topic) to the earliest time at which its next notification may be sent, earliest first.
         self._held: dict[tuple[str, str], float] = {}
 
-        self._line = _Line(_MAX_CONCURRENT_CALLS)
-        self._suspect_line = _Line(_CALLS_TO_SUSPECTS)
+        self.line = _Line(MAX_CONCURRENT_CALLS)
+        self.suspect_line = _Line(CALLS_TO_SUSPECTS)
         self._suspects: set[str] = set()
         self._starts_soon = False
         self._closed = False
@@ -128,7 +128,7 @@ class Notifier:
             del self._held[next(iter(self._held))]
         self._held.pop((uri, topic), None)
         # Round up to a tick, so that the master wakes up once for all delays that end within one tick.
-        self._held[uri, topic] = (now // _HOLD_TICK + 1) * _HOLD_TICK + _HOLD_SECONDS
+        self._held[uri, topic] = (now // _HOLD_TICK + 1) * _HOLD_TICK + HOLD_SECONDS
 
     def send(self, notice: Notice) -> None:
         """Send a notification to its node soon."""
@@ -142,10 +142,10 @@ class Notifier:
             key = (notice.key,)
             end = self._held.get((notice.uri, PARAMETERS))
 
-        node = self._nodes.get(notice.uri)
+        node = self.nodes.get(notice.uri)
         is_idle = node is None or node.timer is not None
         if node is None:
-            node = self._nodes[notice.uri] = _Backlog(notice.uri)
+            node = self.nodes[notice.uri] = _Backlog(notice.uri)
 
         if end and end > asyncio.get_running_loop().time():
             node.pauses[key] = max(end, node.pauses.get(key, 0.0))
@@ -154,7 +154,7 @@ class Notifier:
             node.parameters += 1
         node.notices[key] = notice
 
-        if node.parameters > _MAX_PARAMETERS:
+        if node.parameters > MAX_PARAMETERS:
             self._summarize(node)
         if is_idle:
             self._go_on(node)
@@ -162,10 +162,10 @@ class Notifier:
     async def close(self) -> None:
         """Discard the pending notifications."""
         self._closed = True
-        for node in self._nodes.values():
+        for node in self.nodes.values():
             if node.timer:
                 node.timer.cancel()
-        await self._rpc.close()
+        await self.rpc.close()
 
     def _summarize(self, node: _Backlog) -> None:
         """Replace the notifications for many parameters with one for each key that the node subscribed to."""
@@ -176,7 +176,7 @@ class Notifier:
         node.parameters = 0
 
     def _line_up(self, node: _Backlog) -> None:
-        (self._suspect_line if node.uri in self._suspects else self._line).waiting.append(node)
+        (self.suspect_line if node.uri in self._suspects else self.line).waiting.append(node)
         self._start_soon()
 
     def _start_soon(self) -> None:
@@ -188,7 +188,7 @@ class Notifier:
     def _start(self) -> None:
         self._starts_soon = False
         end = time.perf_counter() + _SECONDS_PER_TURN
-        for line in (self._line, self._suspect_line):
+        for line in (self.line, self.suspect_line):
             while line.waiting and line.under_way < line.most and not self._closed:
                 if time.perf_counter() > end:
                     self._start_soon()
@@ -224,7 +224,7 @@ class Notifier:
             body = serialize_call("paramUpdate", [_MASTER, notice.key, value])
         else:
             body = serialize_call("shutdown", [_MASTER, f"[{notice.name}] Reason: {notice.reason}"])
-        self._rpc.start(node.uri, body, self._timeout, partial(self._called, node, line, notice, count, 0))
+        self.rpc.start(node.uri, body, self._timeout, partial(self._called, node, line, notice, count, 0))
 
     def _call_later(
         self, node: _Backlog, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
@@ -235,7 +235,7 @@ class Notifier:
             self._turns.start(self._call_in_steps(node, line, notice, count))
 
         # Call nodes that responded to the last notification first.
-        (self._large.append if line is self._suspect_line else self._large.appendleft)(start)
+        (self._large.append if line is self.suspect_line else self._large.appendleft)(start)
         self._start_large()
 
     def _start_large(self) -> None:
@@ -272,7 +272,7 @@ class Notifier:
         size = sum(map(len, body))
         self._large_bytes += size
         done = partial(self._called, node, line, notice, count, size)
-        self._rpc.start(node.uri, body, self._timeout, done)
+        self.rpc.start(node.uri, body, self._timeout, done)
         self._start_large()
 
     def _called(
@@ -319,7 +319,7 @@ class Notifier:
             # A timer may fire early by up to the clock's resolution.
             node.timer = loop.call_at(min(node.pauses.values()) + _TICK, self._go_on, node)
         else:
-            del self._nodes[node.uri]
+            del self.nodes[node.uri]
 
     def _update(self, topic: str, publishers: list[str]) -> bytes:
         """Return the call that reports a topic's publishers."""

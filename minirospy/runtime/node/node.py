@@ -31,8 +31,7 @@ __all__ = ["Node"]
 
 _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
-# maximum idle connections to the Slave API; a graph has about as many as this node has peers
-_MAX_IDLE = 200
+MAX_IDLE = 200  # idle connections to the Slave API; a graph has about as many as this node has peers
 
 # seconds after an unsubscription in which the master may still send lists of publishers
 _STALE_SECONDS = 5.0
@@ -80,25 +79,25 @@ class Node:
         self._readers = ReaderSet()
         self._header_memory = tcp.HeaderMemory()
         self._unreachable = Unreachable()
-        self._rpc = AsyncRpcClient(same_host=environment.same_host)
+        self.rpc = AsyncRpcClient(same_host=environment.same_host)
         tables: Mapping[str, Mapping[str, Publication | Subscription | ServiceServer]] = {
             "Publisher": self.publications,
             "Subscriber": self.subscriptions,
             "Service": self.services,
         }
-        self._registrations = Registrations(name, environment, tables, self._rpc, self.workers, watch_seconds)
-        self.parameters = self._registrations.parameters
+        self.registrations = Registrations(name, environment, tables, self.rpc, self.workers, watch_seconds)
+        self.parameters = self.registrations.parameters
         """The parameters that this node has subscribed to at the master; the subscribing code adds them."""
-        self.when_registered_again = self._registrations.when_registered_again
+        self.when_registered_again = self.registrations.when_registered_again
         """Functions that register further state.
 
         They are called in workers when the node registers again with a master that had lost it.
         """
 
-        self._server: RpcServer | None = None
+        self.server: RpcServer | None = None
         self._access = Access.parse(environment.allow) if environment.allow else None
-        self._listener = tcp.Listener(self._accept, self._access.allows if self._access else None)
-        self._unix_listener = tcp.Listener(self._accept)
+        self.listener = tcp.Listener(self._accept, self._access.allows if self._access else None)
+        self.unix_listener = tcp.Listener(self._accept)
         # The value of :func:`local.this_host` if this node also uses Unix sockets, else ""
         self.this_host = ""
         # Name of the Unix socket that serves topics to processes on this machine, or "".
@@ -110,7 +109,7 @@ class Node:
     @property
     def tcpros_port(self) -> int:
         """The port that serves this node's topics and services."""
-        return self._listener.port
+        return self.listener.port
 
     @property
     def is_sending(self) -> bool:
@@ -121,28 +120,28 @@ class Node:
         """Open the node's servers; port 0 means any free port. Raise OSError if a server cannot listen."""
         host = self.environment.bind_host
         ports = self.environment.ports
-        self._listener.open(host, tcpros_port, ports)
+        self.listener.open(host, tcpros_port, ports)
         if self.environment.same_host:
             self._open_unix_listener()
 
-        self._server = RpcServer(
+        self.server = RpcServer(
             SlaveApi(self).dispatch,
             bind_host=host,
             port=xmlrpc_port,
             ports=ports,
-            most_idle=_MAX_IDLE,
+            most_idle=MAX_IDLE,
             access=self._access,
             known_as=(self.environment.uri_host,) if self.environment.same_host else (),
         )
         try:
-            await self._server.start()
+            await self.server.start()
         except BaseException:
             await self.close()
             raise
 
-        self.uri = f"http://{self.environment.uri_host}:{self._server.port}/"
-        self._registrations.uri, self._registrations.service_uri = self.uri, self.service_uri
-        self._registrations.watch()
+        self.uri = f"http://{self.environment.uri_host}:{self.server.port}/"
+        self.registrations.uri, self.registrations.service_uri = self.uri, self.service_uri
+        self.registrations.watch()
         if host in {"127.0.0.1", "::1"} and not _is_loopback(self.environment.master_address[0]):
             # Run this in a thread, because resolving a host name may block.
             await asyncio.get_running_loop().run_in_executor(None, self._check_own_address)
@@ -156,7 +155,7 @@ class Node:
         if self._closed:
             return
         self._closed = True
-        self._unregistering = asyncio.ensure_future(self._registrations.close(announces=announces))
+        self._unregistering = asyncio.ensure_future(self.registrations.close(announces=announces))
         # Let the first call be sent before doing anything else.
         await asyncio.sleep(0)
 
@@ -170,12 +169,12 @@ class Node:
         )
 
         # Close the Unix socket before the port: the next server on that port uses the same socket name.
-        await close_all([self._unix_listener.close, self._listener.close])
+        await close_all([self.unix_listener.close, self.listener.close])
         tables = (self.publications, self.subscriptions, self.services)
         close_each([part.close for table in tables for part in table.values()])
         waits = [subscription.wait_closed for subscription in self.subscriptions.values()]
-        servers = [self._server.close] if self._server else []
-        await close_all([*waits, *servers, self._rpc.close, self._registrations.cancel])
+        servers = [self.server.close] if self.server else []
+        await close_all([*waits, *servers, self.rpc.close, self.registrations.cancel])
 
     def stop_unregistering(self) -> None:
         """Let :meth:`close` return even if the master has not responded. Call this on the loop."""
@@ -187,20 +186,20 @@ class Node:
 
         Raise MasterUnreachableError if it does not respond, RpcRefused with the master's message if it refuses the call.
         """
-        return await self._registrations.call(method, *args)
+        return await self.registrations.call(method, *args)
 
     async def advertise(self, publication: Publication) -> None:
         """Publish a topic. Raise ValueError if this node already publishes it."""
         if self.publications.setdefault(publication.topic, publication) is not publication:
             raise ValueError(f"{self.name} publishes {publication.topic} already")
-        await self._registrations.update(("Publisher", publication.topic))
+        await self.registrations.update(("Publisher", publication.topic))
 
     async def unadvertise(self, publication: Publication) -> None:
         """Stop publishing a topic."""
         if self.publications.get(publication.topic) is publication:
             del self.publications[publication.topic]
             try:
-                await self._registrations.update(("Publisher", publication.topic))
+                await self.registrations.update(("Publisher", publication.topic))
                 await asyncio.gather(*(link.drain(_FLUSH_SECONDS) for link in publication.links))
             finally:
                 publication.close()
@@ -221,7 +220,7 @@ class Node:
             type_,
             self.name,
             deliver,
-            rpc=self._rpc,
+            rpc=self.rpc,
             workers=self.workers,
             readers=self._readers,
             newest=newest,
@@ -237,7 +236,7 @@ class Node:
         topic = subscription.topic
         if self.subscriptions.setdefault(topic, subscription) is not subscription:
             raise ValueError(f"{self.name} subscribes to {topic} already")
-        await self._registrations.update(("Subscriber", topic))
+        await self.registrations.update(("Subscriber", topic))
 
     async def unsubscribe(self, subscription: Subscription) -> None:
         """Unsubscribe from a topic."""
@@ -249,7 +248,7 @@ class Node:
                 self._left[topic].cancel()
             loop = asyncio.get_running_loop()
             self._left[topic] = loop.call_later(_STALE_SECONDS, self._left.pop, topic)
-            await self._registrations.update(("Subscriber", topic))
+            await self.registrations.update(("Subscriber", topic))
 
     def make_service(
         self, name: str, type_: InterfaceType, handler: Handler, *, request_type: str, response_type: str
@@ -269,14 +268,14 @@ class Node:
         """Offer a service. Raise ValueError if this node already offers it."""
         if self.services.setdefault(server.name, server) is not server:
             raise ValueError(f"service [{server.name}] already registered")
-        await self._registrations.update(("Service", server.name))
+        await self.registrations.update(("Service", server.name))
 
     async def unserve(self, server: ServiceServer) -> None:
         """Stop offering a service; cancel the calls in progress."""
         if self.services.get(server.name) is server:
             del self.services[server.name]
             server.close()
-            await self._registrations.update(("Service", server.name))
+            await self.registrations.update(("Service", server.name))
 
     @property
     def service_uri(self) -> str:
@@ -305,7 +304,7 @@ class Node:
 
     def _request_again(self, topic: str) -> None:
         del self._requesting[topic]
-        self._registrations.request_again(topic)
+        self.registrations.request_again(topic)
 
     async def _accept(self, sock: socket.socket, address: str) -> None:
         """Serve a connected peer; its header specifies a topic or service."""
@@ -334,7 +333,7 @@ class Node:
             why = "no topic or service name detected"
 
         if why:
-            self._listener.log_refusal(f"Could not process inbound connection: {why}{fields}")
+            self.listener.log_refusal(f"Could not process inbound connection: {why}{fields}")
             await tcp.send_header(sock, {"error": why})
             sock.close()
 
@@ -344,7 +343,7 @@ class Node:
         if sock:
             self.this_host = local.this_host()
             self.unix_name = local.name_of(self.environment.uri_host, self.tcpros_port)
-            self._unix_listener.listen(sock)
+            self.unix_listener.listen(sock)
 
     def _check_own_address(self) -> None:
         environment = self.environment

@@ -39,7 +39,7 @@ _CALL_SECONDS = 30.0
 # Time limit in seconds for the check whether this node is registered. It is short, because the check is repeated soon
 _LOOK_SECONDS = 5.0
 
-_SILENT_SECONDS, _STILL_SILENT_SECONDS = 10.0, 2.0
+SILENT_SECONDS, STILL_SILENT_SECONDS = 10.0, 2.0
 """A closing node gives up if the master sends no response for this many seconds; the shorter limit applies if the master
 was already silent before. The total time is not limited, because the node waits for a busy master that still responds.
 """
@@ -47,7 +47,7 @@ was already silent before. The total time is not limited, because the node waits
 _CLOSING_CALL_SECONDS = 3600.0
 _PROBE_SECONDS = 3.0  # seconds between a closing node's checks whether the master still responds
 
-_NOTICE_SECONDS = 3.0  # seconds before a closing node logs that it is still waiting for the master
+NOTICE_SECONDS = 3.0  # before a closing node logs that it is still waiting for the master
 
 _MAX_CALLS_PER_MULTICALL = 100  # maximum number of unregistrations per system.multicall
 
@@ -87,38 +87,38 @@ class Registrations:
         self._name = name
         self._environment = environment
         self._tables = tables
-        self._rpc = rpc
+        self.rpc = rpc
         # If no thread can be started, the functions stay queued, and the watch continues.
         self._again = InOrder(workers)
-        self._watch_seconds = watch_seconds
+        self.watch_seconds = watch_seconds
 
         self._known: dict[_Key, _Part | None] = {}
         """The object registered with the master; None if the call failed or has no response yet."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
-        self._watching: asyncio.Task[None] | None = None
+        self.watching: asyncio.Task[None] | None = None
         self._is_master_silent = False
         self._answered = 0.0  # time of the master's last response, by the loop's clock
         self._closed = False
 
     def watch(self) -> None:
         """Start checking whether the node is registered with the master."""
-        self._watching = asyncio.ensure_future(self._watch_master())
+        self.watching = asyncio.ensure_future(self._watch_master())
 
     async def close(self, *, announces: bool) -> None:
         """Unregister everything, and register nothing more. The first call is sent before anything else is done.
 
         Waits while the master continues to respond; does not wait if it refuses connections, and gives up if it sends no
-        response for ``_SILENT_SECONDS``. With ``announces``, a line is logged if this takes long.
+        response for ``SILENT_SECONDS``. ``announces``: whether to log a line when this takes long.
         """
         self._closed = True
-        if self._watching:
-            self._watching.cancel()
+        if self.watching:
+            self.watching.cancel()
         await self._unregister_all(announces=announces)
 
     async def cancel(self) -> None:
         """Cancel the calls that have not received a response yet."""
-        tasks = [*self._registering, *([self._watching] if self._watching else [])]
+        tasks = [*self._registering, *([self.watching] if self.watching else [])]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -128,15 +128,15 @@ class Registrations:
 
         Raise MasterUnreachableError if it does not respond, RpcRefused with the master's message if it refuses the call.
         """
-        return unwrap(method, await self._call_master(method, self._name, *args))
+        return unwrap(method, await self.call_master(method, self._name, *args))
 
-    async def _call_master(self, method: str, *args: object) -> object:
+    async def call_master(self, method: str, *args: object) -> object:
         """Call any method of the master. Raise MasterUnreachableError if it does not respond, RpcError if the call fails."""
         uri = self._environment.master_uri
         # While the node closes, _wait_for_answers() decides when to give up.
         seconds = _CLOSING_CALL_SECONDS if self._closed else _CALL_SECONDS
         try:
-            answer = await self._rpc.call(uri, method, *args, timeout=seconds)
+            answer = await self.rpc.call(uri, method, *args, timeout=seconds)
         except RpcUnreachable as error:
             self._is_master_silent = True
             raise master_unreachable(error) from error
@@ -247,7 +247,7 @@ class Registrations:
         """
         failures = 0
         while not self._closed:
-            await asyncio.sleep(self._watch_seconds)
+            await asyncio.sleep(self.watch_seconds)
             if not (self._known or any(self._tables.values())):
                 continue
 
@@ -323,9 +323,9 @@ class Registrations:
         """
         loop = asyncio.get_running_loop()
         uri = self._environment.master_uri
-        patience = _STILL_SILENT_SECONDS if self._is_master_silent else _SILENT_SECONDS
+        patience = STILL_SILENT_SECONDS if self._is_master_silent else SILENT_SECONDS
         text = "waiting for the master at %s to unregister this node; it is given up when it answers nothing for %g s"
-        notice = loop.call_later(_NOTICE_SECONDS, _log.warning, text, uri, patience) if announces else None
+        notice = loop.call_later(NOTICE_SECONDS, _log.warning, text, uri, patience) if announces else None
 
         self._answered = loop.time()
         pending = set(tasks)
@@ -346,7 +346,7 @@ class Registrations:
 
     async def _probe_master(self) -> None:
         with contextlib.suppress(MasterUnreachableError, RpcError):
-            await self._call_master("getPid", self._name)
+            await self.call_master("getPid", self._name)
 
     async def _call_all(self, calls: Sequence[_Call]) -> None:
         """Make all calls, ignoring their results; batch them if the master supports system.multicall (not all do).
@@ -359,7 +359,7 @@ class Registrations:
             answers: object = None
             if len(part) > 1:
                 with contextlib.suppress(RpcFault, RpcProtocolError):
-                    answers = await self._call_master("system.multicall", batch)
+                    answers = await self.call_master("system.multicall", batch)
             if not isinstance(answers, list) or len(answers) != len(part):
                 answers = [None] * len(part)
             for (method, args), answer in zip(part, answers, strict=True):

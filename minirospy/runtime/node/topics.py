@@ -50,8 +50,7 @@ __all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription", "Unrea
 
 _log = logging.getLogger(__name__)
 
-# seconds within which all nodes register again with a master that has lost its state
-_SETTLE_SECONDS = 10.0
+SETTLE_SECONDS = 10.0  # within which all nodes register again with a master that has lost its state
 
 # Failures before a publisher that refuses is reported: a publisher that is shutting down has exited by then
 _WARN_AFTER = 3
@@ -317,21 +316,21 @@ class Subscription:
         self._links: dict[str, InLink] = {}
         self._caller_id = caller_id
         self._deliver = deliver
-        self._rpc = rpc
+        self.rpc = rpc
         self._workers = workers
         self._readers = readers
         self._header_memory = header_memory
         self._on_loop = on_loop or isinstance(deliver, InTurns)
 
         self.lists = 0  # number of lists of publishers received
-        self._plan = SubscriptionPlan()
+        self.plan = SubscriptionPlan()
         self._named: list[str] = []
-        self._settling: asyncio.TimerHandle | None = None
+        self.settling: asyncio.TimerHandle | None = None
         self._reported: set[str] = set()
         self._unreachable = unreachable or Unreachable()
         # Limit the rate, because /rosout has as many publishers as there are nodes.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
-        self._connecting: dict[str, asyncio.Task[None]] = {}
+        self.connecting: dict[str, asyncio.Task[None]] = {}
         # Links to publishers that have left the master's list, each with the timer that closes it.
         self._leaving: dict[str, tuple[InLink, asyncio.TimerHandle]] = {}
         self.on_connected: list[Callable[[], object]] = []  # called on the loop when a publisher is connected
@@ -348,20 +347,20 @@ class Subscription:
             return
         self.lists += 1
         self._named = list(islice(uris, MAX_PUBLISHERS))
-        for action in self._plan.publishers_changed(self._named, keep=self._settling is not None):
+        for action in self.plan.publishers_changed(self._named, keep=self.settling is not None):
             if isinstance(action, Disconnect):
                 self._leave(action.uri)
             else:
-                self._start_connecting(action)
+                self.start_connecting(action)
 
     def registered_again(self, uris: Iterable[str]) -> None:
         """Apply the first list from a master that had lost its state. Call this on the loop.
 
         The list lacks nodes that have not registered again yet, so for a while no connected publisher is dropped.
         """
-        if self._settling:
-            self._settling.cancel()
-        self._settling = asyncio.get_running_loop().call_later(_SETTLE_SECONDS, self._settle)
+        if self.settling:
+            self.settling.cancel()
+        self.settling = asyncio.get_running_loop().call_later(SETTLE_SECONDS, self._settle)
         self.publishers_changed(uris)
 
     def close(self) -> None:
@@ -369,26 +368,26 @@ class Subscription:
         self._closed = True
         self._unreachable.close()
         self._limited_log.close()
-        if self._settling:
-            self._settling.cancel()
-        for task in self._connecting.values():
+        if self.settling:
+            self.settling.cancel()
+        for task in self.connecting.values():
             task.cancel()
         for uri in [*self._links, *self._leaving]:
             self._disconnect(uri)
 
     async def wait_closed(self) -> None:
         """Wait, after :meth:`close`, until pending connection attempts have stopped."""
-        await asyncio.gather(*self._connecting.values(), return_exceptions=True)
+        await asyncio.gather(*self.connecting.values(), return_exceptions=True)
 
     def _settle(self) -> None:
         """Forget publishers that the master does not list.
 
         Keep those with an open link, because rospy nodes never register again.
         """
-        self._settling = None
-        for action in self._plan.publishers_changed(self._named):
+        self.settling = None
+        for action in self.plan.publishers_changed(self._named):
             if isinstance(action, Connect):
-                self._start_connecting(action)
+                self.start_connecting(action)
             elif action.uri not in self._links:
                 self._disconnect(action.uri)
 
@@ -406,7 +405,7 @@ class Subscription:
         self._leaving[uri] = (link, timer)
 
     def _disconnect(self, uri: str) -> None:
-        task = self._connecting.pop(uri, None)
+        task = self.connecting.pop(uri, None)
         if task:
             task.cancel()
         # Remove the link immediately: it closes only when its reader has detected the end of the connection.
@@ -418,7 +417,7 @@ class Subscription:
             timer.cancel()
             link.close()
 
-    def _start_connecting(self, action: Connect) -> None:
+    def start_connecting(self, action: Connect) -> None:
         if action.uri in self._leaving:
             # If the publisher still used the first connection, a second one would deliver each message twice.
             link, timer = self._leaving.pop(action.uri)
@@ -428,11 +427,11 @@ class Subscription:
         if action.uri in self._links:
             return
         task = asyncio.ensure_future(self._connect(action.uri, action.delay))
-        self._connecting[action.uri] = task
+        self.connecting[action.uri] = task
 
         def done(finished: asyncio.Task[None]) -> None:
-            if self._connecting.get(action.uri) is finished:
-                del self._connecting[action.uri]
+            if self.connecting.get(action.uri) is finished:
+                del self.connecting[action.uri]
 
         task.add_done_callback(done)
 
@@ -442,21 +441,21 @@ class Subscription:
 
         lists = self.lists
         try:
-            link = await self._open_link(uri)
+            link = await self.open_link(uri)
         except HandshakeRefused as error:
             _log.warning("publisher %s of %s refused the connection: %s", uri, self.topic, error)
             if self.lists == lists:
-                self._plan.refused(uri)
+                self.plan.refused(uri)
             else:
                 # A newer list arrived after this refusal, and there may be no further list: retry, because the
                 # publisher may accept now.
-                self._retry(uri, error)
+                self.retry(uri, error)
         except _NoPublisher as error:
             self._limited_log.warning("no connection for %s: %s", self.topic, error)
         except (RpcError, WireError, OSError) as error:
-            self._retry(uri, error)
+            self.retry(uri, error)
         else:
-            if self._closed or self._connecting.get(uri) is not asyncio.current_task():
+            if self._closed or self.connecting.get(uri) is not asyncio.current_task():
                 # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives together with the last
                 # byte.
                 link.sock.close()
@@ -486,18 +485,18 @@ class Subscription:
                     del self._links[uri]
                     link.sock.close()
                     self._limited_log.error("messages of %s are not received: %s", self.topic, error)
-                    self._retry(uri, error)
+                    self.retry(uri, error)
                     return
 
             for notify in self.on_connected:
                 notify()
 
-    async def _open_link(self, uri: str) -> InLink:
+    async def open_link(self, uri: str) -> InLink:
         protocols: list[list[str]] = [["TCPROS"]]
         if self._this_host:
             # Add this after TCPROS, because third-party nodes read the first protocol only.
             protocols.append([local.PROTOCOL, self._this_host])
-        answer = await self._rpc.call(uri, "requestTopic", self._caller_id, self.topic, protocols)
+        answer = await self.rpc.call(uri, "requestTopic", self._caller_id, self.topic, protocols)
         sock, address = await self._reach(answer, uri)
 
         try:
@@ -574,19 +573,19 @@ class Subscription:
         if link.returned:
             # The closed connection belonged to the publisher's previous registration; connect to its current one
             # immediately.
-            self._start_connecting(Connect(link.uri))
+            self.start_connecting(Connect(link.uri))
             return
         fault = link.fault or EOFError("the publisher closed the connection")
         if isinstance(fault, WireError):
             # Log one line and disconnect: everything after the error in such a stream is invalid too.
             _log.warning("connection to %s for %s ended: %s", link.uri, self.topic, fault)
         elif link.received or time.monotonic() - link.since > _WORKED_SECONDS:
-            self._plan.worked(link.uri)
+            self.plan.worked(link.uri)
             self._reported.discard(link.uri)
-        self._retry(link.uri, fault)
+        self.retry(link.uri, fault)
 
-    def _retry(self, uri: str, error: Exception) -> None:
-        action = None if self._closed else self._plan.lost(uri)
+    def retry(self, uri: str, error: Exception) -> None:
+        action = None if self._closed else self.plan.lost(uri)
         if not action:
             return
         _log.debug("connection to %s for %s: %s; again in %g s", uri, self.topic, error, action.delay)
@@ -595,17 +594,17 @@ class Subscription:
             # The error is a limit in this process, not the publisher's fault.
             if is_file_limit(cause):
                 self._limited_log.error("no connection for %s: %s", self.topic, explain(cause))
-            self._start_connecting(action)
+            self.start_connecting(action)
             return
 
         nameless = isinstance(cause, socket.gaierror)
         # Publishers that are shutting down refuse or disconnect, so report other errors immediately: a timeout
         # indicates a wrong address or a firewall.
         at_once = isinstance(cause, OSError) and not isinstance(cause, ConnectionError)
-        if (at_once or self._plan.failures(uri) >= _WARN_AFTER) and uri not in self._reported:
+        if (at_once or self.plan.failures(uri) >= _WARN_AFTER) and uri not in self._reported:
             self._reported.add(uri)
             self._unreachable.add(uri, self.topic, error, _advice(uri, error, nameless=nameless))
-        self._start_connecting(action)
+        self.start_connecting(action)
 
 
 def _advice(uri: str, error: Exception, *, nameless: bool) -> str:

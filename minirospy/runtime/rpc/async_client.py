@@ -32,7 +32,7 @@ _RECEIVE = 65536
 _LARGE = 65536
 _KEEP_PER_SERVER = 8
 _KEEP_AT_MOST = 100
-_KEEP_SECONDS = 10.0
+KEEP_SECONDS = 10.0
 
 # 10035 is WSAEWOULDBLOCK, which Windows reports while connecting.
 _UNDER_WAY = {errno.EINPROGRESS, errno.EWOULDBLOCK, 10035}
@@ -54,7 +54,7 @@ class AsyncRpcClient:
         self.same_host = same_host
         self.max_answer = max_answer
         # The idle connections to each server, least recently used first.
-        self._idle: dict[_Address, list[_Connection]] = {}
+        self.idle: dict[_Address, list[_Connection]] = {}
         self._sweep: asyncio.TimerHandle | None = None
         self.under_way: Deadlines[Call] = Deadlines(Call.end_late)
         self.closed = False
@@ -90,22 +90,22 @@ class AsyncRpcClient:
         if self._sweep:
             self._sweep.cancel()
             self._sweep = None
-        for kept in self._idle.values():
+        for kept in self.idle.values():
             for connection in kept:
                 connection.close()
-        self._idle.clear()
+        self.idle.clear()
         for call in list(self.under_way):
             call.fail(EOFError("the client was closed"))
         self.under_way.close()
 
     def acquire(self, address: _Address) -> _Connection | None:
         """Return an idle connection to a server and remove it from the idle ones, or return None."""
-        kept = self._idle.get(address)
+        kept = self.idle.get(address)
         if not kept:
             return None
         connection = kept.pop()
         if not kept:
-            del self._idle[address]
+            del self.idle[address]
         return connection
 
     def keep(self, connection: _Connection) -> None:
@@ -113,34 +113,34 @@ class AsyncRpcClient:
         if self.closed:
             connection.close()
             return
-        kept = self._idle.pop(connection.address, [])
+        kept = self.idle.pop(connection.address, [])
         if len(kept) >= _KEEP_PER_SERVER:
             kept.pop(0).close()
         kept.append(connection)
-        self._idle[connection.address] = kept
-        if len(self._idle) > _KEEP_AT_MOST:
-            for oldest in self._idle.pop(next(iter(self._idle))):
+        self.idle[connection.address] = kept
+        if len(self.idle) > _KEEP_AT_MOST:
+            for oldest in self.idle.pop(next(iter(self.idle))):
                 oldest.close()
         loop = asyncio.get_running_loop()
         connection.used = loop.time()
         if self._sweep is None:
-            self._sweep = loop.call_later(_KEEP_SECONDS, self._close_idle)
+            self._sweep = loop.call_later(KEEP_SECONDS, self._close_idle)
 
     def drop(self, connection: _Connection) -> None:
         """Remove an idle connection that has closed."""
         connection.close()
-        kept = self._idle[connection.address]
+        kept = self.idle[connection.address]
         kept.remove(connection)
         if not kept:
-            del self._idle[connection.address]
+            del self.idle[connection.address]
 
     def _close_idle(self) -> None:
         """Close connections that have not been used for a while, because each may occupy a thread in the server."""
         loop = asyncio.get_running_loop()
-        end = loop.time() - _KEEP_SECONDS / 2
-        for connection in [each for kept in self._idle.values() for each in kept if each.used < end]:
+        end = loop.time() - KEEP_SECONDS / 2
+        for connection in [each for kept in self.idle.values() for each in kept if each.used < end]:
             self.drop(connection)
-        self._sweep = loop.call_later(_KEEP_SECONDS, self._close_idle) if self._idle else None
+        self._sweep = loop.call_later(KEEP_SECONDS, self._close_idle) if self.idle else None
 
 
 class _Connection:

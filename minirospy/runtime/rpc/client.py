@@ -38,9 +38,9 @@ class RpcClient:
         """
         self.uri = uri
         self._host, self._port, self._path = parse_http_uri(uri)
-        self._timeout = timeout
+        self.timeout = timeout
         self._same_host = same_host
-        self._idle: deque[socket.socket] = deque()
+        self.idle: deque[socket.socket] = deque()
 
     def call(self, method: str, *args: object) -> Any:
         """Call ``method`` and return the value in the response.
@@ -56,12 +56,12 @@ class RpcClient:
 
     def close(self) -> None:
         """Close the idle connections. Idempotent."""
-        while self._idle:
-            self._idle.pop().close()
+        while self.idle:
+            self.idle.pop().close()
 
     def _exchange(self, request: bytes) -> HttpMessage:
         try:
-            sock: socket.socket | None = self._idle.pop()
+            sock: socket.socket | None = self.idle.pop()
         except IndexError:
             sock = None
         try:
@@ -71,7 +71,7 @@ class RpcClient:
                     return self._ask(sock, request)
             return self._ask(self._connect(), request)
         except TimeoutError as error:
-            raise RpcTimeout(self.uri, self._timeout) from error
+            raise RpcTimeout(self.uri, self.timeout) from error
         except (OSError, EOFError) as error:
             why = explain(error) if is_file_limit(error) else getattr(error, "strerror", None) or str(error)
             why = why or "the connection was closed"
@@ -80,9 +80,9 @@ class RpcClient:
     def _connect(self) -> socket.socket:
         unix = local.reach(self._host, self._port) if self._same_host else None
         if unix:
-            unix.settimeout(self._timeout)
+            unix.settimeout(self.timeout)
             return unix
-        seconds = min(self._timeout, _CONNECT_SECONDS)
+        seconds = min(self.timeout, _CONNECT_SECONDS)
         try:
             # "localhost" may resolve to an IPv6 address first, on which a ROS 1 server listens only with ROS_IPV6.
             host: Any = sockets.resolvable("127.0.0.1" if self._host == "localhost" else self._host)
@@ -93,7 +93,7 @@ class RpcClient:
             sock = socket.create_connection(("::1", self._port), seconds)
         except TimeoutError as error:
             raise self._late(seconds) from error
-        sock.settimeout(self._timeout)
+        sock.settimeout(self.timeout)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return sock
 
@@ -117,7 +117,7 @@ class RpcClient:
             raise
 
         if messages[0].keep_alive:
-            self._idle.append(sock)
+            self.idle.append(sock)
         else:
             sock.close()
         return messages[0]

@@ -36,7 +36,7 @@ __all__ = ["Connection", "State"]
 
 _log = logging.getLogger(__name__)
 
-_REQUEST_SECONDS = 30.0  # time limit for receiving a started request, and for the client to read a response
+REQUEST_SECONDS = 30.0  # time limit for receiving a started request, and for the client to read an answer
 
 _LINGER_SECONDS = 2.0
 """Keep reading from a refused client for this many seconds; closing earlier resets the connection, and the response is lost."""
@@ -46,8 +46,9 @@ _SHORT_BODY = 4096  # bytes; a longer request is read in steps
 # Bytes; requests longer than this are read one at a time, because their values may take several times as much memory.
 _ALONE_BODY = 1024 * 1024
 
-# transferred bytes that restart the time limit, because a slow radio link needs long for a large value
-_PROGRESS = 65536
+PROGRESS_BYTES = (
+    65536  # transferred bytes that restart the time limit: slow radio needs long for a large value
+)
 
 _RECEIVE = 4096
 _RECEIVE_MORE = 16384
@@ -522,9 +523,9 @@ class Connection:
     def _set_deadline(self) -> None:
         """Set the time limit for a started request or a pending response; an idle connection has none."""
         if self._out or not self._reader.is_idle:
-            is_due = not self._has_deadline or self._moved > _PROGRESS
+            is_due = not self._has_deadline or self._moved > PROGRESS_BYTES
             if is_due and self._state is not _ENDED and self._state is not _REFUSED:
-                self._limit(_REQUEST_SECONDS)
+                self._limit(REQUEST_SECONDS)
         elif self._has_deadline and self._state is not _REFUSED:
             self._has_deadline = False
             self._server.deadlines.drop(self)

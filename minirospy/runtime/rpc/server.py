@@ -33,8 +33,8 @@ __all__ = ["Dispatch", "RpcServer", "is_address_in_use"]
 _log = logging.getLogger(__name__)
 
 # Maximum total bytes of all clients' incomplete requests and those being read; beyond that the largest are refused
-_MAX_HELD = 72 * 1024 * 1024
-_LARGE = 32 * 1024  # bytes; requests up to this size are not refused when _MAX_HELD is exceeded
+MAX_HELD = 72 * 1024 * 1024
+LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are not refused because of that limit
 
 # Maximum bytes of responses that all clients together have not read; beyond that, the client that has not read
 # anything for the longest time is disconnected
@@ -288,9 +288,9 @@ class RpcServer:
 
     def limit_held(self, connection: Connection) -> bool:
         """Reject the largest requests if their total exceeds the limit; return whether ``connection`` is still open."""
-        while self.held > _MAX_HELD:
+        while self.held > MAX_HELD:
             largest = max(self.holders, key=self.holders.__getitem__)
-            if self.holders[largest] <= _LARGE:
+            if self.holders[largest] <= LARGE_REQUEST:
                 break
             largest.refuse(503, "too much is being sent at the same time: try again later")
         return not connection.is_refused

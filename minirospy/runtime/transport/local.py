@@ -20,7 +20,7 @@ __all__ = ["PROTOCOL", "UnixAddress", "bind", "connect", "name_of", "parse_answe
 PROTOCOL = "UNIXROS"
 _PREFIX = "minirospy-"  # the start of socket names
 
-_TRUSTED = frozenset({0})  # trusted user ids in addition to this process's own: root
+TRUSTED_USERS = frozenset({0})  # user ids that are trusted in addition to this process's own: root
 
 
 class UnixAddress(NamedTuple):
@@ -75,7 +75,7 @@ def reach(host: str, port: int) -> socket.socket | None:
     except OSError:
         return None
     user = sockets.peer(sock).user
-    if user not in _TRUSTED and user != os.geteuid():
+    if user not in TRUSTED_USERS and user != os.geteuid():
         sock.close()
         return None
     return sock

@@ -14,7 +14,7 @@ from minirospy.runtime.transport.limits import naming_thread_limit
 __all__ = ["LoopClosedError", "LoopThread", "new_event_loop"]
 
 _T = TypeVar("_T")
-_CLOSE_SECONDS = 2.0  # seconds for which :meth:`LoopThread.close` waits for the loop's tasks to finish
+CLOSE_SECONDS = 2.0  # how long :meth:`LoopThread.close` waits for the loop's tasks to finish
 
 
 def new_event_loop() -> asyncio.AbstractEventLoop:
@@ -109,7 +109,7 @@ class LoopThread:
         # Do not call loop.stop(), because a second call would interrupt the thread during its last steps.
         self.post(self._end.set)
         if threading.current_thread() is not self._thread:
-            self._thread.join(_CLOSE_SECONDS)
+            self._thread.join(CLOSE_SECONDS)
 
     def _serve(self) -> None:
         asyncio.set_event_loop(self.loop)

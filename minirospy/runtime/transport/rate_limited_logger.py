@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = ["RateLimitedLogger"]
 
-_SECONDS = 10.0
+INTERVAL_SECONDS = 10.0
 
 
 class RateLimitedLogger:
@@ -58,7 +58,7 @@ class RateLimitedLogger:
         if now >= self._end:
             if self._omitted:
                 text, args = text + " (and %d more like it before)", (*args, self._omitted)
-            self._end, self._logged, self._omitted = now + _SECONDS, 0, 0
+            self._end, self._logged, self._omitted = now + INTERVAL_SECONDS, 0, 0
         elif self._logged == self._limit:
             self._omitted += 1
             return

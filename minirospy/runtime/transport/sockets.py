@@ -33,7 +33,7 @@ HANDSHAKE_SECONDS = 10.0  # time limit in seconds for each handshake, because a 
 
 BUSY_POLL_SECONDS = 0.0002  # seconds within which most responses from a process on the same host arrive
 
-_KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
+KEEPALIVE = {"TCP_KEEPIDLE": 20, "TCP_KEEPALIVE": 20, "TCP_KEEPINTVL": 10, "TCP_KEEPCNT": 3}
 """Seconds of silence, seconds between probes, number of probes. On macOS the first option is called TCP_KEEPALIVE."""
 
 # Requested buffer size for a Unix socket in bytes, as much as TCP buffers; Linux limits it to net.core.wmem_max (208
@@ -61,7 +61,7 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
     if nodelay:
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    for option, value in _KEEPALIVE.items():
+    for option, value in KEEPALIVE.items():
         if hasattr(socket, option):
             with contextlib.suppress(OSError):
                 sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)

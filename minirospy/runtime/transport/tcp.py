@@ -147,7 +147,7 @@ class Listener:
         self._allows = allows
         self._sock: socket.socket | None = None
         # Dict from handshake task to the peer's address, in the order in which the tasks started.
-        self._handshakes: dict[asyncio.Task[None], str] = {}
+        self.handshakes: dict[asyncio.Task[None], str] = {}
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.port = 0
 
@@ -173,7 +173,7 @@ class Listener:
             asyncio.get_running_loop().remove_reader(self._sock)
             self._sock.close()
             self._sock = None
-        tasks = list(self._handshakes)
+        tasks = list(self.handshakes)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -210,15 +210,15 @@ class Listener:
             )
             peer.close()
             return
-        if len(self._handshakes) >= MAX_HANDSHAKES:
+        if len(self.handshakes) >= MAX_HANDSHAKES:
             self._end_oldest(f"it sent nothing, and {MAX_HANDSHAKES} others are waiting")
         # A peer on a Unix socket has no address.
         where = f"{address[0]}:{address[1]}" if isinstance(address, tuple) else "this machine"
         task = asyncio.ensure_future(self._handle(peer, where))
-        self._handshakes[task] = where
+        self.handshakes[task] = where
 
         def done(finished: asyncio.Task[None]) -> None:
-            self._handshakes.pop(finished, None)
+            self.handshakes.pop(finished, None)
             if finished.cancelled():
                 # The task may have been cancelled before its first step.
                 peer.close()
@@ -240,9 +240,9 @@ class Listener:
             peer.close()
 
     def _end_oldest(self, why: str) -> None:
-        for task in list(self._handshakes)[:1]:
+        for task in list(self.handshakes)[:1]:
             task.cancel()
-            self.log_refusal(f"connection from {self._handshakes.pop(task)} closed: {why}")
+            self.log_refusal(f"connection from {self.handshakes.pop(task)} closed: {why}")
 
 
 def _bind(host: str, port: int) -> socket.socket:

@@ -21,7 +21,7 @@ from minirospy.base.private_files import create_file
 
 __all__ = ["LinkFile", "has_screen", "link_page", "open_link"]
 
-_SNAPS = (Path("/snap/bin/firefox"), Path("/snap/bin/chromium"))
+SNAPS = (Path("/snap/bin/firefox"), Path("/snap/bin/chromium"))
 """Browsers that cannot read the temporary folder or hidden folders, but can read other files in the home folder."""
 
 
@@ -88,6 +88,6 @@ def _open(address: str, remove: Callable[[], object]) -> Callable[[], object]:
 def _parent() -> Path | None:
     """Return the folder in which to create the file's own folder, or None for the system's temporary folder."""
     home = Path.home()
-    if any(each.exists() for each in _SNAPS) and os.access(home, os.W_OK):
+    if any(each.exists() for each in SNAPS) and os.access(home, os.W_OK):
         return home
     return None

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["LIFETIME", "Codes"]
 
 LIFETIME = 60.0  # seconds; the browser starts immediately, and sends the code within a few seconds
-_ROOT = 0
+ROOT_UID = 0
 
 
 def _nothing() -> None:
@@ -101,6 +101,6 @@ def _is_trusted(request: HttpRequest) -> bool:
     if sys.platform != "linux":
         return True
     return owner_of((request.peer, request.peer_port), (request.address, request.port)) in (
-        _ROOT,
+        ROOT_UID,
         os.getuid(),
     )

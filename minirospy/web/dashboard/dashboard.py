@@ -46,11 +46,11 @@ class Dashboard:
         self._board = BoardEndpoint()
         self.rviz = RvizEndpoint(rviz_file)
         self._tools = ToolsEndpoint(master_uri)
-        self._bags = BagEndpoint(bags or BagFolder(Path.cwd()), master_uri, lambda: self.bridge.graph)
-        self._launches = LaunchEndpoint(master_uri)
+        self.bags = BagEndpoint(bags or BagFolder(Path.cwd()), master_uri, lambda: self.bridge.graph)
+        self.launches = LaunchEndpoint(master_uri)
         self._joints = JointEndpoint(node, lambda: self.bridge.graph, always_publishes=publishes_joints)
         driving = DriveEndpoint(lambda: self.bridge.graph)
-        own = (self.rviz, self._bags, self._launches, self._joints)
+        own = (self.rviz, self.bags, self.launches, self._joints)
         endpoints = (self._board, self._tools, driving, *own)
         pages = {**handlers(read_folder()), "/token": self.codes.serve}
         self.bridge = Bridge(node, options, extras=Extras(endpoints, pages))
@@ -77,8 +77,8 @@ class Dashboard:
                 self._board,
                 self.bridge,
                 self.rviz,
-                self._launches,
+                self.launches,
                 self._joints,
-                self._bags,
+                self.bags,
             ):
                 closing.push_async_callback(part.close)

@@ -36,7 +36,7 @@ _VALUE_FACTOR = 4
 
 _INTERNAL_ERROR = 1011  # WebSocket close code for an internal error, RFC 6455, section 7.4.1
 
-_CLOCK_SECONDS = time.get_clock_info("monotonic").resolution
+CLOCK_SECONDS = time.get_clock_info("monotonic").resolution
 """Resolution of the loop's clock in seconds, 16 ms on Windows before Python 3.13."""
 
 _T = TypeVar("_T")
@@ -326,7 +326,7 @@ async def wait_until(event: asyncio.Event, end: float) -> None:
     # event. Add the clock's resolution, because a loop runs timers early by that much, and callers that compare times
     # would spin until the clock advances.
     loop = asyncio.get_running_loop()
-    timer = loop.call_at(end + _CLOCK_SECONDS, event.set) if end < math.inf else None
+    timer = loop.call_at(end + CLOCK_SECONDS, event.set) if end < math.inf else None
     try:
         await event.wait()
     finally:

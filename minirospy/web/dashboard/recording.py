@@ -23,7 +23,7 @@ __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
 """Timeouts in seconds for stopping. They are long, because after SIGINT the file is completed, possibly on a slow disk."""
 
-_TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
+TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
 """Short timeouts while no file is open: a starting interpreter may lose a SIGINT that arrives in a callback of importlib."""
 
 _MAX_LINES = 20
@@ -69,7 +69,7 @@ class Recording:
         self._paths = (path.with_name(f"{path.name}.active"), path)
         self._master_uri = master_uri
         self._topics = tuple(topics)
-        self._lines: deque[str] = deque(maxlen=_MAX_LINES)
+        self.lines: deque[str] = deque(maxlen=_MAX_LINES)
         self._started = time.monotonic()
         self._seconds: float | None = None
         self._guardian = Guardian(_TIMEOUTS, master_uri)
@@ -115,7 +115,7 @@ class Recording:
         assert stream
         with stream:
             for line in stream:
-                self._lines.append(line.decode("utf-8", "replace").rstrip())
+                self.lines.append(line.decode("utf-8", "replace").rstrip())
         self._process.popen.wait()
         self._seconds = time.monotonic() - self._started
 
@@ -136,7 +136,7 @@ class Recording:
             error = "it was stopped before it had started: nothing was recorded"
         elif status:
             error = next(
-                (line for line in reversed(tuple(self._lines)) if "ERROR" in line or "rror" in line),
+                (line for line in reversed(tuple(self.lines)) if "ERROR" in line or "rror" in line),
                 f"rosbag record ended with status {status}",
             )
         return RecordingState(self._path.name, self._topics, seconds, size, status is not None, error)
@@ -147,7 +147,7 @@ class Recording:
 
     def _stop(self) -> None:
         has_file = any(path.exists() for path in self._paths)
-        end_processes([self._process], _TIMEOUTS if has_file else _TIMEOUTS_BEFORE_FILE, lambda _: None)
+        end_processes([self._process], _TIMEOUTS if has_file else TIMEOUTS_BEFORE_FILE, lambda _: None)
         self._reader.join()
         self._guardian.remove(self._process)
         self._guardian.close()

@@ -47,7 +47,7 @@ _TYPE_NAMES: Mapping[type, str] = {
 _MAX_PREVIEW = 200
 """Maximum characters shown of a value that the user is typing."""
 
-_REPORT_SECONDS = 2.0
+REPORT_SECONDS = 2.0
 _MAX_CONCURRENT = 4
 """Maximum concurrent requests from one client. Nodes that do not respond take seconds."""
 
@@ -113,7 +113,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             for session in tuple(self._watching):
                 session.report(data)
             # If nodes respond slowly, pause for longer.
-            await asyncio.sleep(max(_REPORT_SECONDS, 2 * (time.monotonic() - started)))
+            await asyncio.sleep(max(REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
     def topic_types(self) -> Mapping[str, str]:
         """Return the topic types that the master knows; ``*`` if a topic has only subscribers to any type."""

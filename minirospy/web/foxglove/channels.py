@@ -13,7 +13,7 @@ from minirospy.web.graph import SharedGraph
 
 __all__ = ["Channels", "Services"]
 
-_SECONDS = 3.0
+TYPE_SECONDS = 3.0
 """Timeout in seconds for querying topic types that are not installed. It is short because all clients wait for the channels."""
 
 
@@ -65,7 +65,7 @@ class Channels:
                 others[topic] = snapshot.publishers.get(topic, ())
 
         # If no publisher responds in time, the type is taken from the first message.
-        found = await graph.texts.of_publishers(others, _SECONDS)
+        found = await graph.texts.of_publishers(others, TYPE_SECONDS)
         new += [
             self._add(topic, wanted[topic], found.get(topic) or InterfaceType(wanted[topic], ANY))
             for topic in others

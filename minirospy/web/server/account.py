@@ -75,7 +75,7 @@ class Account:
         self.shed = 0
         """Number of times that a client had to release memory."""
         self._shares: set[Share] = set()
-        self._holders: Counter[int] = Counter()
+        self.holders: Counter[int] = Counter()
         """Number of times that a large piece is queued, by the id of the object, which exists while it is queued."""
         self._is_enforcing = False
 
@@ -98,8 +98,8 @@ class Account:
             size = len(piece)
             if size >= LARGE_PIECE:
                 found += size
-                self._holders[id(piece)] += 1
-                if self._holders[id(piece)] == 1:
+                self.holders[id(piece)] += 1
+                if self.holders[id(piece)] == 1:
                     self.total += size
         return found
 
@@ -110,9 +110,9 @@ class Account:
             size = len(piece)
             if size >= LARGE_PIECE:
                 found += size
-                self._holders[id(piece)] -= 1
-                if not self._holders[id(piece)]:
-                    del self._holders[id(piece)]
+                self.holders[id(piece)] -= 1
+                if not self.holders[id(piece)]:
+                    del self.holders[id(piece)]
                     self.total -= size
         return found
 

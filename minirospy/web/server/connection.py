@@ -110,17 +110,17 @@ class Connection:
         self.active = now  # when the connection was opened, or last received a message or sent one
         # bytes of incomplete messages, and of the message that the session is processing
         self.unfinished = 0
-        self._site = site  # the listener
+        self.site = site  # the listener
         self._limits = limits  # the listener's limits
         self._pipe = pipe  # the transport
-        self._loop = loop
+        self.loop = loop
         self._websocket = WebSocket(self._select, limits.message, limits.messages_a_second)
         self._output = Output(pipe, SendQueue(limits.queue, share=self.share), self.share, loop, self._count)
         # work for the client that is not a response to its messages
         self._jobs = Jobs(limits.queue, self.share)
-        self._liveness = Liveness(limits.silent_seconds, now)
-        self._turn = site.turns.join(self._work)  # the client's share of the loop's time
-        self._turn.weight = _NEW_WEIGHT
+        self.liveness = Liveness(limits.silent_seconds, now)
+        self.turn = site.turns.join(self._work)  # the client's share of the loop
+        self.turn.weight = _NEW_WEIGHT
         self._endpoint: Endpoint | None = None  # set in the handshake, when the sub-protocol is chosen
         self._phase = _Phase.OPEN
         self._is_held_back = False  # True if the client has used up its frame quota for the current second
@@ -158,15 +158,15 @@ class Connection:
         """Process bytes received from the client."""
         if not self.is_open:
             return
-        self._liveness.heard(self._loop.time())
+        self.liveness.heard(self.loop.time())
         self.traffic.received_bytes += len(data)
         if self.exchange:
             return  # a connection has only one request
         self._websocket.feed(data)
         # Read a large message in large pieces, unless other clients are waiting for their turns.
-        is_alone = len(data) >= SMALL_READ and not self._site.turns.is_busy
+        is_alone = len(data) >= SMALL_READ and not self.site.turns.is_busy
         self._pipe.read_bytes = LARGE_READ if is_alone else SMALL_READ
-        if self._is_held_back or self._is_paused or self._site.turns.start(self._turn):
+        if self._is_held_back or self._is_paused or self.site.turns.start(self.turn):
             self._pipe.pause()
         self._count_unfinished()
 
@@ -180,7 +180,7 @@ class Connection:
             return
         self._phase = _Phase.ENDED
         self._timer.cancel()
-        self._site.turns.leave(self._turn)
+        self.site.turns.leave(self.turn)
         self._discard_unfinished()
         try:
             if self.session:
@@ -193,8 +193,8 @@ class Connection:
         # The connection is part of reference cycles: release its memory now, not when they are collected.
         self._jobs.clear()
         self._output.end()
-        self._site.account.close(self.share)
-        self._site.left(self)
+        self.site.account.close(self.share)
+        self.site.left(self)
 
     # --- to the pipe
 
@@ -225,7 +225,7 @@ class Connection:
             if self._output.is_full:
                 self._count()
             else:
-                self.active = self._loop.time()
+                self.active = self.loop.time()
             self._output.schedule()
 
     def close_when_sent(self) -> None:
@@ -233,7 +233,7 @@ class Connection:
         self._close()
         self._output.close_when_sent()
         self._timer.cancel()
-        self._timer = self._loop.call_later(self._limits.handshake_seconds, self._abort)
+        self._timer = self.loop.call_later(self._limits.handshake_seconds, self._abort)
 
     def close_websocket(self, code: int, reason: str) -> None:
         """Send a close frame, and close the connection when all queued data has been sent."""
@@ -264,7 +264,7 @@ class Connection:
         self._worked_on = 0
         self._count_unfinished()
         if self._phase is not _Phase.ENDED and not self._is_held_back:
-            self._site.turns.start(self._turn)
+            self.site.turns.start(self.turn)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
         """Run ``work`` in the client's turn, or immediately if it is the client's turn now.
@@ -278,7 +278,7 @@ class Connection:
         if not self.is_open:
             return
         self.queue.dropped += self._jobs.add(work, message)
-        self._site.turns.start(self._turn)
+        self.site.turns.start(self.turn)
         if self._jobs:
             self._count()
 
@@ -286,7 +286,7 @@ class Connection:
         """Stop or continue the work for the client, while the last piece of work continues in a thread."""
         self._are_jobs_held = are_held
         if not are_held and self._jobs:
-            self._site.turns.start(self._turn)
+            self.site.turns.start(self.turn)
 
     def session_holds(self, count: int) -> None:
         """Set the number of bytes that the session uses for the client."""
@@ -319,7 +319,7 @@ class Connection:
             except Exception:  # noqa: BLE001 whatever a session raises ends this client alone
                 _log.exception("a message for %s could not be sent", self.peer)
                 self.close_websocket(CloseCode.INTERNAL_ERROR, "the bridge failed on a message")
-            if self._loop.time() >= end and self.is_open:
+            if self.loop.time() >= end and self.is_open:
                 return bool((self._jobs and not self._are_jobs_held) or self._websocket.has_unread)
         return False
 
@@ -327,7 +327,7 @@ class Connection:
         """Handle frames until a time; return whether more are left within the client's quota for this second."""
         if self.client is None:
             self._parse_head()
-        websocket, rate, time_of = self._websocket, self._websocket.rate, self._loop.time
+        websocket, rate, time_of = self._websocket, self._websocket.rate, self.loop.time
         now = time_of()
         rate.update(now)
         while self.client and self.is_open and not (self._is_paused or self._is_held_back):
@@ -337,7 +337,7 @@ class Connection:
             frame = websocket.next_frame()
             if frame is None:
                 break
-            self._framed(frame)
+            self.framed(frame)
             if time_of() >= end and websocket.has_unread and self.is_open:
                 return True
         if self.client and self._phase is not _Phase.ENDED:
@@ -349,7 +349,7 @@ class Connection:
             self._pipe.resume()
         return False
 
-    def _framed(self, frame: Frame) -> None:
+    def framed(self, frame: Frame) -> None:
         event = self._websocket.event_of(frame)
         if isinstance(event, Ping):
             # Only the newest ping needs a response (RFC 6455, 5.5.3), so at most one is queued for a client that
@@ -362,7 +362,7 @@ class Connection:
         assert self.session
         data = message.data
         self.traffic.received += 1
-        self.active = self._loop.time()
+        self.active = self.loop.time()
         try:
             if not message.is_text:
                 self.session.received_binary(data)
@@ -383,12 +383,12 @@ class Connection:
         self._is_held_back = True
         self.traffic.held_back += 1
         self._pipe.pause()
-        self._loop.call_later(seconds, self._go_on)
+        self.loop.call_later(seconds, self.go_on)
 
-    def _go_on(self) -> None:
+    def go_on(self) -> None:
         self._is_held_back = False
         if not self._is_paused:
-            self._site.turns.start(self._turn)
+            self.site.turns.start(self.turn)
 
     def _answer_protocol(self) -> None:
         data = self._websocket.data_to_send()
@@ -422,8 +422,8 @@ class Connection:
 
         Raise ValueError if the request is invalid.
         """
-        grant = self._site.check(head.credentials, is_page=head.is_page)
-        refusal = grant if isinstance(grant, Refusal) else self._site.admit(self, grant)
+        grant = self.site.check(head.credentials, is_page=head.is_page)
+        refusal = grant if isinstance(grant, Refusal) else self.site.admit(self, grant)
         if refusal:
             return refusal
         assert isinstance(grant, Grant)
@@ -439,16 +439,16 @@ class Connection:
         self._answer_protocol()
         self.client = WebClient(self, seen, grant, self._websocket.subprotocol)
         self.share.is_owner = self.client.is_owner
-        self._turn.weight = _WEIGHTS[grant]
+        self.turn.weight = _WEIGHTS[grant]
         if not self.client.may_write:
             self._websocket.restrict(min(self._limits.message, self._limits.read_only_message))
-        self._watch(self._ping)
+        self._watch(self.ping)
         self.session = self._endpoint.open(self.client)
 
     def _select(self, offered: Sequence[str]) -> str | None:
         """Choose the endpoint; return its sub-protocol. Raise NegotiationError if no endpoint accepts the client."""
         why = "nothing is served here"
-        for endpoint in self._site.endpoints:
+        for endpoint in self.site.endpoints:
             try:
                 chosen = endpoint.select(offered)
             except LookupError as error:
@@ -459,12 +459,12 @@ class Connection:
         raise NegotiationError(why)
 
     def _serve_page(self, request: HttpRequest, grant: Grant) -> None:
-        handler = self._site.page(request.path)
+        handler = self.site.page(request.path)
         if handler is None:
             self._refuse(Refusal(404, "there is no such page; WebSocket clients are served here"))
             return
         self.exchange = Exchange(self, request, grant)
-        self._output.progressed = self._loop.time()
+        self._output.progressed = self.loop.time()
         self._watch(self._watch_progress)
         try:
             handler(self.exchange)
@@ -519,12 +519,12 @@ class Connection:
     def _watch(self, check: Callable[[], None]) -> None:
         """Call ``check`` after the ping interval, instead of the previous check."""
         self._timer.cancel()
-        self._timer = self._loop.call_later(self._limits.ping_seconds, check)
+        self._timer = self.loop.call_later(self._limits.ping_seconds, check)
 
-    def _ping(self) -> None:
+    def ping(self) -> None:
         """Ping the client, or disconnect it if it no longer responds."""
         output = self._output
-        verdict = self._liveness.check(self._loop.time(), output.progressed, is_full=output.is_full)
+        verdict = self.liveness.check(self.loop.time(), output.progressed, is_full=output.is_full)
         if verdict in (Verdict.STUCK, Verdict.SILENT):
             why = "reads nothing" if verdict is Verdict.STUCK else "does not answer"
             _log.info("%s %s: disconnected", self.peer, why)
@@ -533,12 +533,12 @@ class Connection:
         if verdict is Verdict.PING:
             self._websocket.ping(b"minirospy")
             self._answer_protocol()
-        self._watch(self._ping)
+        self._watch(self.ping)
 
     def _watch_progress(self) -> None:
         """Disconnect the client of a page if it reads nothing."""
         output = self._output
-        if self._liveness.is_stuck(self._loop.time(), output.progressed, is_full=output.is_full):
+        if self.liveness.is_stuck(self.loop.time(), output.progressed, is_full=output.is_full):
             self._abort()
             return
         self._watch(self._watch_progress)

@@ -36,7 +36,8 @@ SLICE_SECONDS = 0.0001
 NEW_PIECES = 8
 EXPECTED_DECAY = 0.9  # decay of the expected seconds with each piece of work that takes less
 IMMEDIATE_SHARE = 0.5  # of the time, for work that starts without being queued
-# of one burst, 1 ms: a request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms
+# of one burst, 1 ms: a request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms. A new client has one slice, and one more
+# with each short burst: 250 new clients that flood the server go after its other clients as soon as each has had a slice.
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients: interactive clients alone may use 200 ms before bulk clients get a slice again
 MAX_DEBT_TURNS = 10
@@ -57,6 +58,7 @@ class Share:
         "last_burst",
         "pieces",
         "queue",
+        "short_bursts",
         "tag",
         "weight",
         "work",
@@ -72,6 +74,7 @@ class Share:
         self.pieces = 0  # number of pieces of work done while the client is new
         self.burst = 0.0  # seconds used since the client last had nothing to do
         self.last_burst = 0.0  # seconds of the burst before
+        self.short_bursts = 0  # in succession, up to INTERACTIVE_SLICES
         self.is_queued = False
         self.is_closed = False
 
@@ -144,6 +147,7 @@ class FairTurns:
 
     def join(self, work: Work) -> Share:
         """Return the share of a new client: it has no advantage over clients that have been idle."""
+        self._interactive.update()
         return Share(work, self._interactive)
 
     def leave(self, share: Share) -> None:
@@ -184,8 +188,12 @@ class FairTurns:
             self._call_soon(self._turn)
 
     def _queue_of(self, share: Share) -> _FairQueue:
-        is_bulk = max(share.burst, share.last_burst) > INTERACTIVE_SLICES * self._slice
-        return self._bulk if is_bulk else self._interactive
+        allowed = max(1, share.short_bursts) * self._slice
+        is_interactive = share.burst <= allowed and self._is_short(share.last_burst)
+        return self._interactive if is_interactive else self._bulk
+
+    def _is_short(self, burst: float) -> bool:
+        return burst <= INTERACTIVE_SLICES * self._slice
 
     def _push(self, share: Share, start: float) -> None:
         # Of clients that would end at the same tag the one that used less before goes first.
@@ -246,6 +254,8 @@ class FairTurns:
         share.expected = max(used, EXPECTED_DECAY * share.expected)
         share.burst += used / share.weight
         if not is_left:
+            is_short = self._is_short(share.burst)
+            share.short_bursts = min(INTERACTIVE_SLICES, share.short_bursts + 1) if is_short else 0
             share.burst, share.last_burst = 0.0, share.burst
         if share.pieces < NEW_PIECES:
             share.pieces += 1

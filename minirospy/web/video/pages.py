@@ -20,7 +20,7 @@ from minirospy.web.video.pictures import COMPRESSED, IMAGE, MAX_PIXELS, encoded,
 
 __all__ = ["VideoPages"]
 
-_SNAPSHOT_SECONDS = 10.0
+SNAPSHOT_SECONDS = 10.0
 _MAX_FEEDS = 32
 """Maximum number of concurrent feeds (a topic in one encoding), because each image is encoded once per feed."""
 _MAX_KEPT = 32_000_000
@@ -114,7 +114,7 @@ class VideoPages:
 
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
-        self._feeds: dict[VideoRequest, _Feed] = {}
+        self.feeds: dict[VideoRequest, _Feed] = {}
         self._shared = _Shared(Capacity(MAX_PIXELS))
         self._log = RateLimitedLogger(logging.getLogger(graph.node.log.name))
 
@@ -189,11 +189,11 @@ class VideoPages:
 
         def is_late() -> None:
             leave()
-            _refuse(exchange, 504, f"no image came on [{request.topic}] in {_SNAPSHOT_SECONDS:.0f} seconds")
+            _refuse(exchange, 504, f"no image came on [{request.topic}] in {SNAPSHOT_SECONDS:.0f} seconds")
 
         def start() -> None:
             nonlocal late, leave
-            late = asyncio.get_running_loop().call_later(_SNAPSHOT_SECONDS, is_late)
+            late = asyncio.get_running_loop().call_later(SNAPSHOT_SECONDS, is_late)
             leave = self._join(exchange, request, show)
 
         self._graph.spawn(self._when_published(exchange, request, start))
@@ -224,7 +224,7 @@ class VideoPages:
             _refuse(
                 exchange, 400, f"topic [{topic}] is of type [{type_}]: {IMAGE} and {COMPRESSED} are images"
             )
-        elif request not in self._feeds and len(self._feeds) >= _MAX_FEEDS:
+        elif request not in self.feeds and len(self.feeds) >= _MAX_FEEDS:
             _refuse(exchange, 503, f"{_MAX_FEEDS} encodings of images are in use: no more")
         else:
             start()
@@ -234,10 +234,10 @@ class VideoPages:
 
         Return a function that stops sending, which is also called when the client disconnects.
         """
-        feed = self._feeds.get(request)
+        feed = self.feeds.get(request)
         is_new = feed is None
         if feed is None:
-            feed = self._feeds[request] = _Feed(self._graph, request, self._shared)
+            feed = self.feeds[request] = _Feed(self._graph, request, self._shared)
         feed.listeners.append(listener)
         joined = feed
 
@@ -247,7 +247,7 @@ class VideoPages:
             joined.listeners.remove(listener)
             if not joined.listeners:
                 joined.close()
-                self._feeds.pop(request, None)
+                self.feeds.pop(request, None)
 
         exchange.on_end = leave
         if is_new:

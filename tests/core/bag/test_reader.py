@@ -132,7 +132,7 @@ def test_damaged_index_is_not_believed(place: str) -> None:
 
 
 def test_overlapping_chunks_need_no_more_memory_than_the_cache(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reading, "_CACHE_SIZE", 1)
+    monkeypatch.setattr(reading, "CACHE_SIZE", 1)
     chunks = [
         [Given(number % 3, time, b"%d" % time) for time in range(number, 200, 9)] for number in range(9)
     ]
@@ -224,8 +224,8 @@ def test_rates_of_numpy_are_those_of_python(monkeypatch: pytest.MonkeyPatch) -> 
         names = [connection(0, "/a"), connection(1, "/a")]
         texts = set()
         for limit, block in ((10**9, 10), (1, 7), (1, 1 << 16)):
-            monkeypatch.setattr(info, "_NUMPY_PAYS", limit)
-            monkeypatch.setattr(info, "_BLOCK", block)
+            monkeypatch.setattr(info, "NUMPY_PAYS", limit)
+            monkeypatch.setattr(info, "BLOCK", block)
             texts.add(info.as_yaml(info.summarize(opened(make_bag(chunks, names)), "a", frequencies=True)))
         assert len(texts) == 1
         assert "frequency:" in texts.pop()

@@ -137,7 +137,7 @@ def test_all_registrations_have_a_limit_in_memory_and_give_it_back() -> None:
             list(registry.forget(f"/n{number}", "u"))
 
     assert registry.is_small
-    assert registry._shares.total == 0
+    assert registry.shares.total == 0
 
 
 def test_limits_are_as_documented() -> None:
@@ -240,14 +240,14 @@ def test_registrations_count_their_memory(kind: str) -> None:
     taken = size_of(registry, set())
     # Sizes are counted for 64 bits; with 32 bits an object takes about half.
     most = 2.5 if maxsize > 2**32 else 5.0
-    assert 0.8 * taken < registry._shares.total < most * taken
+    assert 0.8 * taken < registry.shares.total < most * taken
 
 
 def test_a_registration_is_counted_until_the_last_of_it_is_gone() -> None:
     registry = Registry()
 
     def counted() -> int:
-        return registry._shares.total
+        return registry.shares.total
 
     registry.register_publisher("/n", "/t", "a/B", "u")
     one = counted()
@@ -274,21 +274,21 @@ def test_a_registration_is_counted_until_the_last_of_it_is_gone() -> None:
 def test_a_type_is_counted_for_a_node_that_remains() -> None:
     registry = Registry()
     registry.register_subscriber("/s", "/t", "*", "http://s:1/")
-    alone = registry._shares.total
+    alone = registry.shares.total
     long_type = "a/" + "B" * 4000
     registry.register_publisher("/p", "/t", long_type, "http://p:1/")
     registry.unregister_publisher("/p", "/t", "http://p:1/")
-    assert registry._shares.total - alone > 4000
-    assert registry._shares.excess("s:1", registry._shares.largest - 4000)
+    assert registry.shares.total - alone > 4000
+    assert registry.shares.excess("s:1", registry.shares.largest - 4000)
     list(registry.forget("/s", "http://s:1/"))
-    assert registry._shares.total == 0
+    assert registry.shares.total == 0
     assert registry.topic_types() == {"/t": long_type}
 
 
 def test_size_of_a_text_does_not_change_while_it_is_counted() -> None:
     registry = Registry()
     list(registry.register_parameter("/n", "/p", "http://n:1/"))
-    before, text = registry._shares.total, "\u20ac" * 1000
+    before, text = registry.shares.total, "\u20ac" * 1000
     for number in range(3):
         uri = f"rosrpc://{text}:{number}"
         registry.register_service("/n", f"/s{text}", uri, "http://n:1/")
@@ -298,7 +298,7 @@ def test_size_of_a_text_does_not_change_while_it_is_counted() -> None:
             serialize_record(list(row))
     registry.unregister_service("/n", f"/s{text}", uri)
     registry.unregister_publisher("/n", f"/t{text}", "http://n:1/")
-    assert registry._shares.total == before
+    assert registry.shares.total == before
 
 
 def test_a_service_that_another_node_takes_over_is_counted_for_it() -> None:
@@ -306,7 +306,7 @@ def test_a_service_that_another_node_takes_over_is_counted_for_it() -> None:
     registry.register_service("/a", "/s", "rosrpc://a:1" + "x" * 1000, "http://a:1/")
     registry.register_service("/b", "/s", "rosrpc://b:1", "http://b:1/")
     registry.unregister_service("/b", "/s", "rosrpc://b:1")
-    assert registry._shares.total == 0
+    assert registry.shares.total == 0
 
 
 def test_topics_and_services_are_counted() -> None:
@@ -319,7 +319,7 @@ def test_topics_and_services_are_counted() -> None:
 
 
 def test_as_many_old_types_are_remembered_as_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(topic_types, "_MAX_OLD", 3)
+    monkeypatch.setattr(topic_types, "MAX_OLD", 3)
     registry = Registry()
     registry.register_publisher("/n", "/published", "a/B", "u")
     registry.register_subscriber("/n", "/subscribed", "a/B", "u")
@@ -344,7 +344,7 @@ def test_old_types_take_no_more_than_4_mib() -> None:
 
 
 def test_types_of_topics_that_are_gone_are_forgotten_one_day(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(topic_types, "_MAX_OLD", 10)
+    monkeypatch.setattr(topic_types, "MAX_OLD", 10)
     registry = Registry()
     registry.register_publisher("/n", "/kept", "a/B", "u")
     for number in range(100):

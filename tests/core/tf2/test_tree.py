@@ -292,7 +292,7 @@ def test_data_decoded_by_all_frames_is_released() -> None:
 
 
 def test_more_messages_than_any_use_are_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.core.tf2.pending._MAX_MESSAGES", 256)
+    monkeypatch.setattr("minirospy.core.tf2.pending.MAX_MESSAGES", 256)
     buffer = TransformBuffer(cache_time=1000 * SECOND)
     stream(buffer, 1000)
     assert kept(buffer) <= 256 + 64

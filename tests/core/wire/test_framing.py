@@ -98,7 +98,7 @@ def test_a_claimed_length_costs_no_memory_before_the_bytes_come() -> None:
 
 
 def test_a_frame_beyond_the_first_claim_grows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.core.wire.framing._FIRST_CLAIM", 4 * CHUNK)
+    monkeypatch.setattr("minirospy.core.wire.framing.FIRST_CLAIM", 4 * CHUNK)
     body = bytes(range(256)) * (9 * CHUNK // 256)
     assert feed(FrameReader(), serialize_frame(body), 50_000) == [body]
 
@@ -237,7 +237,7 @@ def test_bytes_that_are_put_back_come_first() -> None:
 
 
 def test_memory_of_a_large_frame_doubles_as_its_bytes_come(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.core.wire.framing._FIRST_CLAIM", 2 * CHUNK)
+    monkeypatch.setattr("minirospy.core.wire.framing.FIRST_CLAIM", 2 * CHUNK)
     reader = FrameReader()
     assert feed(reader, struct.pack("<I", 9 * CHUNK), 4) == []
     room = []

@@ -12,10 +12,10 @@ from minirospy.core.wire.http import (
     HttpHead,
     HttpMessage,
     HttpReader,
-    _short_head,
     serialize_error,
     serialize_request,
     serialize_response,
+    short_head,
 )
 from tests.core.wire.memory import Allocations
 
@@ -463,9 +463,9 @@ def test_line_feed_alone_in_front_of_a_carriage_return() -> None:
 def test_only_short_heads_are_kept() -> None:
     # Caching long heads would fill the memory.
     for size, keeps in ((300, True), (30_000, False)):
-        before = _short_head.cache_info().misses
+        before = short_head.cache_info().misses
         head_of(b"POST / HTTP/1.1\r\nContent-Length: 0\r\nX: %s\r\n\r\n" % (b"x" * size))
-        assert (_short_head.cache_info().misses > before) is keeps
+        assert (short_head.cache_info().misses > before) is keeps
 
 
 def test_limit_of_a_body_is_as_documented() -> None:

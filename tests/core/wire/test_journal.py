@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.core.wire.journal import (
-    _STEP_BYTES,
-    _STEP_ITEMS,
     HEAD,
+    STEP_BYTES,
+    STEP_ITEMS,
     pack_in_steps,
     parse_journal,
     serialize_record,
@@ -146,40 +146,40 @@ def test_pieces_are_the_whole_value(value: Any) -> None:
     assert unpack(b"".join(pack_in_steps(value))) == value
 
 
-@pytest.mark.parametrize("count", [0, 1, 3 * _STEP_ITEMS, 3 * _STEP_ITEMS + 1])
+@pytest.mark.parametrize("count", [0, 1, 3 * STEP_ITEMS, 3 * STEP_ITEMS + 1])
 def test_list_of_numbers_comes_in_pieces_of_so_many(count: int) -> None:
     pieces = list(pack_in_steps([7] * count))
     # A header of up to five bytes, and a byte for each number.
-    assert len(pieces) == count // _STEP_ITEMS + 1
-    assert max(map(len, pieces)) <= _STEP_ITEMS + 5
+    assert len(pieces) == count // STEP_ITEMS + 1
+    assert max(map(len, pieces)) <= STEP_ITEMS + 5
     assert unpack(b"".join(pieces)) == [7] * count
 
 
 @pytest.mark.parametrize("kind", [str, bytes])
 def test_long_text_comes_in_pieces(kind: type) -> None:
-    value = "z" * (3 * _STEP_BYTES + 5)
+    value = "z" * (3 * STEP_BYTES + 5)
     value = value if kind is str else value.encode()
     pieces = list(pack_in_steps([1, value, 2]))
-    assert max(map(len, pieces)) == _STEP_BYTES
-    assert sum(len(each) == _STEP_BYTES for each in pieces) == 3
+    assert max(map(len, pieces)) == STEP_BYTES
+    assert sum(len(each) == STEP_BYTES for each in pieces) == 3
     assert unpack(b"".join(pieces)) == [1, value, 2]
     # The longest value that fits into one piece.
-    short = value[:_STEP_BYTES]
+    short = value[:STEP_BYTES]
     assert len(list(pack_in_steps(short))) == 1
 
 
 def test_long_text_of_any_characters_comes_in_pieces() -> None:
-    value = "\u0151" * (3 * _STEP_BYTES + 5)
+    value = "\u0151" * (3 * STEP_BYTES + 5)
     pieces = list(pack_in_steps([1, value, 2]))
     # The first pieces are empty: a length is known only after encoding.
     assert [len(each) for each in pieces[:6]] == [2, 0, 0, 0, 0, 5]
-    assert max(map(len, pieces)) == 2 * _STEP_BYTES
+    assert max(map(len, pieces)) == 2 * STEP_BYTES
     assert unpack(b"".join(pieces)) == [1, value, 2]
 
 
 def test_many_texts_come_in_pieces() -> None:
-    pieces = list(pack_in_steps(["x" * (_STEP_BYTES // 2)] * 10))
-    assert [len(each) // _STEP_BYTES for each in pieces] == [1] * 5 + [0]
+    pieces = list(pack_in_steps(["x" * (STEP_BYTES // 2)] * 10))
+    assert [len(each) // STEP_BYTES for each in pieces] == [1] * 5 + [0]
 
 
 def test_pieces_hold_dates_and_refuse_what_no_journal_holds() -> None:

@@ -241,9 +241,9 @@ def test_lines_of_a_text_are_one_piece() -> None:
 
 
 def test_limits_are_as_documented() -> None:
-    assert (MAX_DEPTH, xmlrpc_reader._MAX_ELEMENTS, xmlrpc_reader._MAX_MEMORY) == (64, 10**6, 64 * 2**20)
-    assert xmlrpc_reader._MAX_WIDE == 16 * 2**20
-    assert (xmlrpc_reader._MAX_TOKEN, xmlrpc_reader._MAX_SCALAR) == (64 * 2**10, 2048)
+    assert (MAX_DEPTH, xmlrpc_reader.MAX_ELEMENTS, xmlrpc_reader.MAX_MEMORY) == (64, 10**6, 64 * 2**20)
+    assert xmlrpc_reader.MAX_WIDE == 16 * 2**20
+    assert (xmlrpc_reader.MAX_TOKEN, xmlrpc_reader.MAX_SCALAR) == (64 * 2**10, 2048)
 
 
 def nested(levels: int) -> Any:
@@ -293,7 +293,7 @@ def test_levels_of_tags_are_limited(levels: int) -> None:
 
 
 def test_elements_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(xmlrpc_reader, "_MAX_ELEMENTS", 5)
+    monkeypatch.setattr(xmlrpc_reader, "MAX_ELEMENTS", 5)
     reader = Reader()
     reader.feed(b"<a><b/><b/><b/><b/>")
     with pytest.raises(RpcProtocolError, match="more than 5 elements"):
@@ -532,7 +532,7 @@ def test_each_step_is_short() -> None:
 def test_too_large_input_is_refused_before_its_end(
     body: bytes, why: str, status: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(xmlrpc_reader, "_MAX_MEMORY", 1024 * 1024)
+    monkeypatch.setattr(xmlrpc_reader, "MAX_MEMORY", 1024 * 1024)
     with pytest.raises(RpcProtocolError, match=why) as caught:
         finish(parse_call_in_steps(body))
     assert caught.value.status == status

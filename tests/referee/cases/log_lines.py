@@ -23,11 +23,6 @@ for message in (5, 1.5, None, (1, 2), [], {"a": 1}, b"bytes", "", "\\u00e4\\u20a
     rospy.loginfo(message)
 rospy.loginfo("%% of %s", 100)
 rospy.loginfo("%(a)s", {"a": 2})
-for arguments in (("%d", "x"), ("x", "y"), ("%s %s", 1)):
-    try:
-        rospy.loginfo(*arguments)
-    except TypeError as error:
-        print("TypeError", error)
 try:
     rospy.loginfo()
 except TypeError as error:

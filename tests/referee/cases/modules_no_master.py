@@ -67,8 +67,8 @@ for expected, call, *arguments in (
     with contextlib.redirect_stdout(io.StringIO()):
         try:
             said = f"gives {call(*arguments)!r}"
-        except expected:
-            said = f"raises {expected.__name__}"
+        except expected as error:
+            said = f"raises {expected.__name__}" + (f": {error}" if expected is not OSError else "")
         except Exception as error:  # noqa: BLE001 - whatever it is
             said = f"raises another: {type(error).__name__}"
     show(getattr(call, "__name__", "call"), said)

@@ -48,17 +48,6 @@ calls = []
 timer = rospy.Timer(rospy.Duration(0.05), calls.append, oneshot=True)
 timer.join(30)
 show("oneshot", len(calls), timer.is_alive())
-
-
-def fails(event):
-    calls.append(event)
-    raise ValueError("in the callback")
-
-
-timer = rospy.Timer(rospy.Duration(0.02), fails)
-timer.join(30)
-show("an error ends it", len(calls), timer.is_alive(), errors)
-errors.clear()
 for period in (rospy.Duration(0), rospy.Duration(-1), rospy.Duration(0, 1), rospy.Duration(1e-3)):
     calls.clear()
     timer = rospy.Timer(period, calls.append, oneshot=True)

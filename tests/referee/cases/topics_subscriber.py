@@ -97,7 +97,8 @@ seen.clear()
 
 def bad(message):
     note("bad", message.data)
-    raise ValueError("bad thing")
+    if message.data == 6:  # minirospy logs the same error once
+        raise ValueError("bad thing")
 
 
 failing = rospy.Subscriber("/chatter", Int32, bad)

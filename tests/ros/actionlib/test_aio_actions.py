@@ -258,7 +258,7 @@ def test_a_cancel_that_comes_before_its_goal(monkeypatch: pytest.MonkeyPatch) ->
     async def main(client: Client, server: Server) -> None:
         await client.wait_for_server()
         goal = client.send(msg.TestGoal(3))
-        await server._take_cancel(GoalID(id=goal.id))
+        await server.take_cancel(GoalID(id=goal.id))
         with pytest.raises(GoalError, match="recalled: it was cancelled before it came"):
             await goal
 
@@ -275,7 +275,7 @@ def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatc
             # Both have arrived by now; the one with the shorter pause is done before the other continues.
             pauses.append(seconds)
             await until(
-                lambda: not (len(pauses) < 2 or (seconds == max(pauses) and "other-1" not in server._goals))
+                lambda: not (len(pauses) < 2 or (seconds == max(pauses) and "other-1" not in server.goals))
             )
 
         monkeypatch.setattr(server_module, "asyncio", SimpleNamespace(**{**vars(asyncio), "sleep": sleep}))
@@ -285,8 +285,8 @@ def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatc
         ):
             await goals.wait_for_subscribers()
             await goals.publish(goal_id=GoalID(id="other-1"), goal=msg.TestGoal(3))
-            await server._take_cancel(GoalID())
-            assert server._goals["other-1"].is_cancel_requested
+            await server.take_cancel(GoalID())
+            assert server.goals["other-1"].is_cancel_requested
             monkeypatch.undo()
 
     run(main)
@@ -296,7 +296,7 @@ def test_a_cancel_of_all_up_to_a_time() -> None:
     async def main(client: Client, server: Server) -> None:
         goal = client.send(msg.TestGoal(3))
         await started(goal)
-        await server._take_cancel(GoalID(stamp=server._node.now()))
+        await server.take_cancel(GoalID(stamp=server._node.now()))
         with pytest.raises(GoalError, match="preempted"):
             await goal
         assert (await client.send(msg.TestGoal(1))).result == 1
@@ -317,7 +317,7 @@ def test_a_server_that_ends_aborts_and_one_that_forgot_loses() -> None:
     async def forgetful(client: Client, server: Server) -> None:
         goal = client.send(msg.TestGoal(3))
         await started(goal)
-        server._goals.clear()
+        server.goals.clear()
         with pytest.raises(GoalError, match="lost"):
             await goal
 

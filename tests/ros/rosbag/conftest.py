@@ -45,20 +45,20 @@ class Talker:
     """A node that publishes strings."""
 
     def __init__(self, name: str) -> None:
-        self._loop = LoopThread(name)
+        self.loop = LoopThread(name)
         self.node = Node(f"/{name}", Environment.read())
-        self._loop.run(self.node.start())
+        self.loop.run(self.node.start())
 
     def advertise(self, topic: str, *, latch: bool = False, type_: InterfaceType = STRING) -> Publication:
         """Advertise a topic."""
         publication = Publication(topic, type_, latch=latch)
-        self._loop.run(self.node.advertise(publication))
+        self.loop.run(self.node.advertise(publication))
         return publication
 
     def close(self) -> None:
         """Shut down the node."""
-        self._loop.run(self.node.close())
-        self._loop.close()
+        self.loop.run(self.node.close())
+        self.loop.close()
 
 
 def say(publication: Publication, text: str | bytes) -> None:

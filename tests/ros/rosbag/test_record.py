@@ -80,7 +80,7 @@ def test_all_topics_are_found_while_it_runs(talker: Talker, start: Start, tmp_pa
 
 def test_a_node_s_topics_are_recorded(talker: Talker, start: Start, tmp_path: Path) -> None:
     listened, other = talker.advertise("/listened"), talker.advertise("/other")
-    talker._loop.run(
+    talker.loop.run(
         talker.node.subscribe(talker.node.make_subscription("/listened", listened.type, lambda *_: None))
     )
     process = start("record", "--node", "talker", "-O", "out", "--chunksize", "0")
@@ -198,7 +198,7 @@ def test_begin_write_names_the_file(talker: Talker, start: Start, tmp_path: Path
     subscription = talker.node.make_subscription(
         "/begin_write", talker.advertise("/x").type, lambda body, _: heard.append(bytes(body))
     )
-    talker._loop.run(talker.node.subscribe(subscription))
+    talker.loop.run(talker.node.subscribe(subscription))
     process = start("record", "-p", "-O", "out", "/chatter")
     wait_until(lambda: heard)
     end(process)
@@ -481,7 +481,7 @@ def test_launch_files_start_both_programs(talker: Talker, tmp_path: Path) -> Non
         writer.close()
     heard: list[bytes] = []
     subscription = talker.node.make_subscription("/played", STRING, lambda body, _: heard.append(bytes(body)))
-    talker._loop.run(talker.node.subscribe(subscription))
+    talker.loop.run(talker.node.subscribe(subscription))
 
     code = "import sys; from minirospy.ros.roslaunch.commands.roslaunch import main; sys.exit(main())"
     launch = subprocess.Popen(

@@ -249,6 +249,7 @@ def test_the_args_of_a_file_are_described(tmp_path: Path) -> None:
         ),
         ('<machine name="m" address="a" ros-root="/x"/>', "use env-loader"),
         ('<machine name="m" address="a"><env name="a" value="b"/></machine>', "use env-loader"),
+        ('<param name="p" value="1" type="float"/>', "Unknown type 'float'"),
         ('<machine name="m" address="a"/><machine name="m" address="b"/>', "declared otherwise"),
     ],
 )
@@ -257,6 +258,15 @@ def test_errors_name_the_line(packages: Packages, body: str, says: str) -> None:
         load(packages, body)
     assert raised.value.file == "<stdin>"
     assert raised.value.line == (4 if "multiple" in says else 2)
+
+
+def test_other_tags_in_a_machine_are_warnings(packages: Packages) -> None:
+    spec = load(packages, '<machine name="m" address="a"><foo/><param name="p" value="1"/></machine>')
+    assert list(spec.machines) == ["m"]
+    assert [str(each) for each in spec.warnings] == [
+        "<stdin>:2: unrecognized 'foo' tag in <machine> tag",
+        "<stdin>:2: unrecognized 'param' tag in <machine> tag",
+    ]
 
 
 @pytest.mark.parametrize(

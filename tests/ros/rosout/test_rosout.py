@@ -49,14 +49,14 @@ def test_subscriber_that_does_not_read_gets_no_large_messages() -> None:
     links = [Link(0), Link(99), Link(100), Link(1000)]
     node = make_node(links)
     for size in (16 * 1024, 16 * 1024 + 1):
-        finish(node._on_message(b"x" * (size - 4), {}))
+        finish(node.on_message(b"x" * (size - 4), {}))
     assert [len(link.sent) for link in links] == [2, 2, 1, 1]
     assert links[3].sent == [16 * 1024]
 
 
 def test_many_subscribers_get_a_message_in_steps() -> None:
     links = [Link(0) for _ in range(50)]
-    assert sum(1 for _ in make_node(links)._on_message(b"x", {})) == 50
+    assert sum(1 for _ in make_node(links).on_message(b"x", {})) == 50
     assert all(link.sent for link in links)
 
 
@@ -65,9 +65,9 @@ def test_long_text_is_written_in_steps() -> None:
     node = make_node()
     node._file = SimpleNamespace(text=lines.append)
     text = "\x1b[1m\n\t" * 10_000
-    steps = node._on_message(body_of(text, "/a\nb"), {})
+    steps = node.on_message(body_of(text, "/a\nb"), {})
     # Each control character in a string takes some 0.5 us.
-    assert sum(1 for _ in steps) >= len(text) // rosout._STEP_LETTERS
+    assert sum(1 for _ in steps) >= len(text) // rosout.STEP_LETTERS
     assert lines == [
         f"0.000000000 INFO /a\\nb [f.py:7(g)] [topics: ] {text.replace(chr(27), chr(92) + 'x1b')}"
     ]
@@ -77,7 +77,7 @@ def test_text_that_is_not_a_log_message_is_not_written() -> None:
     lines: list[str] = []
     node = make_node()
     node._file = SimpleNamespace(text=lines.append)
-    finish(node._on_message(b"x", {}))
+    finish(node.on_message(b"x", {}))
     assert lines == []
 
 

@@ -55,8 +55,8 @@ class TestBuffer:
             await broadcaster.send_static(stamped("map", "odom", 0, 1.0))
             await broadcaster.send_static(stamped("base", "laser", 0, 0.5))
             await broadcaster.send()
-            assert broadcaster._moving is not None
-            await broadcaster._moving.wait_for_subscribers()
+            assert broadcaster.moving is not None
+            await broadcaster.moving.wait_for_subscribers()
             await broadcaster.send(stamped("odom", "base", 1, 1.0))
             await broadcaster.send(stamped("odom", "base", 3, 3.0), stamped("base", "wheel", 3))
             found = await waiting
@@ -83,8 +83,8 @@ class TestBuffer:
             with pytest.raises(InvalidArgumentException):
                 await anext(buffer.changes("map", ""))
             assert "cannot be empty" in (buffer.why_not("map", "") or "")
-            buffer._tree.insert("map", "base", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
-            buffer._tree.insert("other", "tree", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+            buffer.tree.insert("map", "base", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+            buffer.tree.insert("other", "tree", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
             with pytest.raises(ExtrapolationException):
                 await buffer.lookup("map", "base", Time(9))
             with pytest.raises(ConnectivityException):
@@ -108,8 +108,8 @@ class TestBuffer:
 
             following = asyncio.create_task(follow())
             await broadcaster.send()
-            assert broadcaster._moving is not None
-            await broadcaster._moving.wait_for_subscribers()
+            assert broadcaster.moving is not None
+            await broadcaster.moving.wait_for_subscribers()
             await broadcaster.send(stamped("map", "base", 1, 0.0))
             await following
             assert places == [0.5, 1.5, 2.5]
@@ -138,13 +138,13 @@ class TestBuffer:
         async def main(node: Node, buffer: Buffer) -> None:
             times = [Time(10)]
             node.now = lambda: times[-1]  # type: ignore[method-assign]
-            buffer._tree.insert("map", "base", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+            buffer.tree.insert("map", "base", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
             for later in (Time(10), Time(11)):
                 times.append(later)
-                buffer._check_for_jump()
+                buffer.check_for_jump()
                 assert buffer.why_not("map", "base") is None
             times.append(Time(5))
-            buffer._check_for_jump()
+            buffer.check_for_jump()
             assert buffer.why_not("map", "base")
 
         run(main)

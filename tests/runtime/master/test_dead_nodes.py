@@ -18,8 +18,8 @@ from tests.waiting import until
 
 
 def test_a_crowded_master_forgets_nodes_that_refuse_connections(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(masters, "_SWEEP_SECONDS", 0.01)
-    monkeypatch.setattr(dead_nodes, "_SECONDS", 0.1)
+    monkeypatch.setattr(masters, "SWEEP_SECONDS", 0.01)
+    monkeypatch.setattr(dead_nodes, "SILENCE_SECONDS", 0.1)
     called: list[str] = []
     publishers: list[object] = []
 

@@ -17,7 +17,7 @@ from minirospy.runtime.master.log_file import LogFile
 
 
 def test_flood_of_warnings_is_written_in_batches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_file, "_SECONDS", 0.05)
+    monkeypatch.setattr(log_file, "FLUSH_SECONDS", 0.05)
     written: list[int] = []
     again = asyncio.Event()
 
@@ -40,7 +40,7 @@ def test_flood_of_warnings_is_written_in_batches(tmp_path: Path, monkeypatch: py
         again.clear()
         await again.wait()
         # Timers of each line and warning would have fired by then.
-        await asyncio.sleep(2 * log_file._SECONDS)
+        await asyncio.sleep(2 * log_file.FLUSH_SECONDS)
         assert len(written) == at_once + 1
         assert (tmp_path / "master.log").read_text().endswith(": the last\n")
         file.close()

@@ -210,10 +210,10 @@ def test_an_update_does_not_meet_the_answer_to_a_registration(
 ) -> None:
     # If real rospy received the update first and the older response later, it would stay without the publisher.
     old, fresh = slaves
-    monkeypatch.setattr(notifier, "_HOLD_SECONDS", 0.0)
+    monkeypatch.setattr(notifier, "HOLD_SECONDS", 0.0)
     proxy.registerSubscriber("/old", "/t", "std_msgs/Bool", old.uri)
     proxy.registerSubscriber("/fresh", "/before", "std_msgs/Bool", fresh.uri)
-    monkeypatch.setattr(notifier, "_HOLD_SECONDS", 3600.0)
+    monkeypatch.setattr(notifier, "HOLD_SECONDS", 3600.0)
     proxy.registerSubscriber("/fresh", "/t", "std_msgs/Bool", fresh.uri)
     proxy.subscribeParam("/fresh", fresh.uri, "/p")
     proxy.setParam("/other", "/p", 1)
@@ -299,7 +299,7 @@ def test_the_kept_answer_to_get_system_state_is_never_an_old_one() -> None:
 
     async def scene() -> None:
         master = Master()
-        master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+        master.notifier.send = lambda notice: None  # type: ignore[method-assign]
 
         for number in range(2000):
             node, uri, topic = rng.choice(nodes), rng.choice(uris), rng.choice(topics)

@@ -227,14 +227,14 @@ def loop() -> Iterator[LoopThread]:
 
 
 def test_a_request_that_never_ends_is_hung_up_on(monkeypatch: pytest.MonkeyPatch, master: str) -> None:
-    monkeypatch.setattr(connections, "_REQUEST_SECONDS", 0.05)
+    monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.05)
     assert exchange(master, b"POST / HTTP/1.1\r\nContent-Length: 10\r\n\r\nabc") == b""
 
 
 def test_a_client_that_never_reads_is_hung_up_on(monkeypatch: pytest.MonkeyPatch, master: str) -> None:
     with ServerProxy(master) as proxy:
         proxy.setParam("/test", "/large", "x" * 1_000_000)
-        monkeypatch.setattr(connections, "_REQUEST_SECONDS", 0.3)
+        monkeypatch.setattr(connections, "REQUEST_SECONDS", 0.3)
         with socket.create_connection(("127.0.0.1", int(master.rsplit(":", 1)[1])), 20) as sock:
             hung_up = False
             while not hung_up:
@@ -273,8 +273,8 @@ def test_of_many_connections_the_longest_silent_go(loop: LoopThread) -> None:
 def test_large_requests_are_refused_while_too_many_are_on_their_way(
     monkeypatch: pytest.MonkeyPatch, master: str
 ) -> None:
-    monkeypatch.setattr(rpc_server, "_MAX_HELD", 100_000)
-    monkeypatch.setattr(rpc_server, "_LARGE", 50_000)
+    monkeypatch.setattr(rpc_server, "MAX_HELD", 100_000)
+    monkeypatch.setattr(rpc_server, "LARGE_REQUEST", 50_000)
     half = post(b"x" * 300_000)[:150_000]
     assert exchange(master, half).startswith(b"HTTP/1.1 503")
     with ServerProxy(master) as proxy:
@@ -395,15 +395,15 @@ PIECES = st.sampled_from(
 def test_any_bytes_are_answered_or_refused(pieces: list[bytes]) -> None:
     async def test() -> None:
         master = Master()
-        master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+        master.notifier.send = lambda notice: None  # type: ignore[method-assign]
         await master.start()
         ours, theirs = socket.socketpair()
         ours.setblocking(False)
 
         with theirs:
             theirs.setblocking(False)
-            connection = connections.Connection(master._server, ours, asyncio.get_running_loop())
-            master._server.connections[connection] = None
+            connection = connections.Connection(master.server, ours, asyncio.get_running_loop())
+            master.server.connections[connection] = None
 
             for piece in pieces:
                 if connection._state is connections.State.OPEN:
@@ -413,7 +413,7 @@ def test_any_bytes_are_answered_or_refused(pieces: list[bytes]) -> None:
 
             connection.end()
 
-        assert master._server.held == 0
+        assert master.server.held == 0
         assert master.dispatch("getSystemState", ["/x"])[0] == 1
         parse_response(serialize_response(master.dispatch("getParam", ["/x", "/"])))
         await master.close()
@@ -448,7 +448,7 @@ METHODS = [
 def test_any_call_is_answered(calls: list[tuple[str, list[Any]]]) -> None:
     async def test() -> None:
         master = Master()
-        master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+        master.notifier.send = lambda notice: None  # type: ignore[method-assign]
         for method, args in calls:
             try:
                 answer = result_of(master.dispatch(method, args))

@@ -208,7 +208,7 @@ def test_old_session_is_recovered_only_if_a_node_answers(
             os.utime(path, (time.time() - 86400 * 3,) * 2)
         if lives:
             # On a busy machine the node's response may arrive late.
-            monkeypatch.setattr(master_module, "_QUICK_CHECK_SECONDS", 30.0)
+            monkeypatch.setattr(master_module, "QUICK_CHECK_SECONDS", 30.0)
         second = await start(path)
         assert call(second, "getParamNames", "/x") == (["/p"] if lives else [])
         assert set(second.registry.nodes()) == ({"/a"} if lives else set())
@@ -273,8 +273,8 @@ def test_recovered_node_is_forgotten_after_three_tries_of_three_seconds(
         await first.close(keep_journal=True)
         nodes = Answers(monkeypatch, *answers)
         second = await start(path)
-        assert second._checking
-        await second._checking
+        assert second.checking
+        await second.checking
         assert nodes.calls == [(uri, "getName", 3.0)] * tries
         assert set(second.registry.nodes()) == ({"/a"} if is_kept else set())
         await second.close()
@@ -317,13 +317,13 @@ def test_master_gives_a_sign_of_life_every_thirty_seconds(path: Path) -> None:
         before = loop.time()
         master = await start(path)
         os.utime(path, (1, 1))
-        assert master._touching
-        assert before + 30 <= master._touching.when() <= loop.time() + 30
+        assert master.touching
+        assert before + 30 <= master.touching.when() <= loop.time() + 30
         # Call the timer's function.
-        first = master._touching
-        master._touch()
+        first = master.touching
+        master.touch()
         assert path.stat().st_mtime > 1
-        assert master._touching is not first
+        assert master.touching is not first
         first.cancel()
         await master.close()
 
@@ -356,7 +356,7 @@ def test_damaged_journal_is_recovered_up_to_the_damage(path: Path, damage: str) 
 
 
 def test_two_masters_never_share_a_journal(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(master_module, "_LOCK_SECONDS", 0.0)
+    monkeypatch.setattr(master_module, "LOCK_SECONDS", 0.0)
 
     async def test() -> None:
         first = await start(path)
@@ -378,7 +378,7 @@ def test_two_masters_never_share_a_journal(path: Path, monkeypatch: pytest.Monke
 def test_journal_of_another_master_is_written_once_that_one_has_ended(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(master_module, "_LOCK_SECONDS", 0.0)
+    monkeypatch.setattr(master_module, "LOCK_SECONDS", 0.0)
     monkeypatch.setattr(journal_module, "RETRY_SECONDS", 0.0)
 
     async def test() -> None:
@@ -386,7 +386,7 @@ def test_journal_of_another_master_is_written_once_that_one_has_ended(
         call(first, "setParam", "/a", "/q", 1)
         second = await start(path)
         os.utime(path, (0, 0))
-        second._touch()
+        second.touch()
         assert path.stat().st_mtime == 0
         call(second, "setParam", "/a", "/p", 1)
         assert "held by another master" in call(second, "minirospy.status", "/x")["journal"]
@@ -416,7 +416,7 @@ def test_master_without_the_port_never_locks_the_journal(path: Path) -> None:
 
 
 def test_master_waits_for_the_lock_of_one_that_exits(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(master_module, "_LOCK_SECONDS", 20.0)
+    monkeypatch.setattr(master_module, "LOCK_SECONDS", 20.0)
 
     async def test() -> None:
         ending = Journal(path, lambda: [["set", "/", {"p": 1}]])
@@ -568,7 +568,7 @@ def test_failed_journal_is_retried_without_a_call(path: Path, monkeypatch: pytes
             master = await start(path)
             master.parameters.set("/p", 1, "")
         monkeypatch.setattr(journal_module, "RETRY_SECONDS", 0.0)
-        master._touch()
+        master.touch()
         assert not call(master, "minirospy.status", "/x")["journal"].startswith("failing")
         assert ["set", "/", {"p": 1}] in parse_journal(path.read_bytes()).records
         await master.close()
@@ -647,13 +647,13 @@ def random_call(rng: random.Random) -> tuple[Any, ...]:
 def test_journal_replays_to_the_same_state_after_any_calls(
     path: Path, seed: int, compact: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(journal_module, "_COMPACT_BYTES", compact)
-    monkeypatch.setattr(journal_module, "_COMPACT_FACTOR", 1)
+    monkeypatch.setattr(journal_module, "COMPACT_BYTES", compact)
+    monkeypatch.setattr(journal_module, "COMPACT_FACTOR", 1)
 
     async def test() -> None:
         rng = random.Random(seed)
         master = await start(path)
-        master._notifier.send = lambda notice: None  # type: ignore[method-assign]
+        master.notifier.send = lambda notice: None  # type: ignore[method-assign]
         for number in range(400):
             method, *args = random_call(rng)
             master.dispatch(method, args)

@@ -24,15 +24,15 @@ class Scene:
     """A notifier to whose calls the test responds."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(notifier_module, "_MAX_CONCURRENT_CALLS", 4)
-        monkeypatch.setattr(notifier_module, "_CALLS_TO_SUSPECTS", 1)
+        monkeypatch.setattr(notifier_module, "MAX_CONCURRENT_CALLS", 4)
+        monkeypatch.setattr(notifier_module, "CALLS_TO_SUSPECTS", 1)
         self.under_way: dict[str, Callable[[bytes | RpcError], None]] = {}
         self.bodies: list[tuple[str, bytes]] = []
         """The calls in order: the node's URI, and the request."""
         self.publishers: list[str] = []
         self.values: dict[str, object] = {}
         self.notifier = Notifier(self, Turns(), timeout=3.0)  # type: ignore[arg-type]
-        monkeypatch.setattr(self.notifier._rpc, "start", self.start)
+        monkeypatch.setattr(self.notifier.rpc, "start", self.start)
 
     def publisher_uris(self, topic: str) -> list[str]:
         return list(self.publishers)
@@ -166,7 +166,7 @@ def test_notices_of_one_node_keep_their_order(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_many_parameters_become_one_notice_for_each_subscription(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(notifier_module, "_MAX_PARAMETERS", 3)
+    monkeypatch.setattr(notifier_module, "MAX_PARAMETERS", 3)
 
     async def scene(clock: ManualLoop) -> None:
         scene = Scene(monkeypatch)
@@ -227,7 +227,7 @@ def test_updates_of_many_publishers_are_rate_limited(monkeypatch: pytest.MonkeyP
         assert [args[1] for _, args in scene.calls] == ["/many", "/few", "/many"]
         # A node whose pause has ended uses neither memory nor time.
         await clock.advance(0.06)
-        assert not scene.notifier._nodes
+        assert not scene.notifier.nodes
         await scene.notifier.close()
 
     run_manually(scene)
@@ -273,9 +273,9 @@ def test_a_node_on_the_loop_is_notified_without_a_call(monkeypatch: pytest.Monke
         await clock.advance(0.02)
         assert received[2:] == [("/many", 1000)]
         await clock.advance(0.06)
-        assert not scene.notifier._nodes
+        assert not scene.notifier.nodes
         assert not scene.under_way
-        assert not scene.notifier._line.under_way
+        assert not scene.notifier.line.under_way
         await scene.notifier.close()
 
     run_manually(scene)

@@ -120,7 +120,7 @@ def test_a_peer_that_requests_an_unknown_topic_gets_an_error(
 
 
 def test_clients_that_only_connect_leave_room_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(node_module, "_MAX_IDLE", 20)
+    monkeypatch.setattr(node_module, "MAX_IDLE", 20)
 
     async def scene() -> None:
         async with running() as node:
@@ -131,8 +131,8 @@ def test_clients_that_only_connect_leave_room_for_others(monkeypatch: pytest.Mon
                 idle.append(await tcp.connect("127.0.0.1", port))
                 if number % 50 == 49:
                     assert await rpc.call(node.uri, "getName", "/me") == [1, "", "/node"]
-            assert node._server
-            assert node._server.clients <= 20
+            assert node.server
+            assert node.server.clients <= 20
             await rpc.close()
             for sock in idle:
                 sock.close()

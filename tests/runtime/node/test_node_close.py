@@ -32,24 +32,24 @@ class FakeMaster:
         self.release = asyncio.Event()
         self.release.set()
         self._has_multicall = multicall
-        self._server = RpcServer(self._dispatch)
+        self.server = RpcServer(self.dispatch)
 
     async def __aenter__(self) -> FakeMaster:
-        await self._server.start()
+        await self.server.start()
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        await self._server.close()
+        await self.server.close()
 
     @property
     def uri(self) -> str:
-        return f"http://127.0.0.1:{self._server.port}"
+        return f"http://127.0.0.1:{self.server.port}"
 
     @property
     def unregistered(self) -> list[str]:
         return sorted(args[1] for method, args in self.calls if method.startswith("unregister"))
 
-    async def _dispatch(self, method: str, args: Sequence[Any]) -> Any:
+    async def dispatch(self, method: str, args: Sequence[Any]) -> Any:
         self.calls.append((method, args))
         if not method.startswith("register"):
             await self.release.wait()
@@ -113,7 +113,7 @@ def test_close_repeats_what_a_multicall_did_not_do() -> None:
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:
             node = await publishing_node(master.uri)
-            dispatch = master._dispatch
+            dispatch = master.dispatch
 
             async def refuse_most(method: str, args: Sequence[Any]) -> Any:
                 answer = await dispatch(method, args)
@@ -122,7 +122,7 @@ def test_close_repeats_what_a_multicall_did_not_do() -> None:
                     answer[1:] = [{"faultCode": 1, "faultString": "too long"}] * (TOPICS - 1)
                 return answer
 
-            master._server.dispatch = refuse_most
+            master.server.dispatch = refuse_most
             await node.close()
             assert master.unregistered == ALL
 
@@ -147,14 +147,14 @@ def test_registration_waits_for_a_master_that_is_busy_for_20_seconds() -> None:
             arrived, passed = asyncio.Event(), 0.0
             clock = loop.time
             loop.time = lambda: clock() + passed  # type: ignore[method-assign]
-            dispatch = master._dispatch
+            dispatch = master.dispatch
 
             async def answer_late(method: str, args: Sequence[Any]) -> Any:
                 arrived.set()
                 await master.release.wait()
                 return await dispatch(method, args)
 
-            master._server.dispatch = answer_late
+            master.server.dispatch = answer_late
             master.release.clear()
             registering = asyncio.ensure_future(node.advertise(Publication("/late", STRING)))
             await arrived.wait()
@@ -206,14 +206,14 @@ def test_close_waits_for_a_master_that_is_busy_for_minutes() -> None:
     async def scene(clock: ManualLoop) -> None:
         async with FakeMaster(multicall=True) as master:
             node = await publishing_node(master.uri)
-            busy, dispatch = asyncio.Event(), master._dispatch
+            busy, dispatch = asyncio.Event(), master.dispatch
 
             async def answer_short_calls(method: str, args: Sequence[Any]) -> Any:
                 if method == "system.multicall":
                     await busy.wait()
                 return await dispatch(method, args)
 
-            master._server.dispatch = answer_short_calls
+            master.server.dispatch = answer_short_calls
             closing = asyncio.ensure_future(node.close())
             for number in range(40):
                 await clock.advance(3.0)
@@ -236,8 +236,8 @@ def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.Monke
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:
             node = await publishing_node(master.uri)
-            registrations = node._registrations
-            registrations._watch_seconds = 0.0
+            registrations = node.registrations
+            registrations.watch_seconds = 0.0
             looking = asyncio.Event()
 
             async def lose(awaitable: Coroutine[Any, Any, Any], _: float) -> None:
@@ -250,8 +250,8 @@ def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.Monke
 
             with monkeypatch.context() as patch:
                 patch.setattr(registration.asyncio, "wait_for", lose)
-                assert registrations._watching
-                registrations._watching.cancel()
+                assert registrations.watching
+                registrations.watching.cancel()
                 registrations.watch()
                 await looking.wait()
                 await node.close()
@@ -262,8 +262,8 @@ def test_close_ends_a_watch_whose_cancellation_is_lost(monkeypatch: pytest.Monke
 def test_close_gives_up_on_a_master_that_is_silent(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(registration, "_SILENT_SECONDS", 0.2)
-    monkeypatch.setattr(registration, "_NOTICE_SECONDS", 0.1)
+    monkeypatch.setattr(registration, "SILENT_SECONDS", 0.2)
+    monkeypatch.setattr(registration, "NOTICE_SECONDS", 0.1)
 
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:

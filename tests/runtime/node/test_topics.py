@@ -145,7 +145,7 @@ async def subscribe_to(
 ) -> Subscription:
     """Return a subscription that was notified of one publisher, which is simulated by ``foreign``."""
     subscription = node.make_subscription("/t", STRING, deliver, on_loop=on_loop)
-    monkeypatch.setattr(subscription._rpc, "call", foreign.answer)
+    monkeypatch.setattr(subscription.rpc, "call", foreign.answer)
     subscription.publishers_changed(["http://127.0.0.1:1/"])
     return subscription
 
@@ -195,7 +195,7 @@ def test_a_refused_subscriber_logs_why_and_retries_only_after_a_change(
             await until(lambda: "refused the connection" in caplog.text)
             assert not publication.links
             # The connecting task has logged this; it finishes one loop iteration later.
-            await until(lambda: not subscription._connecting)
+            await until(lambda: not subscription.connecting)
             await a.unadvertise(publication)
             right = await publish(a, "/t")
             await until(lambda: right.links)
@@ -216,13 +216,13 @@ def test_publisher_of_garbage_is_reported_and_retried_with_backoff(
         await tcp.receive_header(sock)
 
     async def scene() -> None:
-        monkeypatch.setattr("minirospy.core.graph.subscription._FIRST_DELAY", 0.001)
+        monkeypatch.setattr("minirospy.core.graph.subscription.FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             foreign, box = Foreign(garbage), Box()
             subscription = await subscribe_to(foreign, monkeypatch, b, box, on_loop=on_loop)
-            start = subscription._start_connecting
+            start = subscription.start_connecting
             monkeypatch.setattr(
-                subscription, "_start_connecting", lambda action: (delays.append(action.delay), start(action))
+                subscription, "start_connecting", lambda action: (delays.append(action.delay), start(action))
             )
             await until(lambda: len(delays) >= 4)
             subscription.close()
@@ -242,7 +242,7 @@ def test_a_publisher_whose_header_is_none_is_diagnosed_in_one_line(
         await asyncio.get_running_loop().sock_sendall(sock, answer)
 
     async def scene() -> None:
-        monkeypatch.setattr("minirospy.core.graph.subscription._FIRST_DELAY", 0.001)
+        monkeypatch.setattr("minirospy.core.graph.subscription.FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             foreign = Foreign(bad_header)
             subscription = await subscribe_to(foreign, monkeypatch, b, Box())
@@ -270,11 +270,11 @@ def test_an_address_that_cannot_be_reached_is_diagnosed_in_one_line(
     uri: str, advice: str, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def scene() -> None:
-        monkeypatch.setattr("minirospy.core.graph.subscription._FIRST_DELAY", 0.001)
+        monkeypatch.setattr("minirospy.core.graph.subscription.FIRST_DELAY", 0.001)
         async with graph("/b") as (_, (b,)):
             subscription = b.make_subscription("/t", STRING, Box())
             subscription.publishers_changed([uri])
-            await until(lambda: subscription._plan.failures(uri) >= 5)
+            await until(lambda: subscription.plan.failures(uri) >= 5)
             subscription.close()
 
     run(scene)
@@ -305,8 +305,8 @@ def test_a_publisher_of_many_topics_that_cannot_be_reached_is_one_line(
             for number in range(count):
                 subscription = b.make_subscription(f"/t{number}", STRING, Box())
                 b.subscriptions[subscription.topic] = subscription
-                subscription._plan.publishers_changed([uri])
-                subscription._retry(uri, TimeoutError("no answer"))
+                subscription.plan.publishers_changed([uri])
+                subscription.retry(uri, TimeoutError("no answer"))
 
     run(scene)
     lines = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
@@ -321,12 +321,12 @@ def test_many_publishers_that_cannot_be_reached_are_some_lines_and_a_number(
     async def scene() -> None:
         async with graph("/b") as (_, (b,)):
             subscription = b.make_subscription("/t", STRING, Box())
-            subscription._plan.publishers_changed(uris)
+            subscription.plan.publishers_changed(uris)
             for uri in uris:
-                subscription._retry(uri, TimeoutError("no answer"))
+                subscription.retry(uri, TimeoutError("no answer"))
             subscription.close()
 
-    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger._SECONDS", 1e9)
+    monkeypatch.setattr("minirospy.runtime.transport.rate_limited_logger.INTERVAL_SECONDS", 1e9)
     run(scene)
     lines = [r.getMessage() for r in caplog.records if r.levelno == logging.WARNING]
     assert len(lines) == 11
@@ -474,7 +474,7 @@ def test_the_last_message_of_a_latched_topic_is_kept_on_both_sides() -> None:
 def test_a_publisher_update_that_overtakes_the_answer_is_not_undone(monkeypatch: pytest.MonkeyPatch) -> None:
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
-            ask = b._registrations.call
+            ask = b.registrations.call
 
             async def answer_late(method: str, *args: Any) -> Any:
                 answer = await ask(method, *args)
@@ -483,7 +483,7 @@ def test_a_publisher_update_that_overtakes_the_answer_is_not_undone(monkeypatch:
                     await until(lambda: b.subscriptions["/t"].links)
                 return answer
 
-            monkeypatch.setattr(b._registrations, "call", answer_late)
+            monkeypatch.setattr(b.registrations, "call", answer_late)
             subscription = await listen(b, "/t", Box())
             assert [(link.uri, link.closed) for link in subscription.links] == [(a.uri, False)]
 
@@ -497,14 +497,14 @@ def test_a_refusal_that_a_new_list_overtakes_is_not_the_last_word(monkeypatch: p
         async with graph("/a", "/b") as (_, (a, b)):
             await publish(a, "/t")
             subscription = b.make_subscription("/t", STRING, Box())
-            open_link = subscription._open_link
+            open_link = subscription.open_link
 
             async def refuse_once(uri: str) -> Any:
-                monkeypatch.setattr(subscription, "_open_link", open_link)
+                monkeypatch.setattr(subscription, "open_link", open_link)
                 subscription.publishers_changed([a.uri])
                 raise HandshakeRefused("[/a] is not a publisher of [/t]")
 
-            monkeypatch.setattr(subscription, "_open_link", refuse_once)
+            monkeypatch.setattr(subscription, "open_link", refuse_once)
             await b.subscribe(subscription)
             await until(lambda: subscription.links)
 
@@ -534,7 +534,7 @@ def test_publisher_listed_again_while_connecting_is_connected_once(
         async with graph("/a", "/b") as (_, (a, b)):
             await publish(a, "/t")
             subscription = b.make_subscription("/t", STRING, Box())
-            open_link, opening, opened = subscription._open_link, 0, 0
+            open_link, opening, opened = subscription.open_link, 0, 0
             is_named_again = asyncio.Event()
 
             async def open_all_the_same(uri: str) -> Any:
@@ -547,7 +547,7 @@ def test_publisher_listed_again_while_connecting_is_connected_once(
                 opened += 1
                 return link
 
-            monkeypatch.setattr(subscription, "_open_link", open_all_the_same)
+            monkeypatch.setattr(subscription, "open_link", open_all_the_same)
             await b.subscribe(subscription)
             await until(lambda: opening)
             subscription.publishers_changed([])
@@ -561,7 +561,7 @@ def test_publisher_listed_again_while_connecting_is_connected_once(
 
 def slow(node: Node, monkeypatch: pytest.MonkeyPatch, slow_calls: str) -> None:
     """Delay a node's calls to its master if the method has this prefix; they are not cancelled."""
-    ask = node._registrations.call
+    ask = node.registrations.call
 
     async def ask_late(method: str, *args: Any) -> Any:
         await asyncio.sleep(0.05)
@@ -572,7 +572,7 @@ def slow(node: Node, monkeypatch: pytest.MonkeyPatch, slow_calls: str) -> None:
             return await asyncio.shield(asyncio.ensure_future(ask_late(method, *args)))
         return await ask(method, *args)
 
-    monkeypatch.setattr(node._registrations, "call", master)
+    monkeypatch.setattr(node.registrations, "call", master)
 
 
 async def offer(node: Node, kind: str) -> Callable[[], Coroutine[Any, Any, None]]:
@@ -651,7 +651,7 @@ def test_close_gives_up_registrations_with_a_silent_master(
                 await asyncio.sleep(timeout)
                 raise RpcUnreachable(uri, f"{method}: timed out")
 
-            monkeypatch.setattr(a._rpc, "call", silent)
+            monkeypatch.setattr(a.rpc, "call", silent)
             offering = asyncio.ensure_future(offer(a, "publisher"))
             await asyncio.sleep(0)
             closing = asyncio.ensure_future(a.close())
@@ -674,14 +674,14 @@ def test_a_master_that_was_away_gets_the_registrations_it_missed(
     async def scene() -> None:
         async with graph("/a", watch_seconds=0.05) as (master, (a,)):
             await publish(a, "/known")
-            ask, is_away = a._registrations.call, True
+            ask, is_away = a.registrations.call, True
 
             async def be_away(method: str, *args: Any) -> Any:
                 if is_away:
                     raise MasterUnreachableError("http://there")
                 return await ask(method, *args)
 
-            monkeypatch.setattr(a._registrations, "call", be_away)
+            monkeypatch.setattr(a.registrations, "call", be_away)
             with pytest.raises(MasterUnreachableError):
                 await offer(a, kind)
             is_away = False
@@ -723,7 +723,7 @@ def test_closing_the_last_topic_is_not_taken_for_a_new_master(
 ) -> None:
     async def scene() -> None:
         async with graph("/a", watch_seconds=0.02) as (_, (a,)):
-            end, call, looked = await offer(a, "publisher"), a._registrations._call_master, asyncio.Event()
+            end, call, looked = await offer(a, "publisher"), a.registrations.call_master, asyncio.Event()
 
             async def end_first(method: str, *args: Any, **limits: float) -> Any:
                 if method == "lookupNode" and a.publications:
@@ -731,7 +731,7 @@ def test_closing_the_last_topic_is_not_taken_for_a_new_master(
                     asyncio.get_running_loop().call_soon(looked.set)
                 return await call(method, *args, **limits)
 
-            monkeypatch.setattr(a._registrations, "_call_master", end_first)
+            monkeypatch.setattr(a.registrations, "call_master", end_first)
             await looked.wait()
             await asyncio.sleep(0.05)
 
@@ -747,13 +747,13 @@ def test_a_node_of_an_illegal_name_is_not_taken_for_forgotten(
     async def scene() -> None:
         async with graph("/led actuator", watch_seconds=0.02) as (_, (a,)):
             await publish(a, "/t")
-            look, looks = a._registrations._look, asyncio.Queue[str]()
+            look, looks = a.registrations._look, asyncio.Queue[str]()
 
             async def counted(method: str, *args: Any) -> Any:
                 looks.put_nowait(method)
                 return await look(method, *args)
 
-            monkeypatch.setattr(a._registrations, "_look", counted)
+            monkeypatch.setattr(a.registrations, "_look", counted)
             for _ in range(3):
                 assert await looks.get() == "lookupNode"
 
@@ -831,7 +831,7 @@ def test_node_at_the_limit_of_threads_registers_with_restarted_masters(
 
 
 def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(topics, "_SETTLE_SECONDS", 0.01)
+    monkeypatch.setattr(topics, "SETTLE_SECONDS", 0.01)
 
     async def scene() -> None:
         async with graph("/a", "/b") as (_, (a, b)):
@@ -841,12 +841,12 @@ def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: 
             await until(lambda: publication.links and subscription.links)
             subscription.registered_again([])
             subscription.publishers_changed(["http://127.0.0.1:1/"])
-            await until(lambda: subscription._settling is None)
+            await until(lambda: subscription.settling is None)
             assert [link.uri for link in subscription.links] == [a.uri]
-            assert tuple(subscription._plan._failures) == ("http://127.0.0.1:1/",)
+            assert tuple(subscription.plan._failures) == ("http://127.0.0.1:1/",)
             # The node that the master lists again is already connected.
             subscription.publishers_changed([a.uri])
-            assert not subscription._connecting.get(a.uri)
+            assert not subscription.connecting.get(a.uri)
             publication.links[0].close()
             await until(lambda: len(publication.links) == 1)
 
@@ -917,9 +917,9 @@ def test_many_publishers_that_answer_nonsense_are_summed_up(
     async def scene() -> None:
         async with graph("/a") as (_, (a,)):
             subscription = a.make_subscription("/t", STRING, Box())
-            monkeypatch.setattr(subscription._rpc, "call", answer)
+            monkeypatch.setattr(subscription.rpc, "call", answer)
             subscription.publishers_changed(f"http://127.0.0.1:{port}/" for port in range(1, 101))
-            await until(lambda: not subscription._connecting)
+            await until(lambda: not subscription.connecting)
             subscription.close()
 
     run(scene)
@@ -957,11 +957,11 @@ def test_a_closed_node_connects_to_nothing_any_more(monkeypatch: pytest.MonkeyPa
             ended.append(uri)
 
     async def scene() -> None:
-        monkeypatch.setattr(Subscription, "_open_link", connect)
+        monkeypatch.setattr(Subscription, "open_link", connect)
         async with graph("/a", "/b") as (_, (a, b)):
             await publish(a, "/t")
             subscription = await listen(b, "/t", Box())
-            await until(lambda: subscription._connecting)
+            await until(lambda: subscription.connecting)
             await asyncio.sleep(0)
             await b.close()
             assert ended == [a.uri]

@@ -79,8 +79,8 @@ def test_a_call_that_was_late_on_a_kept_connection_is_not_made_again() -> None:
         client = RpcClient(f"http://127.0.0.1:{server.port}/", 30.0)
         loop = asyncio.get_running_loop()
         await loop.run_in_executor(None, client.call, "quick")
-        client._timeout = 0.2
-        for kept in client._idle:
+        client.timeout = 0.2
+        for kept in client.idle:
             kept.settimeout(0.2)
         with pytest.raises(RpcUnreachable, match=r"timed out after 0\.2 s"):
             await loop.run_in_executor(None, client.call, "late")
@@ -182,11 +182,11 @@ def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
         with monkeypatch.context() as patch:
             patch.setattr(socket, "socket", none_left)
             notifier.send(PublisherUpdate(uri, "/lost"))
-            await until(lambda: not notifier._nodes)
+            await until(lambda: not notifier.nodes)
         notifier.send(PublisherUpdate(uri, "/notified"))
         await until(lambda: received)
         assert received == ["/notified"]
-        assert notifier._line.under_way + notifier._suspect_line.under_way <= 1
+        assert notifier.line.under_way + notifier.suspect_line.under_way <= 1
         await notifier.close()
         await server.close()
 
@@ -195,15 +195,15 @@ def test_without_a_file_descriptor_a_call_fails_and_the_next_one_is_made(
 
 def test_a_kept_connection_ends_with_its_server(monkeypatch: pytest.MonkeyPatch) -> None:
     # The connection is closed because the server closes, not because it was idle.
-    monkeypatch.setattr("minirospy.runtime.rpc.async_client._KEEP_SECONDS", 1000.0)
+    monkeypatch.setattr("minirospy.runtime.rpc.async_client.KEEP_SECONDS", 1000.0)
 
     async def test() -> None:
         client, server = AsyncRpcClient(same_host=False), RpcServer(lambda *_: 5)
         await server.start()
         await client.call(f"http://127.0.0.1:{server.port}/", "a")
-        await until(lambda: client._idle)
+        await until(lambda: client.idle)
         await server.close()
-        await until(lambda: not client._idle)
+        await until(lambda: not client.idle)
         await client.close()
 
     run(test)

@@ -84,7 +84,7 @@ def test_a_client_that_is_disconnected_amid_its_requests_gets_no_answers() -> No
 
 
 def test_the_time_limit_restarts_for_a_client_that_makes_progress(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "_PROGRESS", 10_000)
+    monkeypatch.setattr(connections, "PROGRESS_BYTES", 10_000)
 
     async def scene() -> None:
         server = RpcServer(lambda *_: "x" * 20_000_000)

@@ -182,7 +182,7 @@ def test_silent_connections_neither_stop_the_node_nor_fill_its_log(
                     assert await greet(listener.port) == {"callerid": "/server"}
                 if len(silent) == 300:
                     silent.pop(0).close()
-            assert len(listener._handshakes) <= tcp.MAX_HANDSHAKES
+            assert len(listener.handshakes) <= tcp.MAX_HANDSHAKES
             assert len(received) == 10
         finally:
             for sock in silent:
@@ -240,7 +240,7 @@ def test_closing_ends_handshakes_that_are_under_way() -> None:
     async def scene() -> None:
         listener = await serve([])
         sock = await tcp.connect("127.0.0.1", listener.port)
-        await until(lambda: listener._handshakes)
+        await until(lambda: listener.handshakes)
         await listener.close()
         assert await asyncio.get_running_loop().sock_recv(sock, 1) == b""
         sock.close()

@@ -171,7 +171,7 @@ def test_services_and_slave_api_are_reached_by_unix_socket(
         client.close()
         slave = RpcClient(node.uri, same_host=same_host)
         assert slave.call("getPid", "/c")[2] == os.getpid()
-        families.append(slave._idle[0].family)
+        families.append(slave.idle[0].family)
         slave.close()
 
     async def scene() -> None:
@@ -228,7 +228,7 @@ def test_a_master_is_reached_by_each_of_its_names(uri: str) -> None:
             client = RpcClient(uri.format(master.port))
             answer = await asyncio.get_running_loop().run_in_executor(None, client.call, "getPid", "/c")
             assert answer[2] == os.getpid()
-            assert client._idle[0].family == socket.AF_UNIX
+            assert client.idle[0].family == socket.AF_UNIX
             client.close()
 
     run(scene)
@@ -238,7 +238,7 @@ def test_a_socket_name_of_another_user_is_not_trusted(monkeypatch: pytest.Monkey
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
     # This has the same effect as if this process, which took the name, belonged to a user other than this one and
     # root.
-    monkeypatch.setattr(local, "_TRUSTED", frozenset())
+    monkeypatch.setattr(local, "TRUSTED_USERS", frozenset())
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         taken = local.bind("127.0.0.1", port)
@@ -395,7 +395,7 @@ def test_a_node_that_ends_gives_its_name_free_before_its_port(monkeypatch: pytes
         async with graph("/a") as (_, (node,)):
 
             async def closing(listener: Listener) -> None:
-                order.append("name" if listener is node._unix_listener else "port")
+                order.append("name" if listener is node.unix_listener else "port")
                 await close(listener)
 
             monkeypatch.setattr(Listener, "close", closing)

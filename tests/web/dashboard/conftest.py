@@ -22,7 +22,7 @@ class Served:
     """A running dashboard, and other nodes in the same graph."""
 
     def __init__(self, options: BridgeOptions) -> None:
-        self._loop = LoopThread("test-dashboard")
+        self.loop = LoopThread("test-dashboard")
         self._nodes: list[Node] = []
         self._options = options
         self.dashboard: Dashboard | None = None
@@ -40,7 +40,7 @@ class Served:
         return self._nodes[0]
 
     def run(self, work: Coroutine[object, object, _T]) -> _T:
-        return self._loop.run(work, 200.0)
+        return self.loop.run(work, 200.0)
 
     def node(self, name: str) -> Node:
         async def start() -> Node:
@@ -66,7 +66,7 @@ class Served:
         try:
             self.run(self._close())
         finally:
-            self._loop.close()
+            self.loop.close()
 
     async def _start(self) -> Dashboard:
         node = Node("dashboard", rosout=False)

@@ -275,7 +275,7 @@ def test_chosen_topics_are_recorded(
 async def _subscribed(node: Any) -> list[str]:
     from minirospy.introspect.snapshot import fetch
 
-    return [topic for topic, nodes in (await fetch(node._node.master)).subscribers.items() if nodes]
+    return [topic for topic, nodes in (await fetch(node.call_master)).subscribers.items() if nodes]
 
 
 def json_error(page: Client) -> str:
@@ -331,7 +331,7 @@ def test_recording_is_kept_if_its_page_closes_during_its_start(
 ) -> None:
     served = serve()
     assert served.dashboard
-    endpoint = served.dashboard._bags
+    endpoint = served.dashboard.bags
     page = client(served)
     page.send("record", topics=["/a"], name="run", suffix=".bag", compression="none")
     assert starting.reached.wait(60)
@@ -352,9 +352,9 @@ def test_recorder_that_loses_the_signal_before_it_has_a_file_is_ended(
         return start_process(name, [sys.executable, "-c", program], **options)
 
     monkeypatch.setattr(recording, "start_process", ignoring)
-    monkeypatch.setattr(recording, "_TIMEOUTS_BEFORE_FILE", Timeouts(interrupt=0.1))
+    monkeypatch.setattr(recording, "TIMEOUTS_BEFORE_FILE", Timeouts(interrupt=0.1))
     started = Recording(tmp_path / "run.bag", ["/a"], "none", master)
-    wait_until(lambda: "up" in started._lines)
+    wait_until(lambda: "up" in started.lines)
     asyncio.run(started.stop())
     assert started.state().error == "it was stopped before it had started: nothing was recorded"
 
@@ -372,7 +372,7 @@ def test_recorder_that_ends_without_a_file_has_saved_nothing(
 
     monkeypatch.setattr(recording, "start_process", early)
     started = Recording(tmp_path / "run.bag", ["/a"], "none", master)
-    wait_until(lambda: "up" in started._lines)
+    wait_until(lambda: "up" in started.lines)
     asyncio.run(started.stop())
     assert started.state().error == "it was stopped before it had started: nothing was recorded"
 
@@ -417,7 +417,7 @@ def test_bag_is_closed_if_its_page_closes_during_opening(
     make_bag(folder / "a.bag", 1)
     served = serve()
     assert served.dashboard
-    endpoint = served.dashboard._bags
+    endpoint = served.dashboard.bags
     page = client(served)
     page.send("open", name="a.bag")
     assert gate.reached.wait(60)

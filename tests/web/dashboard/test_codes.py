@@ -102,7 +102,7 @@ def test_another_user_does_not_get_the_token(
     """The dashboard pretends to run as another user, so that the socket table shows the client as a different user."""
     served = serve()
     assert served.dashboard
-    monkeypatch.setattr(codes, "_ROOT", -1)
+    monkeypatch.setattr(codes, "ROOT_UID", -1)
     monkeypatch.setattr(codes.os, "getuid", lambda: 4711)
     code = served.dashboard.codes.new("token-1")
     assert exchanged(served.port, code, half_closes=half_closes)[0] == 403

@@ -145,7 +145,7 @@ def test_browser_is_started_with_a_file_without_code_or_token(
     monkeypatch.setattr(command, "print", announce_end, raising=False)
     monkeypatch.delenv("WSL_DISTRO_NAME", raising=False)
     monkeypatch.setattr(browser.tempfile, "tempdir", str(tmp_path))
-    monkeypatch.setattr(browser, "_SNAPS", ())
+    monkeypatch.setattr(browser, "SNAPS", ())
     with pytest.raises(Opened):
         command.dashboard(["--port", "0"])
     assert "code" not in opened.get()
@@ -168,7 +168,7 @@ def test_browser_is_opened_with_a_file_of_this_user_alone(
     opened: queue.Queue[str] = queue.Queue()
     monkeypatch.setattr(browser.webbrowser, "open", opened.put)
     monkeypatch.setattr(browser, "has_screen", lambda environ: True)
-    monkeypatch.setattr(browser, "_SNAPS", ())
+    monkeypatch.setattr(browser, "SNAPS", ())
     monkeypatch.delenv("WSL_DISTRO_NAME", raising=False)
     monkeypatch.setattr(browser.tempfile, "tempdir", str(tmp_path))
     remove = open_link("http://127.0.0.1:1/#/plot?path=/a&code=x")
@@ -187,7 +187,7 @@ def test_browser_is_opened_with_a_file_of_this_user_alone(
 def test_browser_without_access_to_temporary_files_gets_one_in_the_home_folder(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(browser, "_SNAPS", (Path(sys.executable),))
+    monkeypatch.setattr(browser, "SNAPS", (Path(sys.executable),))
     monkeypatch.setattr(browser.Path, "home", lambda: tmp_path)
     file = browser.LinkFile("http://127.0.0.1:1/")
     (folder,) = tmp_path.iterdir()
@@ -201,7 +201,7 @@ def test_no_browser_without_a_screen_or_a_file(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.setattr(browser, "has_screen", lambda environ: False)
     assert open_link("http://127.0.0.1:1/") is None
     monkeypatch.setattr(browser, "has_screen", lambda environ: True)
-    monkeypatch.setattr(browser, "_SNAPS", ())
+    monkeypatch.setattr(browser, "SNAPS", ())
     monkeypatch.delenv("WSL_DISTRO_NAME", raising=False)
     monkeypatch.setattr(browser.tempfile, "tempdir", str(tmp_path / "missing"))
     assert open_link("http://127.0.0.1:1/") is None

@@ -88,7 +88,7 @@ def test_text_that_is_not_a_command_is_refused(text: str, why: str) -> None:
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a topic wait for its subscribers for as long as a busy machine needs."""
-    monkeypatch.setattr("minirospy.aio.topics._JOIN_SECONDS", 60.0)
+    monkeypatch.setattr("minirospy.aio.topics.JOIN_SECONDS", 60.0)
 
 
 @pytest.fixture
@@ -235,7 +235,7 @@ class RawSubscriber:
     """A robot with a separate thread: it subscribes to the dashboard's node by XML-RPC and TCPROS."""
 
     def __init__(self, served: Served, topic: str) -> None:
-        with ServerProxy(served.node_of_dashboard._node.uri) as node:
+        with ServerProxy(served.node_of_dashboard.uri) as node:
             answer: Any = node.requestTopic("/raw", topic, [["TCPROS"]])
         _, host, port = answer[2]
         self.socket = socket.create_connection((host, port), 60)
@@ -279,7 +279,7 @@ def test_robot_stops_while_the_loop_of_the_server_is_blocked(robot: Any, is_lost
         blocked.set()
         released.wait()
 
-    served._loop.loop.call_soon_threadsafe(block)
+    served.loop.loop.call_soon_threadsafe(block)
     try:
         assert blocked.wait(60)
         if is_lost:

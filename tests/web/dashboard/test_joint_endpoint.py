@@ -210,7 +210,7 @@ def test_topics_are_left_with_the_page_and_the_parameter(
     node = served.node("other")
 
     def topics() -> tuple[object, object]:
-        state = served.run(fetch(node._node.master))
+        state = served.run(fetch(node.call_master))
         return state.publishers.get("/joint_states"), state.subscribers.get("/from_robot")
 
     page = client(served)
@@ -225,7 +225,7 @@ def test_topics_are_left_with_the_page_and_the_parameter(
     wait_until(lambda: not any(topics()))
 
     def is_followed() -> bool:
-        return "/from_other" in served.run(fetch(node._node.master)).subscribers
+        return "/from_other" in served.run(fetch(node.call_master)).subscribers
 
     wait_until(lambda: not is_followed())
     client(served)

@@ -324,7 +324,7 @@ def test_wait_ends_when_the_clock_has_passed_its_end(monkeypatch: pytest.MonkeyP
         await loop.advance(tick)
         assert waiting.done()
 
-    monkeypatch.setattr(json_session, "_CLOCK_SECONDS", tick)
+    monkeypatch.setattr(json_session, "CLOCK_SECONDS", tick)
     run_manually(work)
 
 

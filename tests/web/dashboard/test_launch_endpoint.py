@@ -263,7 +263,7 @@ def test_restart_is_completed_if_its_page_closes(
     page, other = client(served), client(served)
     run = Run(77)
     assert served.dashboard
-    endpoint = served.dashboard._launches
+    endpoint = served.dashboard.launches
     started: list[LaunchFile] = []
 
     async def add() -> None:
@@ -305,7 +305,7 @@ def test_nothing_is_started_once_the_dashboard_closes(
     page.send("list")
     page.next(lambda found: "files" in found)
     assert served.dashboard
-    endpoint = served.dashboard._launches
+    endpoint = served.dashboard.launches
     reached, go_on = threading.Event(), threading.Event()
     path_of = endpoint.files.path_of
 

@@ -271,7 +271,7 @@ def test_survey_that_fails_is_reported_and_repeated(
         return survey(graph, processes)
 
     monkeypatch.setattr(tools_endpoint, "survey", fail_once)
-    monkeypatch.setattr(tools_endpoint, "_REPORT_SECONDS", 0.05)
+    monkeypatch.setattr(tools_endpoint, "REPORT_SECONDS", 0.05)
     with Tools(serve()) as tools:
         tools.request(do="watch")
         report(tools, lambda each: "no more files" in each.get("trouble", ""))

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from minirospy.base.errors import UsageError
-from minirospy.cli.dashboard import _dashboard_parser
+from minirospy.cli.dashboard import dashboard_parser
 from minirospy.web.dashboard.files import FOLDER
 from minirospy.web.dashboard.views import LAYOUTS, VIEWS, link, plotted_fields
 
@@ -26,7 +26,7 @@ def test_page_has_the_layouts_that_links_name() -> None:
 
 
 def test_help_names_all_layouts() -> None:
-    text = " ".join(_dashboard_parser().format_help().split())
+    text = " ".join(dashboard_parser().format_help().split())
     assert f"several views side by side: {', '.join(LAYOUTS)}" in text
     # "console" and "teleop" are not listed, because they are arguments of one view.
     assert "or a layout: workshop, rviz, classroom" in text

@@ -98,11 +98,11 @@ class ActionClient:
         return self.manager.init_goal(goal, transition_cb, feedback_cb)
 
     def cancel_all_goals(self) -> None:
-        """Request the server to cancel all its goals, including those from other clients."""
+        """Send the server a request to cancel all its goals, including those from other clients."""
         self.pub_cancel.publish(GoalID())
 
     def cancel_goals_at_and_before_time(self, time: times.Time) -> None:
-        """Request the server to cancel all goals stamped at or before ``time``, including those from other clients."""
+        """Send the server a request to cancel all goals stamped at or before ``time``, including those from other clients."""
         self.pub_cancel.publish(GoalID(stamp=time))
 
     def wait_for_action_server_to_start(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008

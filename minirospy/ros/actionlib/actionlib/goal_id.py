@@ -1,4 +1,4 @@
-"""Goal IDs: the node's name, a number and the time make each one unique."""
+"""Generates goal IDs, made unique by the node's name, a counter and the time."""
 
 from __future__ import annotations
 

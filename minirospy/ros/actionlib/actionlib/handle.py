@@ -1,4 +1,4 @@
-"""The server's record of its goals: one StatusTracker per goal, and the ServerGoalHandle with which user code changes it.
+"""The server's record of its goals: one StatusTracker per goal, and ServerGoalHandles for user code.
 
 The transitions are a table in `minirospy.core.graph.goals`.
 """
@@ -42,6 +42,7 @@ class StatusTracker:
         self.id_generator = GoalIDGenerator()
         self.ended_at = 0  # nanoseconds in ROS time; 0 until the goal ends
         self._bytes: bytes | None = None
+        self._serialized: tuple[object, ...] = ()  # the values in `_bytes`
         self.status = GoalStatus()
         if goal is None:
             self.status.goal_id = goal_id or GoalID()
@@ -58,19 +59,25 @@ class StatusTracker:
         """Return the time at which the goal ended; zero before that."""
         return rospy.Time(nsecs=self.ended_at)
 
+    @handle_destruction_time.setter
+    def handle_destruction_time(self, time: times.Time) -> None:
+        self.ended_at = time.to_nsec()
+
     def end(self) -> None:
         """Record that the goal has ended. Its status is removed from the list after the status list timeout."""
         self.ended_at = rospy.Time.now().to_nsec()
         self._bytes = None
 
     def serialize(self) -> bytes:
-        """Return the serialized status. The bytes are cached once the goal has ended, because the status no longer changes."""
-        if self._bytes is not None:
-            return self._bytes
-        encoded = status_bytes(self.status)
-        if self.ended_at:
-            self._bytes = encoded
-        return encoded
+        """Return the serialized status. The bytes are cached once the goal has ended, because the status rarely changes then."""
+        if not self.ended_at:
+            return status_bytes(self.status)
+        status = self.status
+        id, stamp = status.goal_id.id, status.goal_id.stamp
+        values = (status.status, status.text, id, stamp.secs, stamp.nsecs)
+        if self._bytes is None or self._serialized != values:
+            self._bytes, self._serialized = status_bytes(status), values
+        return self._bytes
 
 
 class HandleTrackerDeleter:

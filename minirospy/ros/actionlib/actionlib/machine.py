@@ -1,4 +1,4 @@
-"""The client's record of its goals: one CommStateMachine per goal, owned by the GoalManager, read by a ClientGoalHandle.
+"""The client's record of its goals: one CommStateMachine per goal, owned by the GoalManager and read through a ClientGoalHandle.
 
 The transitions are tables in `minirospy.core.graph.goals`. Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
@@ -28,7 +28,7 @@ FeedbackCallback = Callable[["ClientGoalHandle", Any], object]
 
 _DONE = CommState.DONE
 _MAY_BE_MISSING = (CommState.WAITING_FOR_GOAL_ACK, CommState.WAITING_FOR_RESULT, CommState.DONE)
-"""States in which the server's list may lack the goal: it is not listed yet, or no longer listed."""
+"""States in which a goal may be missing from the server's list, because it is not listed yet or no longer listed."""
 
 
 class ClientGoalHandle:
@@ -49,7 +49,7 @@ class ClientGoalHandle:
         return hash(self.comm_state_machine)
 
     def cancel(self) -> None:
-        """Request the server to cancel this goal."""
+        """Send the server a request to cancel this goal."""
         machine = self._machine("cancel")
         if machine is None:
             return
@@ -183,7 +183,7 @@ class CommStateMachine:
             elif self.state == CommState.LOST:
                 rospy.logerr("In a funny state: %i", self.state)
             else:
-                # The matching status list may arrive later or never: first make its transitions.
+                # The status list with this status may arrive later or never, so make its transitions first.
                 self._follow(action_result.status.status)
                 self.transition_to(_DONE)
 
@@ -200,7 +200,7 @@ class CommStateMachine:
         self.transition_to(_DONE)
 
     def _follow(self, status: int) -> None:
-        """Make the transitions that lead to a status."""
+        """Make the transitions that lead to the state for ``status``."""
         if self.state == CommState.LOST:
             rospy.logerr("CommStateMachine is in a funny state: %i", self.state)
             return

@@ -42,9 +42,9 @@ _TOO_LATE = (
     "This goal handle was canceled by the action server because its timestamp is before the timestamp of "
     "the last cancel request"
 )
-_FEW_STATUSES = 50  # up to this many statuses are published immediately on each change
+_FEW_STATUSES = 50  # maximum number of statuses to publish immediately on each change
 
-# Pause after a longer list, per status in it, so that publishing does not use all the server's time.
+# For a longer list, seconds to pause per status in it, so that publishing does not use all CPU time.
 _SECONDS_A_STATUS = 1e-4
 
 
@@ -99,18 +99,16 @@ class ActionServer:
         self.auto_start = auto_start
         self.started = False
 
-        self._trackers: dict[str, StatusTracker] = {}
+        # All goals whose status is published. Programs change the list
+        self.status_list: list[StatusTracker] = []
+        self._indexed: list[StatusTracker] = []  # the content of `status_list` when `_by_id` was built
+        self._by_id: dict[str, StatusTracker] = {}
         self._published_at = 0.0
         self._status_thread: _StatusThread | None = None
 
         if auto_start:
             self.warn_of_auto_start()
             self.start()
-
-    @property
-    def status_list(self) -> list[StatusTracker]:
-        """Return all goals whose status is published."""
-        return list(self._trackers.values())
 
     @staticmethod
     def warn_of_auto_start() -> None:
@@ -184,7 +182,7 @@ class ActionServer:
             tcp_nodelay=True,
         )
 
-        self._status_thread = _StatusThread(self.publish_status_now, 1.0 / self.status_frequency)
+        self._status_thread = _StatusThread(self._publish_periodically, 1.0 / self.status_frequency)
 
     def publish_result(self, status: GoalStatus, result: Message | None) -> None:
         """Publish a goal's result, then all statuses."""
@@ -202,11 +200,11 @@ class ActionServer:
             self._publish(self.feedback_pub, message)
 
     def publish_status(self) -> None:
-        """Publish all goals' statuses: immediately if there are few, otherwise after a pause."""
+        """Publish all goals' statuses, immediately if they are few, otherwise after a pause."""
         with self.lock:
-            pause = len(self._trackers) * _SECONDS_A_STATUS
+            pause = len(self.status_list) * _SECONDS_A_STATUS
             now = time.monotonic()
-            if len(self._trackers) <= _FEW_STATUSES or now - self._published_at >= pause:
+            if len(self.status_list) <= _FEW_STATUSES or now - self._published_at >= pause:
                 self.publish_status_now()
             elif self._status_thread:
                 self._status_thread.hurry(self._published_at + pause - now)
@@ -216,7 +214,7 @@ class ActionServer:
         with self.lock:
             now = rospy.get_rostime()
             self._forget_old(now)
-            message = StatusList([tracker.serialize() for tracker in self._trackers.values()])
+            message = StatusList([tracker.serialize() for tracker in self.status_list])
             message.header.stamp = now
             self._published_at = time.monotonic()
             self._publish(self.status_pub, message)
@@ -231,7 +229,7 @@ class ActionServer:
             rospy.logdebug("The action server has received a new cancel request")
             stamp = goal_id.stamp.to_nsec()
 
-            for tracker in self.status_list:
+            for tracker in tuple(self.status_list):
                 own = tracker.status.goal_id
                 if not tracker.goal or not is_meant(goal_id.id, stamp, own.id, own.stamp.to_nsec()):
                     continue
@@ -239,10 +237,10 @@ class ActionServer:
                 if handle.set_cancel_requested():
                     self.cancel_callback(handle)
 
-            if goal_id.id and goal_id.id not in self._trackers:
+            if goal_id.id and self._find(goal_id.id) is None:
                 # The goal may still arrive; it is then recalled immediately.
                 tracker = StatusTracker(goal_id, GoalStatus.RECALLING)
-                self._trackers[goal_id.id] = tracker
+                self._add(tracker)
                 tracker.end()
 
             self.last_cancel = max(self.last_cancel, goal_id.stamp)
@@ -257,12 +255,12 @@ class ActionServer:
             if not self.started:
                 return
             rospy.logdebug("The action server has received a new goal request")
-            known = self._trackers.get(goal.goal_id.id)
+            known = self._find(goal.goal_id.id)
             if known is not None:
                 self._meet_again(known)
                 return
             tracker = StatusTracker(None, None, goal)
-            self._trackers[tracker.status.goal_id.id] = tracker
+            self._add(tracker)
             handle = self._handle(tracker)
             stamp = goal.goal_id.stamp
             if stamp != _NOTHING and stamp <= self.last_cancel:
@@ -271,7 +269,7 @@ class ActionServer:
                 self.goal_callback(handle)
 
     def _meet_again(self, tracker: StatusTracker) -> None:
-        """Process a goal whose ID is known: the goal was sent twice, or cancelled before it arrived."""
+        """Process a goal whose ID is already known, because the goal was sent twice or cancelled before it arrived."""
         status = tracker.status
         rospy.logdebug(
             "Goal %s was already in the status list with status %i", status.goal_id.id, status.status
@@ -287,11 +285,34 @@ class ActionServer:
             tracker.handle_tracker = HandleTrackerDeleter(self, tracker)
         return ServerGoalHandle(tracker, self, tracker.handle_tracker)
 
+    def _publish_periodically(self) -> None:
+        # A subclass that overrides publish_status() expects each publication to go through it.
+        if type(self).publish_status is ActionServer.publish_status:
+            self.publish_status_now()
+        else:
+            self.publish_status()
+
+    def _find(self, id: str) -> StatusTracker | None:
+        """Return the goal in the list with this ID, or None."""
+        # Equality of lists compares the identity of their items first, which is fast.
+        if self._indexed != self.status_list:
+            self._indexed = list(self.status_list)
+            self._by_id = {tracker.status.goal_id.id: tracker for tracker in reversed(self._indexed)}
+        return self._by_id.get(id)
+
+    def _add(self, tracker: StatusTracker) -> None:
+        self.status_list.append(tracker)
+        self._indexed.append(tracker)
+        self._by_id.setdefault(tracker.status.goal_id.id, tracker)
+
     def _forget_old(self, now: times.Time) -> None:
         limit = now.to_nsec() - self.status_list_timeout.to_nsec()
-        old = [id for id, tracker in self._trackers.items() if 0 < tracker.ended_at < limit]
-        for id in old:
-            tracker = self._trackers.pop(id)
+        old = [tracker for tracker in self.status_list if 0 < tracker.ended_at < limit]
+        if not old:
+            return
+        gone = set(old)
+        self.status_list[:] = [tracker for tracker in self.status_list if tracker not in gone]
+        for tracker in old:
             rospy.logdebug(
                 "Item %s with destruction time of %.3f being removed from list.  Now = %.3f",
                 tracker.status.goal_id,

@@ -57,9 +57,9 @@ class SimpleActionClient:
         active_cb: Callable[[], object] | None = None,
         feedback_cb: FeedbackCallback | None = None,
     ) -> None:
-        """Send a goal; the previous goal is no longer tracked.
+        """Send a goal, and stop tracking the previous one.
 
-        ``active_cb()`` is called when the server accepts the goal, ``feedback_cb(feedback)`` with feedback, and
+        ``active_cb()`` is called when the server accepts the goal, ``feedback_cb(feedback)`` for each feedback message, and
         ``done_cb(state, result)`` when the goal ends. All are called in the library's threads.
         """
         with self._lock:
@@ -105,7 +105,8 @@ class SimpleActionClient:
             return False
 
         def is_over() -> bool:
-            # The done callback may have sent the next goal, or another thread may track a different one.
+            # The goal is also over if the done callback has sent the next goal, or another thread has sent a
+            # different one.
             return (
                 self.gh is None or self.simple_state == SimpleGoalState.DONE or self._finished is waited_for
             )
@@ -132,20 +133,20 @@ class SimpleActionClient:
         return self.gh.get_goal_status_text()
 
     def cancel_all_goals(self) -> None:
-        """Request the server to cancel all its goals, including those from other clients."""
+        """Send the server a request to cancel all its goals, including those from other clients."""
         self.action_client.cancel_all_goals()
 
     def cancel_goals_at_and_before_time(self, time: times.Time) -> None:
-        """Request the server to cancel all goals stamped at or before ``time``, including those from other clients."""
+        """Send the server a request to cancel all goals stamped at or before ``time``, including those from other clients."""
         self.action_client.cancel_goals_at_and_before_time(time)
 
     def cancel_goal(self) -> None:
-        """Request the server to cancel the goal."""
+        """Send the server a request to cancel the goal."""
         if self.gh:
             self.gh.cancel()
 
     def stop_tracking_goal(self) -> None:
-        """Stop calling the goal's callbacks; the server continues with the goal."""
+        """Stop calling the goal's callbacks. The server still executes the goal."""
         self.gh = None
         self._finished = None
 
@@ -175,7 +176,7 @@ class SimpleActionClient:
             self._log_wrong(comm_state)
 
     def _finish(self, tracked: ClientGoalHandle | None) -> None:
-        """Wake the threads that are waiting for the goal, once its done callback has returned."""
+        """Wake the threads that wait for the goal, after its done callback has returned."""
         with self._lock:
             self._finished = tracked
             if self.gh is tracked:

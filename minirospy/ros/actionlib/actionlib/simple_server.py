@@ -58,7 +58,8 @@ class SimpleActionServer:
         self.action_server = ActionServer(
             name, ActionSpec, self.internal_goal_callback, self.internal_preempt_callback, auto_start=False
         )
-        # Both share one lock: with two, a goal that arrives while another ends could cause a deadlock.
+        # Share the action server's lock: with two locks, a goal that arrives while another ends could cause a
+        # deadlock.
         self.lock = self.action_server.lock
         self.execute_condition = threading.Condition(self.lock)
 
@@ -187,7 +188,7 @@ class SimpleActionServer:
                 self.new_goal_preempt_request = True
 
     def executeLoop(self) -> None:
-        """Run the execute callback for each goal; this method is the body of the execute thread."""
+        """Run the execute callback for each goal, in the execute thread."""
         with rospy.interrupting(self._wake_soon):
             while True:
                 with self.execute_condition:

@@ -1,4 +1,4 @@
-"""An action's message classes, found from its class: `TestAction` -> goal, result and feedback, with and without header."""
+"""Finds the message classes of an action, from a class such as `TestAction`: goal, result and feedback."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ __all__ = [
 ]
 
 
-# Field in the connection header of goal topics from minirospy clients.
+# Connection header field by which minirospy clients announce, on goal topics, that they accept fast responses.
 TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
 
-# Delay for goals from other clients: Python actionlib drops results that arrive before send_goal has returned.
+# Seconds by which the server delays goals from other clients: Python actionlib drops results that arrive before
+# send_goal returns.
 SEND_SECONDS = 1e-3
 
-# Delay for cancel requests: a goal sent earlier uses another connection, and is itself delayed.
+# Seconds by which cancel requests are delayed: a goal sent earlier uses another connection, and is itself delayed.
 CANCEL_SECONDS = 3 * SEND_SECONDS
 
 

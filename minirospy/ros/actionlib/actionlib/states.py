@@ -17,7 +17,7 @@ __all__ = [
 ]
 
 NO_TRANSITION, INVALID_TRANSITION = -1, -2
-"""Entries in the transition table of ROS's client: a status that changes nothing, or is invalid.
+"""Entries in the transition table of ROS's client, for a status that changes nothing and for an invalid one.
 
 minirospy's table is in :mod:`minirospy.core.graph.goals`. Programs may use these names after `from actionlib import *`.
 """
@@ -34,7 +34,7 @@ def get_name_of_constant(C: type, n: int) -> str:
 
 
 class CommState:
-    """A goal's communication states in the client."""
+    """The communication states in which a client's goal can be."""
 
     WAITING_FOR_GOAL_ACK = int(ClientState.WAITING_FOR_GOAL_ACK)
     PENDING = int(ClientState.PENDING)
@@ -69,7 +69,7 @@ class TerminalState:
 
 
 class SimpleGoalState:
-    """The goal's states in the simple client."""
+    """The states in which the simple client's goal can be."""
 
     PENDING = int(SimpleState.PENDING)
     ACTIVE = int(SimpleState.ACTIVE)
@@ -81,5 +81,5 @@ class SimpleGoalState:
         return get_name_of_constant(cls, n)
 
 
-# Added because ROS's actionlib adds it too: `GoalStatus.to_string(client.get_state())`.
+# ROS's actionlib also adds this method, so that `GoalStatus.to_string(client.get_state())` works.
 GoalStatus.to_string = classmethod(get_name_of_constant)  # type: ignore[attr-defined]

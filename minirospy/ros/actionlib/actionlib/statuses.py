@@ -1,7 +1,7 @@
 """A serialized actionlib_msgs/GoalStatusArray: composed from serialized statuses, and parsed only on demand.
 
-A server publishes each goal's status for seconds after the goal has ended, so a busy server publishes thousands of statuses
-at a time. A client needs only those of its own goals.
+A server publishes each goal's status for a few seconds after the goal has ended, so a busy server publishes thousands of
+statuses at a time. A client needs only those of its own goals.
 """
 
 from __future__ import annotations
@@ -28,6 +28,12 @@ def status_bytes(status: GoalStatus) -> bytes:
     return buffer.getvalue()
 
 
+def _parse(data: bytes) -> GoalStatus:
+    status = GoalStatus()
+    status.deserialize(data)
+    return status
+
+
 class StatusList(GoalStatusArray):
     """A GoalStatusArray that is composed from serialized statuses, and parsed on first access."""
 
@@ -45,7 +51,8 @@ class StatusList(GoalStatusArray):
     def status_list(self) -> list[GoalStatus]:
         """Return the statuses, parsed on first access."""
         if self._read is None:
-            self._read = [self._status(start, end) for start, end in self._bounds()]
+            parts = self._parts or [self._data[start:end] for start, end in self._bounds()]
+            self._read = list(map(_parse, parts))
         return self._read
 
     @status_list.setter
@@ -59,10 +66,10 @@ class StatusList(GoalStatusArray):
         key = _COUNT.pack(len(name)) + name
         if key not in self._data:
             return None
-        # Check the position: the same bytes may also occur in another goal's text.
+        # Check the position, because the same bytes may also occur in another goal's text.
         for start, end in self._bounds():
             if self._data.startswith(key, start + 8):
-                return self._status(start, end)
+                return _parse(self._data[start:end])
         return None
 
     def serialize(self, buff: Writer) -> None:
@@ -91,6 +98,7 @@ class StatusList(GoalStatusArray):
         self.header.frame_id = data[_HEADER.size : _HEADER.size + length].decode("utf-8", "replace")
         self._data = data
         self._read = None
+        self._parts = []
         return self
 
     def _bounds(self) -> list[tuple[int, int]]:
@@ -107,11 +115,6 @@ class StatusList(GoalStatusArray):
         except (struct.error, OverflowError):
             self._fail(data)
         return bounds
-
-    def _status(self, start: int, end: int) -> GoalStatus:
-        status = GoalStatus()
-        status.deserialize(self._data[start:end])
-        return status
 
     def _fail(self, data: bytes) -> None:
         # For the same data, the generated class raises DeserializationError with the usual error text.

@@ -1,4 +1,4 @@
-"""Blocks until a condition becomes true: without polling, interrupted by a shutdown, with timeouts in ROS time."""
+"""Blocks until a condition becomes true, without polling. A shutdown interrupts the wait, and timeouts are in ROS time."""
 
 from __future__ import annotations
 

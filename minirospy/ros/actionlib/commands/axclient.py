@@ -163,7 +163,7 @@ class _Progress:
         self._tell("Sent")
         try:
             client.send_goal(self._goal, self._on_done, self._on_active, self._on_feedback)
-            # Wait in slices: a Ctrl-C just before a long wait would take effect only when the wait ends.
+            # Wait in slices, because a Ctrl-C just before a long wait would take effect only when the wait ends.
             while not self._done.wait(_SLICE_SECONDS):
                 pass
         except KeyboardInterrupt:
@@ -200,7 +200,7 @@ class _Progress:
         self._tell(line, replaces=True)
 
     def _tell(self, line: str, *, replaces: bool = False) -> None:
-        """Print a line; on a terminal, feedback overwrites the previous feedback."""
+        """Print a line. On a terminal, feedback overwrites the previous feedback."""
         with self._lock:
             on_terminal = sys.stdout.isatty()
             if self._is_line_open and not replaces:
@@ -213,7 +213,10 @@ class _Progress:
 
 
 def progress(goal: Message, feedback: Message) -> float | None:
-    """Return the progress, 0 to 1, if goal and feedback have one number each and the goal's is not the smaller one; else None."""
+    """Return the progress from 0 to 1, or None if it is unknown.
+
+    It is known if goal and feedback have one number each, and the feedback's is between 0 and the goal's.
+    """
     wanted, reached = (
         [cast("float", field.value) for field in fields(message) if type(field.value) in (int, float)]
         for message in (goal, feedback)

@@ -54,7 +54,7 @@ def _axserver(action: str, type: str) -> None:
     print(f"Serving {rospy.resolve_name(action)} ({cls._type})", flush=True)
     while True:
         while not news.wait(_SLICE_SECONDS):
-            # Wait in slices: a Ctrl-C just before a long wait would take effect only when the wait ends.
+            # Wait in slices, because a Ctrl-C just before a long wait would take effect only when the wait ends.
             pass
         news.clear()
         while server.is_new_goal_available():
@@ -64,7 +64,7 @@ def _axserver(action: str, type: str) -> None:
 
 
 def _answer(server: SimpleActionServer) -> bool:
-    """Prompt for actions until the goal has ended; at end of input, abort the goal and return False."""
+    """Prompt the user for actions on the goal until it has ended; at end of input, abort the goal and return False."""
     types = server.action_server
     endings: dict[str, Callable[..., None]] = {
         "s": server.set_succeeded,

@@ -36,12 +36,12 @@ def normalize_angle(angle: float) -> float:
 
 
 def shortest_angular_distance(from_angle: float, to_angle: float) -> float:
-    """Return the shortest rotation from one angle to another; the rotation is from -pi to pi."""
+    """Return the shortest rotation from one angle to another, in the range -pi to pi."""
     return normalize_angle(to_angle - from_angle)
 
 
 def two_pi_complement(angle: float) -> float:
-    """Return the rotation that reaches the same angle in the opposite direction; it is from -2 pi to 2 pi."""
+    """Return the rotation to the same angle in the opposite direction, in the range -2 pi to 2 pi."""
     if abs(angle) > _TURN:
         angle = fmod(angle, _TURN)
     return angle - _TURN if angle > 0 else angle + _TURN

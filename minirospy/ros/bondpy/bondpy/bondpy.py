@@ -37,7 +37,7 @@ def as_float_duration(d: Seconds) -> float:
 
 
 class Timeout:
-    """Calls a function ``duration`` after ``reset``, unless the timeout is reset or cancelled before that."""
+    """Calls a function ``duration`` after the last ``reset``, unless it is cancelled first."""
 
     def __init__(self, duration: Seconds, on_timeout: Callback | None = None) -> None:
         self.duration = duration
@@ -67,7 +67,7 @@ class Timeout:
 
 
 class Bond:
-    """One endpoint of a bond. ``start`` waits for the peer: a Bond with the same topic and ID in another node."""
+    """One endpoint of a bond. ``start`` waits for the peer, which is a Bond with the same topic and ID in another node."""
 
     def __init__(
         self, topic: str, id: str, on_broken: Callback | None = None, on_formed: Callback | None = None
@@ -104,7 +104,7 @@ class Bond:
         return f"[Bond {self.id}, Instance {self.instance_id} ({self._state.value})]"
 
     def __del__(self) -> None:
-        # If ``pub`` is missing, __init__ has failed and there is nothing to shut down.
+        # ``pub`` is missing if __init__ has failed; then there is nothing to shut down.
         if hasattr(self, "pub"):
             self.shutdown()
 
@@ -307,7 +307,7 @@ class Bond:
                 self._run_timeout(event)
             return
         with self.lock:
-            # A message may have restarted the timeout in the meantime.
+            # A message may have restarted the timeout since the deadline passed.
             deadline = self._deadlines.get(event)
             if deadline is not None and deadline <= time.monotonic():
                 del self._deadlines[event]

@@ -53,5 +53,5 @@ _TABLE: dict[tuple[State, Event], tuple[State, tuple[Action, ...]]] = {
 
 
 def next_state(state: State, event: Event) -> tuple[State, tuple[Action, ...]]:
-    """Return the state after an event, and the actions to perform. An event that a state does not expect changes nothing."""
+    """Return the state after an event, and the actions to perform. An event that has no transition changes nothing."""
     return _TABLE.get((state, event), (state, ()))

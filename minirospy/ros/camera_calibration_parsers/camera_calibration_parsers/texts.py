@@ -22,10 +22,10 @@ _MATRICES = (
     ("rectification_matrix", "R", (3, 3)),
     ("projection_matrix", "P", (3, 4)),
 )
-"""Key, CameraInfo field, and shape; None: any shape."""
+"""Keys, CameraInfo fields and shapes of the matrices; None accepts any shape."""
 _INI_COUNTS = {"width": 1, "height": 1, "camera matrix": 9, "rectification": 9, "projection": 12}
 _INI_FIELDS = {"camera matrix": "K", "distortion": "D", "rectification": "R", "projection": "P"}
-_MAX_DIGITS = 100  # digits in a number of pixels, including leading zeros
+_MAX_DIGITS = 100  # maximum number of digits in the width or height, including leading zeros
 _PLAIN = re.compile(r"[\w/][\w./-]*\Z", re.ASCII)
 
 
@@ -120,7 +120,7 @@ def ini_of(name: str, info: CameraInfo) -> str:
 
 def _pixels(word: object) -> int:
     digits = word.strip() if isinstance(word, str) else ""
-    # Limit the digits: Python raises ValueError for more than 4300.
+    # Check the number of digits first, because int() raises ValueError for more than 4300.
     if not (digits.isdecimal() and len(digits) <= _MAX_DIGITS and int(digits) < 1 << 32):
         raise CalibrationError(f"a width or height is not a number of pixels: {word!r:.80}")
     return int(digits)

@@ -56,7 +56,7 @@ class CameraInfoError(Exception):
 
 
 class CameraInfoMissingError(CameraInfoError):
-    """The calibration has not been loaded."""
+    """The calibration has not been loaded yet."""
 
 
 class CameraInfoManager:
@@ -66,7 +66,7 @@ class CameraInfoManager:
     """
 
     def __init__(self, cname: str = "camera", url: str = "", namespace: str = "") -> None:
-        """Offer the service.
+        """Advertise the service ``set_camera_info``.
 
         ``cname``: the camera's name; ``url``: the calibration file; ``namespace``: the service's namespace.
         """
@@ -90,7 +90,7 @@ class CameraInfoManager:
         return self.cname
 
     def getURL(self) -> str:
-        """Return the calibration's URL as it was set."""
+        """Return the calibration's URL, without substitutions."""
         return self.url
 
     def isCalibrated(self) -> bool:
@@ -114,7 +114,7 @@ class CameraInfoManager:
     def setCameraName(self, cname: str) -> bool:
         """Set the camera's name (letters, digits and ``_``); return False if it is invalid.
 
-        The calibration must then be loaded again, because its file may be different.
+        Load the calibration again afterwards, because the file may depend on the name.
         """
         if not re.fullmatch(r"\w+", cname, re.ASCII):
             return False
@@ -123,7 +123,7 @@ class CameraInfoManager:
         return True
 
     def setURL(self, url: str) -> bool:
-        """Set the calibration's URL; return False if it is invalid. The calibration must then be loaded again."""
+        """Set the calibration's URL; return False if it is invalid. Load the calibration again afterwards."""
         if parseURL(resolveURL(url, self.cname)) >= URL_invalid:
             return False
         if self.url != url:

@@ -34,12 +34,18 @@ __all__ = ["ApproximateZoomCameraInfoManager", "InterpolatingZoomCameraInfoManag
 
 
 class ZoomCameraInfoManager(CameraInfoManager):
-    """The base class: a zoom level within limits. As a context manager, it stops the service on exit."""
+    """The base class for cameras with zoom, which keeps the zoom level within limits.
+
+    As a context manager, it stops the service on exit.
+    """
 
     def __init__(
         self, min_zoom: float, max_zoom: float, cname: str = "camera", url: str = "", namespace: str = ""
     ) -> None:
-        """Set the limits. ``url`` is the calibration at the lowest zoom level; for the other arguments see CameraInfoManager."""
+        """Set the limits of the zoom level.
+
+        ``url`` is the calibration at the lowest zoom level; for the other arguments see CameraInfoManager.
+        """
         super().__init__(cname, url, namespace)
         self._min_zoom = min_zoom
         self._max_zoom = max_zoom
@@ -66,7 +72,10 @@ class ZoomCameraInfoManager(CameraInfoManager):
 
 
 class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
-    """Computes K from the fields of view at both ends of the zoom range; all else comes from the calibration file, if any."""
+    """Computes K from the fields of view at both ends of the zoom range.
+
+    All other values are from the calibration file, if any.
+    """
 
     def __init__(
         self,

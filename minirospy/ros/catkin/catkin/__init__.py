@@ -1,1 +1,1 @@
-"""catkin: the sourced workspaces."""
+"""catkin: finds the sourced workspaces."""

@@ -30,7 +30,7 @@ def find_in_workspaces(
     """Return the existing folders ``search_dirs`` in the workspaces, or the files ``path`` in them, for package ``project``.
 
     ``search_dirs`` may contain etc, include, libexec and share; if ``project`` is None, also bin and lib. All searched paths
-    are appended to ``considered_paths``. Raise ValueError for other folders.
+    are appended to ``considered_paths``. Raise ValueError if ``search_dirs`` contains any other folder.
     """
     chosen = _checked(search_dirs, project)
     found: list[str] = []
@@ -59,7 +59,10 @@ def _checked(search_dirs: Sequence[str] | None, project: str | None) -> list[str
 def _by_workspace(
     workspaces: Sequence[str], chosen: Sequence[str], project: str | None
 ) -> Iterator[list[Path]]:
-    """Yield a list of folders to search for each workspace; last, the package's folder if it is in no workspace."""
+    """Yield the list of folders to search in each workspace.
+
+    If no workspace contains the package, finally yield its own folder.
+    """
     for workspace in workspaces:
         folders = []
         for each in chosen:

@@ -1,4 +1,4 @@
-"""catkin.workspace: the sourced workspaces."""
+"""catkin.workspace: finds the sourced workspaces and their source folders."""
 
 from __future__ import annotations
 

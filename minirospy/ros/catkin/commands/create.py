@@ -1,4 +1,4 @@
-"""catkin_create_pkg and catkin_init_workspace: create the first files in a package and in a workspace."""
+"""catkin_create_pkg and catkin_init_workspace: create a package's or a workspace's first files."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ _PLACES: dict[str, Callable[[str], str]] = {
     "libexec": lambda project: f"lib/{project}",
     "share": lambda project: f"share/{project}",
 }
-"""Search folder -> its path below a workspace's devel or install folder."""
+"""Search folders, each with a function from a package's name to its path in a workspace's devel or install folder."""
 
 _WITHOUT_PROJECT = ("bin", "etc", "include", "lib", "share")
 _WITH_PROJECT = ("etc", "include", "libexec", "share")

@@ -1,6 +1,6 @@
 """catkin_make: build workspaces without CMake.
 
-catkin_make_isolated differs only in its folder names: without CMake there are no conflicts from which to isolate packages.
+catkin_make_isolated differs from catkin_make only in its folder names: without CMake, packages cannot conflict.
 Source: http://wiki.ros.org/catkin/commands/catkin_make.
 """
 
@@ -151,7 +151,8 @@ def _catkin_make(
 
     tests = [target for target in targets if target.startswith("run_tests_")]
     others = {"all", "install", *TEST_TARGETS, *tests}
-    # Words with "=", such as VERBOSE=1, set make variables. A target for a message generator means its whole package.
+    # Words with "=", such as VERBOSE=1, set make variables. A target for a message generator selects its whole
+    # package.
     named = [_GENERATED.sub("", word) for word in targets if word not in others and "=" not in word]
     chosen = [*(pkg or []), *named]
     plans = build_packages(workspace, chosen, only_pkg_with_deps or (), variables)
@@ -181,7 +182,7 @@ def _check_folders(command: str, workspace: Workspace) -> None:
 
 
 def _where_to_build(command: str, workspace: Workspace) -> str:
-    """Return advice for a workspace without folder src: usually the current folder is src, or devel."""
+    """Return advice on where to build, for a workspace without folder src: usually the current folder is src, or devel."""
     for above in workspace.root.parents:
         source = above / workspace.source.name
         if workspace.root.is_relative_to(source) or (

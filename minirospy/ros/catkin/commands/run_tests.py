@@ -23,7 +23,7 @@ from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
 
 __all__ = ["run_tests"]
 
-_END_SECONDS = 20.0  # seconds; a bit longer than roslaunch waits for its nodes to exit
+_END_SECONDS = 20.0  # slightly longer than roslaunch waits for its nodes to exit
 
 
 def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
@@ -46,7 +46,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
             continue
         results = workspace.build / "test_results" / plan.name
         if _flat(plan.name) in wanted:
-            # Remove old results: the tests that wrote them may no longer exist.
+            # Remove old results, because the tests that wrote them may no longer exist.
             for file in results.glob("*.xml"):
                 file.unlink()
         for test in plan.tests:
@@ -81,7 +81,7 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
         while (status := popen.poll()) is None and not interrupted.is_set():
             interrupted.wait(POLL_SECONDS)
         if status is None:
-            # The terminal has sent the Ctrl-C to the test too.
+            # The terminal has also sent the Ctrl-C to the test.
             try:
                 popen.wait(_END_SECONDS)
             except subprocess.TimeoutExpired:
@@ -109,7 +109,10 @@ def _folder_of(test: Test, plan: Plan, workspace: Workspace) -> Path:
 
 
 def _targets(plan: Plan, test: Test | None) -> list[str]:
-    """Return the CMake targets that run a package's tests, or one test. The names are as returned by :func:`_flat`."""
+    """Return the CMake targets that run a package's tests, or one test.
+
+    :func:`_flat` has replaced the separators in their names.
+    """
     if test is None:
         return [_flat(plan.name)]
     kinds = {"pytest": ("nosetests", "pytests")}.get(test.kind, (test.kind,))

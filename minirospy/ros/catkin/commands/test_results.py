@@ -23,7 +23,7 @@ _SKIPPED = ("skip", "skipped", "disabled")
 
 
 class Counts(NamedTuple):
-    """Numbers of tests, by result."""
+    """The numbers of tests, errors, failures and skipped tests."""
 
     tests: int = 0
     errors: int = 0
@@ -44,7 +44,7 @@ class Counts(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 0 if all tests passed, 1 after errors or failures, or if the folder does not exist."""
+    """Run the command; return 0 if all tests passed, or 1 if there are errors or failures, or the folder does not exist."""
     return COMMAND.main(argv)
 
 

@@ -74,10 +74,13 @@ def build_packages(
             print(
                 f"       {report.plan.name}: skipped, they need a C++ compiler: {', '.join(report.plan.skipped)}"
             )
+        if report.stand_ins:
+            print(f"       {report.plan.name}: minirospy's own are used instead: {report.stand_ins}")
         for warning in report.warnings:
             print(f"WARNING: {warning}", file=sys.stderr)
 
-    # catkin configures first, so the workspace can be sourced even if a package fails to build; do the same.
+    # As catkin does, write the setup files first, so that the workspace can be sourced even if a package fails to
+    # build.
     write_set_up(workspace.devel, (workspace.source,))
     build(workspace, plans, Packages(), only or None, show)
     if not plans:

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 from minirospy.core.images.encodings import type_of_encoding
 from minirospy.ros.cv_bridge.cv_bridge.core import CvBridge, CvBridgeError
+from minirospy.ros.cv_bridge.display import cvtColorForDisplay
 
 if TYPE_CHECKING:
     from minirospy.ros.cv_bridge.cv_bridge import core as core
 
-__all__ = ["CvBridge", "CvBridgeError", "getCvType"]
+__all__ = ["CvBridge", "CvBridgeError", "cvtColorForDisplay", "getCvType"]
 
 
 def getCvType(encoding: str) -> int:

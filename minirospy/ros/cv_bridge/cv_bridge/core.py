@@ -1,4 +1,4 @@
-"""cv_bridge.core: CvBridge. It needs only numpy, and OpenCV for Bayer patterns and YUV."""
+"""cv_bridge.core: CvBridge. It requires numpy; OpenCV is required only for Bayer patterns and YUV."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def _by_opencv(image: Pixels, source: str, wanted: str) -> tuple[Pixels, str]:
             f"converting [{source}] to [{wanted}] needs OpenCV: {install_command('opencv-python-headless')}"
         )
 
-    # OpenCV names a Bayer pattern after the pixels in the second row, starting at the second column.
+    # OpenCV names a Bayer pattern after the pixels in the second row, from the second column on.
     patterns = {
         "bayer_rggb": "BayerBG",
         "bayer_bggr": "BayerRG",

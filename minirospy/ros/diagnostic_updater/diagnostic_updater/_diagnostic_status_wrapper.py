@@ -17,7 +17,7 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
     """A diagnostic_msgs/DiagnosticStatus that is filled step by step, and can be published directly."""
 
     def __init__(self, *args: Any, **kwds: Any) -> None:
-        """Set the fields: all by position, or some by keyword."""
+        """Set the fields: all of them by position, or some by keyword."""
         super().__init__(*args, **kwds)
 
     @overload
@@ -42,11 +42,10 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
     def mergeSummary(self, level: int, message: str, /) -> None: ...
 
     def mergeSummary(self, *args: object) -> None:
-        """Merge a level and a message; the arguments are those of ``summary``.
+        """Merge another level and message into this status; the arguments are those of ``summary``.
 
-        The higher level is used. If both levels are OK or neither is, the messages are joined; otherwise, the message
-        whose level
-        is not OK is used.
+        The higher level is used. If both levels are OK or neither is, the messages are joined. Otherwise, the message with the
+        level that is not OK is used.
         """
         level, message = _summary_of(args)
         if (level > OK) == (self.level > OK):
@@ -56,7 +55,7 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
         self.level = max(self.level, level)
 
     def add(self, key: str, val: object) -> None:
-        """Append a key and a value, which is converted to a string."""
+        """Append a key with its value, which is converted to a string."""
         self.values.append(KeyValue(key, str(val)))
 
 

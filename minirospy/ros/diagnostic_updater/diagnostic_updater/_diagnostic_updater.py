@@ -107,7 +107,7 @@ class DiagnosticTaskVector:
         self.lock = threading.Lock()
 
     def addedTaskCallback(self, task: DiagnosticTaskInternal) -> None:
-        """Handle an added task; subclasses override it."""
+        """Do nothing; subclasses override this method, which is called for each added task."""
 
     def add(self, *args: Any) -> None:
         """Add a task: ``add(task)`` or ``add(name, function)``. Raise TypeError for other arguments."""
@@ -152,7 +152,7 @@ class Updater(DiagnosticTaskVector):
         self.hwid = hwid
 
     def update(self) -> None:
-        """Run the tasks if the period has passed; call this often. If the clock jumps back, a new period starts."""
+        """Run the tasks if the period has passed; call this method often. If the clock jumps back, a new period starts."""
         self._check_diagnostic_period()
         if _has_passed(self.last_time, self.period):
             self.force_update()
@@ -188,7 +188,7 @@ class Updater(DiagnosticTaskVector):
         self.publish(statuses)
 
     def publish(self, msg: Status | list[Status]) -> None:
-        """Publish one or several statuses, with the node's name added in front of theirs."""
+        """Publish one or more statuses; each name is prefixed with the node's name."""
         statuses = msg if isinstance(msg, list) else [msg]
         for status in statuses:
             status.name = f"{rospy.get_name()[1:]}: {status.name}"

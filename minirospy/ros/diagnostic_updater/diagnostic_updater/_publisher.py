@@ -74,6 +74,6 @@ class DiagnosedPublisher(TopicDiagnostic):
         self.publisher = pub
 
     def publish(self, message: Stamped) -> None:
-        """Count a message with its header's time stamp, and publish the message."""
+        """Count a message by its header's time stamp, and publish the message."""
         self.tick(message.header.stamp)
         self.publisher.publish(message)

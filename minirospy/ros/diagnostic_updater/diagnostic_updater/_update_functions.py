@@ -27,9 +27,10 @@ class FrequencyStatusParam:
     """The limits of FrequencyStatus."""
 
     def __init__(self, freq_bound: Mapping[str, float], tolerance: float = 0.1, window_size: int = 5) -> None:
-        """Set the limits. ``freq_bound``: "min" and optionally "max", in Hz, read at each run.
+        """Set the limits. ``freq_bound``: a mapping with "min" and optionally "max", in Hz, which is read at each run.
 
-        ``tolerance``: the fraction by which a frequency may exceed the bounds; ``window_size``: in runs.
+        ``tolerance``: the fraction by which a frequency may exceed the bounds; ``window_size``: the number of runs over
+        which the frequency is measured.
         """
         self.freq_bound = freq_bound
         self.tolerance = tolerance
@@ -70,7 +71,7 @@ class FrequencyStatus(DiagnosticTask):
             self.hist_indx = (oldest + 1) % self.params.window_size
             total = self.count
 
-        # The window is 0 if a simulated clock has not advanced.
+        # The window is 0 seconds long if a simulated clock has not advanced.
         frequency = events / window if window else math.inf if events else 0.0
         lowest = self.params.freq_bound["min"] * (1 - self.params.tolerance)
         highest = self.params.freq_bound.get("max", math.inf) * (1 + self.params.tolerance)
@@ -109,7 +110,7 @@ class TimeStampStatusParam:
 
 
 class TimeStampStatus(DiagnosticTask):
-    """Reports time stamps since the last run that are zero, too old, or too far in the future, and counts such runs."""
+    """Reports time stamps since the last run that are zero, too old or too far in the future; counts runs with such stamps."""
 
     def __init__(self, params: TimeStampStatusParam | None = None, name: str = "Timestamp Status") -> None:
         super().__init__(name)

@@ -21,11 +21,11 @@ Values: TypeAlias = Mapping[str, Any]
 """Values by parameter name; ``groups``, if present, contains the tree of groups or their states."""
 
 GroupTree: TypeAlias = Mapping[str, Any]
-"""A group, from a type's description or decoded: its ID, name and state, its parameters, and its subgroups."""
+"""A group, either from a type's description or decoded, with its ID, name, state, parameters and subgroups."""
 
 
 class Entry(TypedDict, total=False):
-    """A parameter or a constant, as defined in a .cfg file and in the generated module."""
+    """A parameter or a constant, as defined in a .cfg file and stored in the generated module."""
 
     name: str
     type: str
@@ -34,9 +34,9 @@ class Entry(TypedDict, total=False):
     description: str
     srcfile: str
     srcline: int
-    # For constants only.
+    # set for constants only
     value: Value
-    # For parameters only.
+    # set for parameters only
     default: Value | None
     min: Value | None
     max: Value | None

@@ -44,7 +44,7 @@ DescriptionCallback = Callable[[list[Entry] | None], object]
 
 
 class Client:
-    """A client for the configuration of a server, usually a node."""
+    """A client that reads and changes the configuration of a server, usually another node."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class Client:
         ``config_callback(config)`` is called on each change. Raise ROSException if the server does not appear in time.
         """
         if not isinstance(name, str):
-            # Without this check the client would wait for a server that cannot exist.
+            # Without this check, the client would wait for a server that cannot exist.
             raise TypeError(f"the name of a server is a string, not {name!r}")
         self.name = name
         self.config: Config | None = None
@@ -126,7 +126,7 @@ class Client:
         return decode_config(answer, self.get_group_descriptions())
 
     def update_groups(self, changes: Values) -> Config | None:
-        """Return the tree of the server's groups with the states in ``changes``, given by group name."""
+        """Return the tree of the server's groups, with the states in ``changes``, which maps group names to states."""
         description = self.get_group_descriptions()
         groups = [description] if description else []
         while groups:
@@ -166,7 +166,7 @@ class Client:
     description_callback = property(get_description_callback, set_description_callback)
 
     def _wait(self, is_there: Callable[[], bool], timeout: float | None) -> bool:
-        """Wait until ``is_there()`` is true, and return its last result.
+        """Wait until ``is_there()`` is true; return the last value that it returned.
 
         With ``timeout`` None or 0, wait until the node shuts down.
         """
@@ -222,7 +222,7 @@ class Client:
 
 
 def _constants(edit_method: str) -> list[dict[str, Any]]:
-    """Return an enum's constants. The string is a Python dict from another node, so it is parsed but not executed."""
+    """Return an enum's constants. The string is a Python dict from another node, so parse it without executing it."""
     try:
         found = ast.literal_eval(edit_method)["enum"] if edit_method else []
     except (ValueError, SyntaxError, KeyError, TypeError, MemoryError, RecursionError):

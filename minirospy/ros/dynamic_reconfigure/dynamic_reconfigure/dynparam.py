@@ -193,7 +193,7 @@ def _plain(value: object) -> object:
 
 
 def _connect() -> None:
-    """Initialize a node. Raise MasterUnreachableError if there is no master; ROS waits for a master silently."""
+    """Initialize a node. Raise MasterUnreachableError if there is no master, whereas ROS silently waits for one."""
     _check_master()
     rospy.init_node("dynparam", anonymous=True)
 
@@ -213,7 +213,10 @@ def _values_of(node: str, timeout: float | None) -> Config | None:
 
 
 def _change(node: str, values: Values, timeout: float | None) -> None:
-    """Change values at a node. Raise ROSException if the node does not appear in time, MinirospyError if its server fails."""
+    """Change values at a node; print an error if a value is invalid.
+
+    Raise ROSException if the node does not appear in time, MinirospyError if its server fails.
+    """
     from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.client import Client
 
     client = Client(node, timeout=timeout)

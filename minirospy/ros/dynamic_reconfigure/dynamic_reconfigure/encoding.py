@@ -134,7 +134,7 @@ def _inner_groups(group: GroupTree) -> Iterator[GroupTree]:
 
 
 def group_dict(group: Group | GroupState) -> Config:
-    """Return a group without its subgroups and parameters; in a description, the group's state is True."""
+    """Return a group without its subgroups and parameters. A group from a description gets the state True."""
     return Config(
         id=group.id,
         parent=group.parent,
@@ -199,7 +199,7 @@ def _children(groups: Iterable[_G], parent: int, decode: Callable[[_G], Config],
 
 
 def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
-    """Return a server's first configuration: the groups have the states in the type's description."""
+    """Return a server's first configuration, in which the groups have the states from the type's description."""
     config = _values(msg)
     if msg.groups and description is not None:
         config["groups"] = get_tree(msg)
@@ -247,7 +247,7 @@ def _all_groups(group: GroupTree) -> Iterator[GroupTree]:
 
 
 def _matching(group: Config, description: GroupTree) -> Iterator[tuple[Config, GroupTree]]:
-    """Yield each group in a configuration with its description, matched by name."""
+    """Yield each group in a configuration together with the group of the same name in its description."""
     yield group, description
     described = {each["name"]: each for each in _groups_in(description)}
     for name, each in group["groups"].items():

@@ -1,4 +1,4 @@
-"""The files generated from a .cfg file: the text of the Python module and of the documentation. Pure."""
+"""Generates the Python module and the documentation for a .cfg file. Pure."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ for param in extract_params(config_description):
 
 
 class Group(Protocol):
-    """The parameters to document."""
+    """A group whose parameters are documented."""
 
     def get_parameters(self) -> list[Entry]:
         """Return a dict for each parameter."""

@@ -1,7 +1,7 @@
-"""dynamic_reconfigure.parameter_generator_catkin: the API with which a .cfg file, a Python program, defines parameters.
+"""dynamic_reconfigure.parameter_generator_catkin: the API for .cfg files, Python programs that define parameters.
 
-As in ROS, catkin_make runs the .cfg file with four folders: dynamic_reconfigure's own, and those for documentation, C++
-headers and Python modules. It writes no C++ header, because minirospy does not compile C++.
+As in ROS, catkin_make passes four folders to the .cfg file: dynamic_reconfigure's own, and those for documentation, C++
+headers and Python modules. The .cfg file writes no C++ header, because minirospy does not compile C++.
 Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfgFile.
 """
 
@@ -61,13 +61,13 @@ See http://wiki.ros.org/dynamic_reconfigure/Tutorials"""
 
 
 def check_description(description: str) -> None:
-    """Raise Exception if a description contains a quote, as in ROS, whose C++ header cannot represent one."""
+    """Raise Exception, as ROS does, if a description contains a quote, because ROS's C++ header cannot represent one."""
     if "'" in description or '"' in description:
         raise Exception(f"quotes not allowed in description string `{description}`")
 
 
 def check_name(name: str) -> None:
-    """Raise Exception if the name is not allowed for a parameter."""
+    """Raise Exception if a parameter cannot have this name."""
     if not _NAME.match(name):
         raise Exception(
             f"The name of field '{name}' does not follow the ROS naming conventions, "
@@ -76,7 +76,7 @@ def check_name(name: str) -> None:
 
 
 class ParameterGenerator:
-    """A node's parameters, in groups; ``generate`` writes the files that programs import and include."""
+    """A node's parameters, organized in groups. ``generate`` writes the files for programs."""
 
     minval: Mapping[str, Value] = {int_t: -0x80000000, double_t: -float("inf"), str_t: "", bool_t: False}
     maxval: Mapping[str, Value] = {int_t: 0x7FFFFFFF, double_t: float("inf"), str_t: "", bool_t: True}
@@ -230,7 +230,7 @@ class ParameterGenerator:
     def const(self, name: str, type: str, value: Value, descr: str) -> Entry:
         """Add a constant ``NAME_name`` to the module; return it as an argument for ``enum``.
 
-        Raise Exception for an invalid description, TypeError if the value does not have the type.
+        Raise Exception for an invalid description, TypeError if the value does not have the type ``type``.
         """
         srcfile, srcline = _source_line()
         constant: Entry = {

@@ -1,4 +1,4 @@
-"""dynamic_reconfigure.server: a node's parameters that other nodes can change.
+"""dynamic_reconfigure.server: lets other nodes change a node's parameters.
 
 It offers the latched topics ``~parameter_descriptions`` and ``~parameter_updates``, and the service ``~set_parameters``.
 """
@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 
 __all__ = ["ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv", "Server"]
 
-# Python types allowed for each parameter type; rosparam stores a double without a decimal point as an int.
+# Python types allowed for each parameter type. An int is allowed for a double, because rosparam stores 1.0 as an int
+# if it is written without a point.
 _TYPES: dict[str, tuple[type, ...]] = {
     "int": (int,),
     "double": (float, int),
@@ -59,8 +60,8 @@ class Server:
     ) -> None:
         """Start serving. ``type`` is the module package.cfg.NAMEConfig.
 
-        ``namespace``, below the node's name, is used for the topics and the service. Raise DynamicReconfigureCallbackException
-        if the callback returns None. Any exception that the callback raises is propagated.
+        ``namespace`` is appended to the node's name to form the namespace of the topics and the service. Raise
+        DynamicReconfigureCallbackException if the callback returns None. Exceptions from the callback are propagated.
         """
         self.mutex = threading.Lock()
         if not namespace or namespace == "~":
@@ -89,7 +90,7 @@ class Server:
         self.set_service = rospy.Service(self.ns + "set_parameters", Reconfigure, self._set_callback)
 
     def update_configuration(self, changes: Values) -> Config:
-        """Change values; return the configuration that the callback returns. Any exception from the callback is propagated."""
+        """Change values; return the configuration that the callback returns. Exceptions from the callback are propagated."""
         with self.mutex:
             config = copy.deepcopy(self.config)
             config.update(changes)
@@ -169,7 +170,7 @@ def _fits(param: Entry, value: object) -> bool:
 
 
 def _converted(param: Entry, value: Value) -> Value:
-    """Return a value converted to the type that its message field requires."""
+    """Return a value as the Python type that its message field requires."""
     if param["type"] == "double":
         return float(value)
     return bool(value) if param["type"] == "bool" else value

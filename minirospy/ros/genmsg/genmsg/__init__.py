@@ -1,4 +1,4 @@
-"""genmsg: message and service definitions, as code generators read them."""
+"""genmsg: loads message and service definitions for code generators."""
 
 from typing import TYPE_CHECKING
 

@@ -69,7 +69,7 @@ __all__ = [
 
 _BETWEEN = re.compile(r"^---.*\n?", re.MULTILINE)
 
-SearchPath = Mapping[str, Sequence[str]]  # package -> folders that contain its definitions
+SearchPath = Mapping[str, Sequence[str]]  # maps a package to the folders that contain its definitions
 
 
 class MsgNotFound(Exception):
@@ -122,7 +122,7 @@ class MsgContext:
         self._files[full_msg_type] = file_path
 
     def get_file(self, full_msg_type: str) -> str | None:
-        """Return the file that contains a definition, or None if it is unknown."""
+        """Return the file that contains a definition, or None if the file is unknown."""
         return self._files.get(full_msg_type)
 
     def set_depends(self, full_msg_type: str, dependencies: list[str]) -> None:
@@ -130,13 +130,13 @@ class MsgContext:
         self._depends[full_msg_type] = dependencies
 
     def get_depends(self, full_msg_type: str) -> list[str] | None:
-        """Return the message types that a message's fields use, or None before :func:`load_depends`."""
+        """Return the message types that a message's fields use, or None if :func:`load_depends` has not been called."""
         return self._depends.get(full_msg_type)
 
     def get_all_depends(self, full_msg_type: str) -> list[str]:
         """Return all messages that a message uses, directly or indirectly, each before those that it uses.
 
-        Raise KeyError before :func:`load_depends`.
+        Raise KeyError if :func:`load_depends` has not been called.
         """
         found: list[str] = []
         for name in self._depends[full_msg_type]:

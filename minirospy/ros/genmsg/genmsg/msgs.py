@@ -64,7 +64,7 @@ class _Constant(NamedTuple):
 
 
 class Constant(_Constant):
-    """A constant: ``val`` is its value, ``val_text`` the value's text in the definition.
+    """A constant; ``val`` is its value, ``val_text`` the value as written in the definition.
 
     Raise ValueError if an argument is None.
     """
@@ -160,12 +160,12 @@ class MsgSpec:
 
 
 def is_builtin(msg_type_name: str) -> bool:
-    """Return whether a type is built-in rather than a message."""
+    """Return whether a type is built-in, that is, not a message type."""
     return msg_type_name in BUILTIN_TYPES
 
 
 def is_header_type(msg_type: str) -> bool:
-    """Return whether a type is a name for std_msgs/Header."""
+    """Return whether a type is one of the names for std_msgs/Header."""
     return msg_type in _HEADERS
 
 
@@ -194,7 +194,7 @@ def resolve_type(msg_type: str, package_context: str) -> str:
     bare = bare_msg_type(msg_type)
     if "/" in bare or is_builtin(bare):
         return msg_type
-    # ROS's genmsg drops the brackets after Header; minirospy does not.
+    # Keep the brackets after Header, unlike ROS's genmsg, which drops them.
     return f"std_msgs/{msg_type}" if bare == "Header" else f"{package_context}/{msg_type}"
 
 

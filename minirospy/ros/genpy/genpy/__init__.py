@@ -1,4 +1,4 @@
-"""genpy: the names that generated messages import."""
+"""genpy: provides the names that generated message modules import."""
 
 from typing import TYPE_CHECKING
 

@@ -16,7 +16,8 @@ __all__ = ["MsgGenerationException", "generate_dynamic"]
 def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, type[Message]]:
     """Return the classes for a full definition and for all types in it, by name.
 
-    Raise InvalidMsgSpec if it is invalid, MsgNotFound if a type is missing, MsgGenerationException if a part has no name.
+    Raise InvalidMsgSpec if it is invalid, MsgNotFound if a type is missing, MsgGenerationException if a part of it has no
+    type name.
     """
     from minirospy.core.idl import load
 
@@ -53,6 +54,6 @@ def _as_genpy(core_type: str, msg_cat: str, error: DefinitionError) -> Exception
     except (InvalidMsgSpec, MsgNotFound) as found:
         return found
     except (ValueError, RecursionError):
-        # The definition has an invalid name, or a message that contains itself: use the text from minirospy's error.
+        # The definition has an invalid name, or a message that contains itself; use the text from minirospy's error.
         pass
     return InvalidMsgSpec(str(error))

@@ -103,10 +103,9 @@ def _remap_reserved(field_name: str) -> str:
 
 
 class Generator:
-    """Generates modules.
+    """Generates modules for one kind of definition.
 
-    ``what`` names the kind of definition, ``ext`` is the file extension. The functions load a definition and yield the
-    module's lines.
+    ``what`` names the kind, ``ext`` is its file extension. The functions load a definition and yield its module's lines.
     """
 
     def __init__(self, what: str, ext: str, spec_loader_fn: _Loader, generator_fn: _Emitter) -> None:
@@ -121,8 +120,7 @@ class Generator:
         """Generate the module for the definition file ``f``; return the module's path.
 
         Raise MsgGenerationException or InvalidMsgSpec if the definition is invalid, MsgNotFound if one that it uses is
-        missing,
-        OSError if a file cannot be read or written.
+        missing, OSError if a file cannot be read or written.
         """
         spec = self.spec_loader_fn(msg_context, f, full_type)
         lines = list(self.generator_fn(msg_context, spec, search_path))
@@ -152,7 +150,7 @@ class Generator:
                 OSError,
                 UnicodeDecodeError,
             ) as error:
-                # Continue with the other definitions after an error.
+                # Report the error, and continue with the other definitions.
                 text = f"ERROR: Unable to generate {self.what} for package '{package}': while processing '{file}': {error}"
                 print(f"\n{text}\n", file=sys.stderr)
                 status = 1

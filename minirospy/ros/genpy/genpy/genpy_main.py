@@ -26,9 +26,8 @@ def usage(progname: str) -> None:
 def genmain(argv: Sequence[str], progname: str, gen: Generator) -> NoReturn:
     """Run a generator with a command line that includes the program name, and exit.
 
-    The status is 0, 1 to 3 after an error, 2 after a usage error. Arguments: ``-p PACKAGE -o FOLDER -I PACKAGE:FOLDER
-    FILE ...``,
-    or ``--initpy -o FOLDER``.
+    The exit status is 0, 1 to 3 after an error, or 2 after a usage error. Arguments: ``-p PACKAGE -o FOLDER -I PACKAGE:FOLDER
+    FILE ...``, or ``--initpy -o FOLDER``.
     """
     parser = OptionParser(f"{progname} file")
     parser.add_option("--initpy", action="store_true", default=False)

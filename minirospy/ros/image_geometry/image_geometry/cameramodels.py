@@ -81,8 +81,8 @@ class PinholeCameraModel:
     def rectifyImage(self, raw: Array, rectified: Array) -> None:
         """Rectify the image ``raw`` into ``rectified``, an array of the same shape and type.
 
-        Use OpenCV if it is installed, else numpy with the same interpolation. Raise ValueError if the arrays do not match, or
-        an uncalibrated camera has no size.
+        Use OpenCV if it is installed, else numpy with the same interpolation. Raise ValueError if the arrays do not
+        match, or the camera is uncalibrated and has no image size.
         """
         self._check()
         rectified_image(raw, rectified, (self.K, self._distortion(), self.R, self.P), self.resolution)
@@ -114,19 +114,19 @@ class PinholeCameraModel:
         return _ratio(x, norm), _ratio(y, norm), 1.0 / norm
 
     def getDeltaU(self, deltaX: float, Z: float) -> float:
-        """Return the size in pixels of ``deltaX`` meters at distance ``Z``; inf if ``Z`` is 0."""
+        """Return the length in pixels of ``deltaX`` meters at distance ``Z``; inf if ``Z`` is 0."""
         return self.fx() * deltaX / Z if Z else math.inf
 
     def getDeltaV(self, deltaY: float, Z: float) -> float:
-        """Return the size in pixels of ``deltaY`` meters at distance ``Z``; inf if ``Z`` is 0."""
+        """Return the length in pixels of ``deltaY`` meters at distance ``Z``; inf if ``Z`` is 0."""
         return self.fy() * deltaY / Z if Z else math.inf
 
     def getDeltaX(self, deltaU: float, Z: float) -> float:
-        """Return the size in meters of ``deltaU`` pixels at distance ``Z``."""
+        """Return the length in meters of ``deltaU`` pixels at distance ``Z``."""
         return _ratio(Z * deltaU, self.fx())
 
     def getDeltaY(self, deltaV: float, Z: float) -> float:
-        """Return the size in meters of ``deltaV`` pixels at distance ``Z``."""
+        """Return the length in meters of ``deltaV`` pixels at distance ``Z``."""
         return _ratio(Z * deltaV, self.fy())
 
     def fullResolution(self) -> tuple[int, int]:
@@ -212,7 +212,7 @@ class PinholeCameraModel:
 
 
 class StereoCameraModel:
-    """A pair of rectified cameras; the baseline is in the right camera's P."""
+    """A pair of rectified cameras. The baseline is computed from the right camera's P."""
 
     def __init__(self) -> None:
         self.left = PinholeCameraModel()

@@ -22,8 +22,8 @@ else:
 
 __all__ = ["Distortion", "distorted", "rectified_image", "undistorted"]
 
-_ITERATIONS = 5  # iterations in OpenCV's undistortPoints
-_STEPS = 32  # subpixel positions per pixel in OpenCV's interpolation
+_ITERATIONS = 5  # number of iterations, as in OpenCV's undistortPoints
+_STEPS = 32  # number of subpixel positions per pixel, as in OpenCV's interpolation
 _ONE = 1 << 15  # sum of the integer weights for a pixel's neighbors
 _COUNTS = (0, 4, 5, 8, 12, 14)
 
@@ -59,7 +59,7 @@ def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Val
 
 
 def distorted(u: Values, v: Values, K: Values, D: Distortion, R: Values, P: Values) -> tuple[Values, Values]:
-    """Return the raw pixels for rectified ones, as arrays of u and of v. Raise ValueError if the length of D is not supported."""
+    """Return the raw pixels for rectified ones, as two arrays, u and v. Raise ValueError if the length of D is not supported."""
     import numpy as np
 
     k = _coefficients(D)
@@ -130,7 +130,7 @@ def _tilt(tau_x: float, tau_y: float) -> Values:
 
 
 def _remapped(raw: Values, map_x: Values, map_y: Values) -> Values:
-    """Return an image whose pixels are read from ``raw`` at the map's positions, with bicubic interpolation.
+    """Return an image whose pixels are read from ``raw`` at the positions in the maps, with bicubic interpolation.
 
     Positions outside ``raw`` become black.
     """
@@ -185,7 +185,7 @@ def _fixed_weights() -> Values:
     import numpy as np
 
     table: Values = np.rint(_weights() * np.float32(_ONE)).astype(np.int32)
-    # OpenCV adds the rounding error to the largest or the smallest of these four weights.
+    # OpenCV corrects the largest or the smallest of these four weights by the rounding error.
     corner = table[:, :, 2:, 2:].reshape(_STEPS, _STEPS, 4)
     excess = table.sum(axis=(2, 3)) - _ONE
     places = np.where(excess < 0, corner.argmax(axis=2), corner.argmin(axis=2))

@@ -28,7 +28,7 @@ Callback = Callable[[InteractiveMarkerFeedback], object]
 
 _QUEUE_SIZE = 100
 _KEEP_ALIVE = 0.5  # seconds between keep-alive updates to viewers
-_TURN = 1.0  # seconds for which feedback from other viewers is ignored
+_TURN = 1.0  # seconds after feedback from one viewer for which feedback from other viewers is ignored
 _UNCHANGED: Callback | int = -1
 
 
@@ -102,7 +102,7 @@ class InteractiveMarkerServer:
     def setCallback(
         self, name: str, feedback_cb: Callback | None, feedback_type: int = DEFAULT_FEEDBACK_CB
     ) -> bool:
-        """Set the callback for one type of feedback, or for all feedback whose type has no callback of its own.
+        """Set the callback for one type of feedback, or for all types without a specific callback.
 
         None removes the callback. The change takes effect immediately. Return whether the marker exists.
         """
@@ -185,7 +185,7 @@ class InteractiveMarkerServer:
             context.int_marker = update.int_marker
             message.markers.append(context.int_marker)
         elif context is None:
-            # The marker was added and erased between two applyChanges(), so it was never published.
+            # The marker was added and erased between two applyChanges() calls, so it was never published.
             return
         elif update.update_type == UpdateContext.POSE_UPDATE:
             marker = context.int_marker
@@ -202,7 +202,7 @@ class InteractiveMarkerServer:
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
         """Move a marker as a viewer has requested, and call the program's callback.
 
-        For one second, ignore feedback for the marker from other viewers.
+        Ignore feedback from other viewers for one second.
         """
         with self.mutex:
             context = self.marker_contexts.get(feedback.marker_name)
@@ -251,7 +251,7 @@ class InteractiveMarkerServer:
             )
 
     def doSetPose(self, update: UpdateContext | None, name: str, pose: Pose, header: Header) -> None:
-        """Add a move to the pending changes; the caller holds the lock."""
+        """Add a new pose to the pending changes; the caller holds the lock."""
         if update is None:
             update = self.pending_updates[name] = UpdateContext(UpdateContext.POSE_UPDATE)
         elif update.update_type != UpdateContext.FULL_UPDATE:

@@ -63,7 +63,7 @@ class MenuHandler:
         return handle
 
     def doInsert(self, title: str, command_type: int, command: str, feedback_cb: Callback | None) -> int:
-        """Create an entry that is not in any menu yet; return its handle."""
+        """Create an entry that is not in a menu yet; return its handle."""
         handle = self.current_handle_
         self.current_handle_ += 1
         self.entry_contexts_[handle] = EntryContext(title, command, command_type, feedback_cb=feedback_cb)
@@ -110,7 +110,7 @@ class MenuHandler:
 
     def reApply(self, server: InteractiveMarkerServer) -> bool:
         """Apply the menu again to all markers that use it; return whether all these markers still exist."""
-        # Use a list, not a generator, to continue after a missing marker.
+        # Build a list, not a generator, so that all markers are processed even if one is missing.
         found = [self.apply(server, marker) for marker in list(self.managed_markers_)]
         return all(found)
 

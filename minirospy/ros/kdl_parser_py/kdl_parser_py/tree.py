@@ -1,4 +1,4 @@
-"""A robot's tree with PyKDL's names: segments, joints, chains and poses, but no solvers.
+"""A robot's tree as classes with PyKDL's names: segments, joints, chains and poses, but no solvers.
 
 Source: https://www.orocos.org/kdl, http://wiki.ros.org/kdl_parser.
 """
@@ -67,7 +67,7 @@ class Segment:
 
 
 class Chain:
-    """Segments from a link down to one of its descendants."""
+    """The segments from a link down to one of its descendants."""
 
     def __init__(self, segments: list[Segment]) -> None:
         self._segments = segments
@@ -93,7 +93,7 @@ class Tree:
         self._segments: dict[str, Segment] = {}
 
     def addSegment(self, segment: Segment, hook_name: str) -> bool:
-        """Add a segment below a link; return False if the link does not exist, or the segment already does."""
+        """Add a segment below a link; return False if the link does not exist, or the segment already exists."""
         name = segment.getName()
         is_known = hook_name == self._root or hook_name in self._segments
         if not is_known or name in self._segments or name == self._root:
@@ -123,7 +123,7 @@ class Tree:
 
 
 def tree_of(robot: Robot) -> Tree:
-    """Return a robot's tree, adding each link after its parent."""
+    """Build a robot's tree, adding each link after its parent."""
     tree = Tree(robot.root)
     for joint in _downwards(robot):
         tree.addSegment(Segment(joint), joint.parent)

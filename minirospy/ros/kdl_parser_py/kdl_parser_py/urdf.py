@@ -18,7 +18,7 @@ class Writable(Protocol):
 
 
 def treeFromFile(filename: str) -> tuple[bool, Tree]:
-    """Return the tree for a description file.
+    """Build the tree from a description file.
 
     Raise UrdfError if the description is invalid, OSError if the file cannot be read.
     """
@@ -26,7 +26,7 @@ def treeFromFile(filename: str) -> tuple[bool, Tree]:
 
 
 def treeFromParam(param: str) -> tuple[bool, Tree]:
-    """Return the tree for a description in a parameter.
+    """Build the tree from the robot description in a parameter.
 
     Raise KeyError if the parameter is not set, UrdfError if the description is invalid.
     """
@@ -36,12 +36,12 @@ def treeFromParam(param: str) -> tuple[bool, Tree]:
 
 
 def treeFromString(xml: str | bytes) -> tuple[bool, Tree]:
-    """Return the tree for a description. Raise UrdfError if it is invalid."""
+    """Build the tree from a robot description in XML. Raise UrdfError if it is invalid."""
     return True, tree_of(parse_robot(xml))
 
 
 def treeFromUrdfModel(robot_model: Writable, quiet: bool = False) -> tuple[bool, Tree]:
-    """Return the tree for urdf_parser_py's robot; warn if the root has an inertia, unless ``quiet``.
+    """Build the tree from urdf_parser_py's robot; warn if the root has an inertia, unless ``quiet``.
 
     Raise UrdfError if the description is invalid.
     """

@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 __all__ = ["LaserProjection", "PointCloud2"]
 
 _VIEWPOINT = ("vp_x", "vp_y", "vp_z")
-_INT32, _FLOAT32 = 5, 7  # type numbers in PointField
+_INT32, _FLOAT32 = 5, 7  # the numbers of these types in PointField
 
 
 class LaserProjection:
-    """Converts scans to clouds; caches the directions of the beams between scans."""
+    """Converts scans to clouds; caches the beams' directions between scans."""
 
     LASER_SCAN_INVALID = -1.0
     LASER_SCAN_MIN_RANGE = -2.0
     LASER_SCAN_MAX_RANGE = -3.0
 
     class ChannelOption:
-        """A cloud's fields in addition to x, y and z, as bits."""
+        """Bits that select a cloud's fields in addition to x, y and z."""
 
         NONE = 0x00
         INTENSITY = 0x01
@@ -178,7 +178,7 @@ def _later(stamp: genpy.Time, seconds: float) -> genpy.Time:
 
 
 def _interpolated(first: TransformStamped, last: TransformStamped, ratios: Values) -> Values:
-    """Interpolate between two rotations, along the shorter arc; return x y z w with shape (4, ratios)."""
+    """Interpolate between two rotations along the shorter arc; return quaternions x y z w with shape (4, ratios)."""
     import numpy as np
 
     start, end = (
@@ -198,7 +198,7 @@ def _interpolated(first: TransformStamped, last: TransformStamped, ratios: Value
 
 
 def _rotated(points: Values, rotations: Values) -> Values:
-    """Return the points, each rotated by its own rotation, with shape (3, points)."""
+    """Rotate each point by the rotation with the same index; return points with shape (3, points)."""
     import numpy as np
 
     vectors = np.array([points[axis] for axis in "xyz"], np.float64)

@@ -132,7 +132,7 @@ class Cache(SimpleFilter):
         return stored[-1][0] if stored else None
 
     def getLastestTime(self) -> Time | None:
-        """Return ``getLatestTime()``; this name is old and misspelt."""
+        """Return ``getLatestTime()``; this is its old, misspelt name."""
         return self.getLatestTime()
 
     def getOldestTime(self) -> Time | None:
@@ -163,7 +163,7 @@ class TimeSynchronizer(SimpleFilter):
         """
         super().__init__()
         self.queue_size = queue_size
-        # The lock is reentrant, because a callback may publish to an input in the same process.
+        # Use a reentrant lock, because a callback may publish to an input in the same process.
         self.lock = threading.RLock()
         self.enable_reset = reset
         self.connectInput(fs)
@@ -194,7 +194,7 @@ class TimeSynchronizer(SimpleFilter):
                 return
 
             for each in sorted(set(self.queues[0]).intersection(*self.queues[1:]) if self.queues else ()):
-                # A callback may have added messages to the queues and thereby already completed this set.
+                # A callback may have completed this set already, by adding messages to the queues.
                 if all(each in queue for queue in self.queues):
                     self.signalMessage(*[queue.pop(each) for queue in self.queues])
 
@@ -214,8 +214,8 @@ class TimeSynchronizer(SimpleFilter):
 class ApproximateTimeSynchronizer(TimeSynchronizer):
     """Passes on sets of messages, one from each input, whose time stamps differ by less than ``slop`` seconds.
 
-    A new message is matched with the closest messages from the other inputs. Of all possible sets, the first is used, in the
-    order in which ROS tries them.
+    A new message is matched with the closest messages from the other inputs. If several sets are possible, the one that ROS
+    would try first is used.
     """
 
     def __init__(
@@ -263,7 +263,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
             if waiting > self.queue_size:
                 _keep_newest(my_queue, self.queue_size)
                 if my_queue_index is not None and stamp not in my_queue:
-                    # The queue is full, and the new message was removed again because it is the oldest.
+                    # The queue is full, and the new message has been removed again because it is the oldest.
                     return
             if is_stale:
                 return
@@ -282,7 +282,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
     def _match(self, my_queue_index: int | None, nanoseconds: int) -> list[object]:
         """Remove from the queues the set that a time stamp completes, and return its messages; [] if there is no such set."""
-        # A subclass may have replaced ``queues`` by its own list of dicts.
+        # Use ``_stamp_queues``, because a subclass may have replaced ``queues`` by its own list of dicts.
         queues = self._stamp_queues
         if self.queues is not queues:
             queues = [queue if isinstance(queue, StampQueue) else StampQueue(queue) for queue in self.queues]

@@ -48,7 +48,7 @@ class StampQueue(MutableMapping[Time, object]):
         """Store a message under its stamp, which is given both in nanoseconds and as a Time."""
         entries, order = self._entries, self.order
         if nanoseconds in entries:
-            # As in a dict, an existing key keeps its position and its identity.
+            # As in a dict, storing under an existing key keeps the key's position and the key object.
             stamp = entries[nanoseconds][0]
         elif order and nanoseconds < order[-1]:
             insort(order, nanoseconds)
@@ -130,7 +130,7 @@ def closest_stamps(
     if last - first < slop:
         return nearest
 
-    # Stamps that differ by less than `slop` are in a window with that width that starts at one of them.
+    # Stamps that differ by less than `slop` lie in a window of that width that starts at one of them.
     candidates = [
         [stamp] if at == index else queue.between(stamp - slop, stamp + slop)
         for at, queue in enumerate(queues)

@@ -22,7 +22,7 @@ class Rotation:
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, *args: Any) -> None:
-        """Create a rotation from nine numbers row by row, three column vectors, or another Rotation; by default, the identity."""
+        """Create a rotation from nine numbers (row by row), three column vectors, or a Rotation; by default, the identity."""
         if not args:
             self._m = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
         elif len(args) == 1 and isinstance(args[0], Rotation):
@@ -97,7 +97,7 @@ class Rotation:
 
     @staticmethod
     def Quaternion(x: float, y: float, z: float, w: float) -> Rotation:
-        """Return a quaternion's rotation, without normalising the quaternion."""
+        """Return the rotation for a quaternion, which is not normalized first."""
         xx, yy, zz, ww = x * x, y * y, z * z, w * w
         return Rotation(
             ww + xx - yy - zz, 2 * x * y - 2 * w * z, 2 * x * z + 2 * w * y,
@@ -153,7 +153,7 @@ class Rotation:
         if cosine > 1 - tolerance:
             return 0.0, Vector(0, 0, 1)
         if cosine < -1 + tolerance:
-            # A rotation by 180 degrees has two possible axes; return the one that KDL returns, which points up.
+            # A rotation by 180 degrees has two possible axes; return the same one as KDL, which points up.
             x, y, z = (math.sqrt(max(0.0, (m[each] + 1.0) / 2)) for each in (0, 4, 8))
             x = -x if m[2] < 0 else x
             y = -y if m[7] < 0 else y
@@ -272,7 +272,7 @@ class Frame:
     header: Header  # set only by tf2_ros.Stamped
 
     def __init__(self, R: Rotation | Vector | Frame | None = None, V: Vector | None = None) -> None:
-        """Create a pose from a Rotation and a Vector, from one of these, or from another Frame; by default, the identity."""
+        """Create a pose from a Rotation and a Vector, from either of them, or from another Frame; by default, the identity."""
         self.M: Rotation
         self.p: Vector
         if isinstance(R, Frame):

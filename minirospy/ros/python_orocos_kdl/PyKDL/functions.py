@@ -53,7 +53,7 @@ def diff(a: Wrench, b: Wrench, dt: float = 1) -> Wrench: ...
 
 
 def diff(a: Any, b: Any, dt: float = 1) -> Any:
-    """Return the velocity that leads from ``a`` to ``b`` within ``dt``; for poses, a twist in the base frame."""
+    """Return the velocity that moves ``a`` to ``b`` within ``dt``; for poses, a twist in the base frame."""
     if isinstance(a, Frame) and isinstance(b, Frame):
         return Twist(diff(a.p, b.p, dt), diff(a.M, b.M, dt))
     if isinstance(a, Rotation) and isinstance(b, Rotation):
@@ -62,7 +62,7 @@ def diff(a: Any, b: Any, dt: float = 1) -> Any:
 
 
 def addDelta(a: _Geometry, da: Any, dt: float = 1) -> _Geometry:
-    """Return the result of moving ``a`` with the velocity ``da`` for ``dt``; this function is the inverse of :func:`diff`."""
+    """Return ``a`` after moving it with the velocity ``da`` for ``dt``; the inverse of :func:`diff`."""
     if isinstance(a, Frame):
         return Frame(addDelta(a.M, da.rot, dt), addDelta(a.p, da.vel, dt))
     if isinstance(a, Rotation):

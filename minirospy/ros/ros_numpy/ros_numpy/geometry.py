@@ -1,4 +1,4 @@
-"""ros_numpy.geometry: converts points, vectors and quaternions to arrays, poses and transforms to 4x4 matrices; and back.
+"""ros_numpy.geometry: converts points, vectors and quaternions to arrays and back, and poses and transforms to 4x4 matrices.
 
 An array with more dimensions is converted to an array of messages.
 """
@@ -43,7 +43,7 @@ def vector3_to_numpy(msg: Vector3, hom: bool = False) -> Floats:
 
 @converts_from_numpy(Vector3)
 def numpy_to_vector3(arr: Array) -> object:
-    """Return a vector from three values, or from four of which the last is 0. Raise AssertionError for other values."""
+    """Return a vector from three values, or from four if the last is 0. Raise AssertionError for other values."""
     if arr.shape[-1] == 4:
         assert np.all(arr[..., -1] == 0)
         arr = arr[..., :-1]

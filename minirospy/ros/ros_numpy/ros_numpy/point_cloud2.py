@@ -78,7 +78,7 @@ def dtype_to_fields(dtype: np.dtype[np.void]) -> list[PointField]:
 
 @converts_to_numpy(PointCloud2)
 def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> Array:
-    """Return the points as a read-only view: shape (height, width), or (width,) for a single row with ``squeeze``.
+    """Return the points as a read-only view with shape (height, width), or (width,) if ``squeeze`` and there is one row.
 
     Raise ValueError if the message has too little data for its size.
     """

@@ -19,11 +19,14 @@ _F = TypeVar("_F", bound=_Function)
 
 _to_numpy: dict[tuple[str, bool], _Function] = {}
 _from_numpy: dict[tuple[str, bool], _Function] = {}
-"""Conversion functions by type name, because messages in a bag have other classes, and by whether they convert lists."""
+"""Conversion functions by (type name, whether they convert lists).
+
+Names are used because messages in a bag have other classes.
+"""
 
 
 def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a function for messages with a type, or with ``plural`` for lists of them."""
+    """Return a decorator that registers a conversion from a message type, or with ``plural`` a list of messages, to an array."""
 
     def register(function: _F) -> _F:
         _to_numpy[msgtype._type, plural] = function
@@ -33,7 +36,7 @@ def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[
 
 
 def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a function from an array to a message with a type, or with ``plural`` to a list."""
+    """Return a decorator that registers a conversion from an array to a message type, or with ``plural`` to a list of them."""
 
     def register(function: _F) -> _F:
         _from_numpy[msgtype._type, plural] = function

@@ -1,4 +1,4 @@
-"""The node ros_mac_authentication: its service ``authenticate`` checks that a client knows a secret.
+"""The node ros_mac_authentication, whose service ``authenticate`` checks that a client knows a secret.
 
 Parameters: ~secret_file_location (a file with 16 characters), ~allowed_time_delta (5 seconds; negative: no limit).
 Source: http://wiki.ros.org/rosauth, http://wiki.ros.org/rosauth/Tutorials/Authenticating%20a%20ROS%20Connection.
@@ -24,7 +24,7 @@ _NO_PARAMETER, _NO_FILE, _NO_SECRET = 255, 254, 253
 
 
 def main() -> int:
-    """Run the node; return the exit status: 255 if the parameter is missing, 254 if the file is, 253 if the secret is invalid."""
+    """Run the node; return 255 if the parameter is missing, 254 if the file is missing, 253 if the secret is invalid."""
     rospy.init_node("ros_mac_authentication")
     file = rospy.get_param(f"~{_SECRET_FILE}", None)
     if not isinstance(file, str):
@@ -57,7 +57,7 @@ def main() -> int:
 
 
 def mac_of(request: AuthenticationRequest, secret: str) -> str:
-    """Return the MAC for a request from a sender that knows the secret: SHA-512, in hexadecimal."""
+    """Return the MAC that a client with the secret sends in this request: a SHA-512 hash in hexadecimal."""
     text = f"{secret}{request.client}{request.dest}{request.rand}{request.t.secs}{request.level}{request.end.secs}"
     return hashlib.sha512(text.encode("utf-8", "surrogateescape")).hexdigest()
 

@@ -26,7 +26,10 @@ __all__ = ["echo_bag", "list_bag", "show_bag"]
 
 @contextmanager
 def _opened(path: str, ros_error: str) -> Iterator[BagReader]:
-    """Open a bag and yield its reader. Raise MinirospyError; if the file does not exist, with ROS's message."""
+    """Open a bag and yield its reader.
+
+    Raise MinirospyError if it cannot be read; if the file does not exist, the error prints ROS's message.
+    """
     if not os.path.exists(path):
         text = f"bag file [{path}] does not exist"
         raise WordedError(NotFoundError("bag file", path), RosText(f"{ros_error}{text}"))
@@ -40,7 +43,7 @@ def _opened(path: str, ros_error: str) -> Iterator[BagReader]:
 def list_bag(path: str, topic: str | None) -> None:
     """Print the topics of a bag, ordered by first message.
 
-    With ``topic``: print the message counts of that topic and of the topics below it.
+    With ``topic``, print the message count of that topic and the topics in its namespace.
     """
     with _opened(path, "ERROR: ") as reader:
         if topic is None:
@@ -80,8 +83,8 @@ def _topics_in_order(reader: BagReader) -> list[str]:
 class EchoOptions(NamedTuple):
     """Options for printing the messages of a bag.
 
-    ``make`` returns the Echo for a topic or field; ``keep`` filters messages; at most ``limit`` are printed, each after
-    ``prefix``.
+    ``make`` returns the Echo for a topic or field; ``keep`` filters messages; at most ``limit`` messages are printed,
+    each after ``prefix``.
     """
 
     make: Callable[[TopicField], Echo]
@@ -91,8 +94,8 @@ class EchoOptions(NamedTuple):
 
 
 def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
-    """Print the messages of topic ``name`` in a bag, or one field of them if ``name`` ends in a field; if None, of all topics."""
-    from minirospy.introspect.streams import Received
+    """Print a bag's messages on the topic ``name``, or one field of them if ``name`` ends in a field; None prints all topics."""
+    from minirospy.introspect.messages import Received
     from minirospy.introspect.topics import TopicField
 
     with _opened(path, "ERROR: ") as reader:
@@ -126,11 +129,12 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
 
 
 def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
-    """Return the IDs of the connections to print, each with the path of the field to print: "" for the whole message."""
+    """Return the IDs of the connections to print, each with the path of the field to print, which is "" for the whole message."""
     topics = {number: _global(each.topic) for number, each in reader.connections.items()}
     if name is None:
         return dict.fromkeys(topics, "")
-    # The longest matching topic wins: a topic with the full name precedes a field of a topic with a shorter name.
+    # The longest matching topic takes precedence: a topic with the full name wins over a field of a topic with a
+    # shorter name.
     holders = [topic for topic in topics.values() if name == topic or name.startswith(f"{topic}/")]
     topic = max(holders, key=len, default="")
     return {
@@ -141,12 +145,12 @@ def _paths(reader: BagReader, name: str | None) -> dict[int, str]:
 
 
 def _global(topic: str) -> str:
-    """Return the global name of a topic: a bag may contain relative names."""
+    """Return the global name of a topic, because a bag may contain relative names."""
     return topic if topic.startswith("/") else f"/{topic}"
 
 
 def show_bag(path: str, type_: str, *, raw: bool) -> None:
-    """Print the definition of a type as stored in a bag: expanded, or as raw text."""
+    """Print the definition of a type as stored in a bag, either expanded or as raw text."""
     from minirospy.core.idl.load import specs_of_text
     from minirospy.introspect.interfaces import describe
 

@@ -1,7 +1,7 @@
 """rosbag: record, play, inspect, repair and rewrite bags.
 
-Source: http://wiki.ros.org/rosbag/Commandline. Output and exit statuses are those of ROS: 0 for an unknown verb. Each verb
-has its own module; add a verb with a line in the table.
+Source: http://wiki.ros.org/rosbag/Commandline. Output and exit statuses are those of ROS, for example 0 for an unknown
+verb. Each verb has its own module, and a line in the table FAMILY.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ FAMILY = Family(
     interrupted=INTERRUPTED,
     summary="record, play and change bags",
     help_status=HelpStatus(0, 0, 0, 0),
+    wording={},
 )
 """The verbs. `rosbag -h` lists those that ROS also has, in alphabetical order."""
 

@@ -137,7 +137,7 @@ def _filter(words: list[str], print: str | None) -> int:
     from minirospy.introspect import bags
     from minirospy.ros.rosbag.commands.rosbag_progress import showing_progress
 
-    # Check the name before the progress is shown.
+    # Check the name before showing the progress.
     bags.check_bag_name(target)
     keep = bags.Expression(text)
     show = bags.Expression(print) if print else None
@@ -149,7 +149,7 @@ def _filter(words: list[str], print: str | None) -> int:
         return 0 if isinstance(error, BagEncryptedError) else 1
 
     try:
-        # Without the progress bar if matches are printed on a terminal: they would overwrite each other.
+        # Do not show the progress bar if matches are printed on a terminal, because they would overwrite each other.
         with showing_progress(target, total, quiet=show is not None and sys.stdout.isatty()) as progress:
             bags.filter_bag(source, target, keep, progress, show=show, on_shown=_print_match, warn=report)
     except (BagError, ValueTextError, MessageException) as error:

@@ -1,6 +1,6 @@
 """`rosbag play` and `rosrun rosbag play`: publish the messages of bags with their original timing.
 
-Source: http://wiki.ros.org/rosbag/Commandline#play. Options and texts are those of ROS's command and of its C++ program.
+Source: http://wiki.ros.org/rosbag/Commandline#play. Options and messages are those of ROS's command and its C++ program.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ def _nanoseconds(name: str, seconds: float) -> int:
 
 
 def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> int:
-    # Imported here: --help does not need the client library.
+    # Imported here because --help does not need the client library.
     from minirospy import client
     from minirospy.ros.rosbag.recording.player import Player
     from minirospy.ros.rosbag.recording.sources import Bags
@@ -177,12 +177,12 @@ def _run(paths: list[str], options: PlayOptions, foxglove_port: int | None) -> i
             print("\n".join(bridge.lines), flush=True)
 
         try:
-            # Use wall time: the player may itself publish /clock.
+            # Use wall time, because the player may itself publish /clock.
             client.init_node("play", anonymous=True, disable_rostime=True)
             for path in paths:
                 client.loginfo("Opening %s", path)
             if options.prefix:
-                # Two closing quotes, as the C++ program prints them.
+                # Print two closing quotes, as the C++ program does.
                 client.loginfo("Using prefix '%s'' for topics ", options.prefix)
             player = Player(bags, options, serve if foxglove_port is not None else None)
             return player.run()

@@ -1,4 +1,4 @@
-"""The progress of long rosbag commands: a bar on a terminal, ROS's text on a pipe, nothing if quiet."""
+"""Shows the progress of long rosbag commands: a bar on a terminal, ROS's text in a pipe, nothing if quiet."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from minirospy.base.escape import escaped, own_output
 __all__ = ["showing_progress"]
 
 _REFRESH = 1.0
-_BESIDE_PATH = 37  # columns of ROS's progress line without the path
+_BESIDE_PATH = 37  # number of columns in ROS's progress line, excluding the path
 
 
 @contextlib.contextmanager
@@ -32,7 +32,7 @@ def showing_progress(path: str, total: int, *, quiet: bool) -> Iterator[Callable
         try:
             yield meter.step
         except BaseException:
-            # Print the next message on a new line.
+            # End the progress line, so that the next message is on a new line.
             print()
             raise
         meter.finish()
@@ -49,8 +49,8 @@ def _bar(path: str, total: int) -> Iterator[Callable[[int], None]]:
         DownloadColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
     )
-    # The commands' own stdout escapes control sequences, and the bar needs them to move the cursor: write to the
-    # wrapped stream.
+    # Write to the wrapped stream: the commands' own stdout escapes control sequences, but the bar needs them to move
+    # the cursor.
     console = Console(file=own_output())
     with Progress(*columns, console=console, redirect_stdout=False, redirect_stderr=False) as progress:
         task = progress.add_task(escaped(path), total=max(total, 1))

@@ -1,6 +1,6 @@
 """`rosbag record` and `rosrun rosbag record`: record topics into bags.
 
-Source: http://wiki.ros.org/rosbag/Commandline#record. Options and errors are those of ROS's command and of its C++ program.
+Source: http://wiki.ros.org/rosbag/Commandline#record. Options and errors are those of ROS's command and its C++ program.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def without_split_size(words: Sequence[str]) -> Iterator[str]:
-    """Yield the words, replacing ``--split=N`` and ``--split N`` of old launch files and scripts by ``--split --size N``."""
+    """Yield the words, replacing ``--split=N`` and ``--split N``, which old launch files use, by ``--split --size N``."""
     for number, word in enumerate(words):
         size = word.removeprefix("--split=")
         is_value = size == word and number and words[number - 1] == "--split" and word.lstrip("-").isdecimal()
@@ -199,7 +199,7 @@ def _record(given: RecordArguments) -> int:
 
 
 def _run(options: RecordOptions, *, quiet: bool) -> int:
-    # Imported here: --help does not need the client library.
+    # Imported here because --help does not need the client library.
     from minirospy import client
     from minirospy.core.bag.compression import check_compression
     from minirospy.core.bag.mcap_writer import check_mcap

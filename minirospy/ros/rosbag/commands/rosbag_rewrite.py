@@ -84,7 +84,7 @@ def _reindex(bags: list[str], output_dir: str | None, force: bool, quiet: bool) 
 
 
 def _reindex_one(source: str, target: str, quiet: bool) -> None:
-    import shutil  # imported here: it takes longer to import than the commands take
+    import shutil  # imported here because the import takes longer than these commands
 
     from minirospy.introspect import bags
     from minirospy.ros.rosbag.commands.rosbag_progress import showing_progress
@@ -110,7 +110,7 @@ def _rewrite(
     *,
     unindexed: bool = False,
 ) -> int:
-    """Rewrite each bag with ``write(source, target)``: into a folder, or in place, with a backup of the original.
+    """Rewrite each bag with ``write(source, target)``, either into a folder, or in place with a backup of the original.
 
     Return the exit status.
     """
@@ -133,7 +133,8 @@ def _rewrite(
             target = os.path.join(output_dir, os.path.basename(path))
             if os.path.realpath(target) != os.path.realpath(path):
                 if not _write(path, path, target, write) and unindexed:
-                    # As in ROS, only reindex fails then: compress and decompress continue with status 0.
+                    # As in ROS, only reindex fails if the target cannot be created; compress and decompress continue
+                    # with status 0.
                     status = 1
                 continue
 
@@ -163,7 +164,7 @@ def _is_readable(path: str, *, unindexed: bool) -> bool:
     try:
         with open_reader(path) as reader:
             if not unindexed:
-                # This reads the headers of all chunks: a bag with a damaged one is not rewritten.
+                # Read the headers of all chunks first, so that a bag with a damaged header is not rewritten.
                 data_size(reader)
             return True
     except (BagError, OSError) as error:

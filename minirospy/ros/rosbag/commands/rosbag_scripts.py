@@ -1,6 +1,6 @@
-"""The programs of ROS's package rosbag other than record and play: `rosrun rosbag topic_renamer.py ...`.
+"""The programs of ROS's package rosbag other than record and play, run as `rosrun rosbag topic_renamer.py ...`.
 
-Arguments, output and exit statuses are those of ROS; the connection of each publisher is preserved.
+Arguments, output and exit statuses are those of ROS; each publisher keeps its own connection in the bag.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def main(name: str, argv: Sequence[str] | None = None) -> int:
 def copying(
     usage: str, count: int, change: Callable[[list[str]], Callable[[Connection], Connection]]
 ) -> Script:
-    """Return a program that copies a bag; its last but one and its last word, or the second and the last, are bags."""
+    """Return a program that copies a bag. The bags are its first and second word, or of four words, the second and the last."""
 
     def script(words: list[str]) -> int:
         from minirospy.introspect.bags import copy_bag
@@ -67,7 +67,7 @@ def _with_md5sum_of_definition(connection: Connection) -> Connection:
 
 
 def fix_each(words: list[str], usage: str, verb: str, fix: Callable[[str, str], bool]) -> int:
-    """Have ``fix(bag, temporary)`` write each bag again; the original becomes BAG.old."""
+    """Rewrite each bag by calling ``fix(bag, temporary)``; the original becomes BAG.old."""
     if not words:
         print(usage)
         return 0
@@ -143,4 +143,4 @@ SCRIPTS: dict[str, Script] = {
     "fix_md5sums.py": _fix_md5sums,
     "savemsg.py": _savemsg,
 }
-"""The programs by their names; those of migration are in `migration/scripts.py`."""
+"""The programs by name; those for migration are in `migration/scripts.py`."""

@@ -1,4 +1,4 @@
-"""Bags that contain messages whose types have changed: find the required migrations, and write a migrated bag."""
+"""Migrates bags that contain messages whose types have changed: finds the required migrations, and writes a migrated bag."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["check_bag", "check_classes", "fix_bag"]
 
 
 def check_classes(migrator: MessageMigrator, classes: Iterable[MessageClass]) -> list[Migration]:
-    """Return the migrations that messages with these classes need, one per class."""
+    """Return the migrations required by messages with these classes, one per class."""
     found = []
     seen = set()
     for each in classes:
@@ -28,7 +28,7 @@ def check_classes(migrator: MessageMigrator, classes: Iterable[MessageClass]) ->
 
 
 def check_bag(migrator: MessageMigrator, path: str, warn: Callable[[str], object]) -> list[Migration]:
-    """Return the migrations that a bag's messages need, in order of first use.
+    """Return the migrations that a bag's messages require, in order of first use.
 
     Raise BagError if the bag is invalid, OSError if it cannot be read.
     """
@@ -50,8 +50,7 @@ def fix_bag(
     """Write a bag with its messages migrated; return the migrations without a rule. If there are any, write nothing.
 
     ``force``: write the bag anyway, and copy messages that cannot be migrated. Raise BagError if the bag is invalid,
-    OSError if
-    a file cannot be read or written, BagMigrationException if a message cannot be migrated.
+    OSError if a file cannot be read or written, BagMigrationException if a message cannot be migrated.
     """
     missing = [each for each in check_bag(migrator, source, warn) if each.missing]
     if missing and not force:

@@ -1,4 +1,4 @@
-"""Rule files that packages export: `<export><rosbag migration_rule_file="rules.bmr"/></export>`."""
+"""Finds the rule files that packages export: `<export><rosbag migration_rule_file="rules.bmr"/></export>`."""
 
 from __future__ import annotations
 

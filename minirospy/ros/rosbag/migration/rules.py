@@ -1,7 +1,7 @@
-"""Rules that convert a message from an old type to a new type: from .bmr files, or generated from the two types.
+"""Rules that convert a message from an old type to a new one. They are read from .bmr files, or generated from the two types.
 
 Source: http://wiki.ros.org/rosbag/migration. A generated rule copies the fields whose name and type are equal; it is valid
-if no field is lost or needs an invented value. No text from a bag is executed.
+if no field is lost or needs an invented value. Text from a bag is never executed.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Migrator(Protocol):
 
 
 class MessageUpdateRule:
-    """The base class of all rules: subclasses set the class attributes and override :meth:`update`.
+    """The base class of all rules. Subclasses set the class attributes and override :meth:`update`.
 
     ``order`` sorts the rules for a type; ``migrated_types`` contains the pairs (old, new) of field types that update()
     migrates.
@@ -202,7 +202,7 @@ def clean_name(name: str, top_name: str) -> str:
 
 
 def qualified_name(name: str, top_name: str) -> str:
-    """Return a type's name with its package; ``top_name`` is the enclosing message."""
+    """Return a type's name with its package. ``top_name`` is the enclosing message's type."""
     clean = clean_name(name, top_name)
     if "/" in clean or clean in PRIMITIVES:
         return clean
@@ -218,7 +218,7 @@ def get_message_key(c: MessageClass) -> Key | None:
 
 
 def get_path_key(c1: MessageClass, c2: MessageClass) -> tuple[Key | None, Key | None]:
-    """Return the key for a migration from one class to another."""
+    """Return the key for a migration from one class to another: a pair of message keys."""
     return get_message_key(c1), get_message_key(c2)
 
 
@@ -305,13 +305,13 @@ def make_update_rule(
 
 
 def make_old_half_rule(old_class: MessageClass) -> type[MessageUpdateRule]:
-    """Return an invalid rule from an old type whose new type is unknown."""
+    """Return an invalid rule from an old type, because the new type is unknown."""
     name = f"update__{old_class._type.replace('/', '_')}__{old_class._md5sum}"
     return _rule(name, old_class, None, ["pass"], [], valid=False)
 
 
 def make_new_half_rule(new_class: MessageClass) -> type[MessageUpdateRule]:
-    """Return an invalid rule to a new type whose old type is unknown."""
+    """Return an invalid rule to a new type, because the old type is unknown."""
     name = f"update_to_{new_class._type.replace('/', '_')}_{new_class._md5sum}"
     return _rule(name, None, new_class, ["pass"], [], valid=False)
 
@@ -359,7 +359,7 @@ def _quoted(text: str) -> str:
 
 
 def _mismatch(old_type: str | None, new_type: str) -> str:
-    """Return the reason why a field cannot be copied, from its array form and primitive type; "" if it can be copied."""
+    """Compare two field types; return the reason why a field cannot be copied, or "" if it can be copied."""
     if old_type is None:
         return "No matching field name in old message"
     old, new = _parsed(old_type), _parsed(new_type)
@@ -377,7 +377,7 @@ def _mismatch(old_type: str | None, new_type: str) -> str:
 
 
 def _message_pair(migrator: Migrator, old: tuple[str, str], new: tuple[str, str]) -> tuple[str, str] | str:
-    """Return the names of two fields' message types, or the reason why there is no migration between these types.
+    """Return the message types of two fields, or the reason why there is no migration between these types.
 
     ``old`` and ``new`` are pairs: the field's type, and the type of the message that contains the field.
     """

@@ -1,6 +1,6 @@
-"""Migrates stored messages to the installed types: builds a path of rules from each old type to its newest version.
+"""Migrates stored messages to the installed types, by a path of rules from each old type to its newest version.
 
-Explicit rules come from .bmr files, ordered by type. The rules between them, and those for types that keep their name, are
+Explicit rules are in .bmr files, ordered by type. The rules between them, and those for types that keep their name, are
 generated from the two types. Source: http://wiki.ros.org/rosbag/migration.
 """
 
@@ -40,7 +40,7 @@ __all__ = [
 
 
 class RuleChain:
-    """A type's explicit rules: its updates sorted by ``order``, then the rule that renames the type, if there is one."""
+    """A type's explicit rules: its update rules sorted by ``order``, then the rule that renames the type, if any."""
 
     def __init__(self) -> None:
         self.chain: list[MessageUpdateRule] = []
@@ -53,7 +53,7 @@ class RuleChain:
 
 
 class ScaffoldNode:
-    """A step on a path: converts one class to another with a rule; ``next`` is the following step."""
+    """A step on a path, which converts one class to another with a rule; ``next`` is the following step."""
 
     def __init__(
         self, old_class: MessageClass, new_class: MessageClass, rule: MessageUpdateRule | None
@@ -79,7 +79,7 @@ class ScaffoldNode:
 
 
 class Migration(NamedTuple):
-    """A type that needs migration: the path, and the missing rules on it."""
+    """A type that needs migration, with its path and the rules that are missing on the path."""
 
     path: list[ScaffoldNode]
     missing: list[MessageUpdateRule]
@@ -141,7 +141,7 @@ class MessageMigrator:
             chain.chain.sort(key=lambda each: each.order)
 
     def all_rules_valid(self) -> bool:
-        """Return whether no rule is missing."""
+        """Return whether every rule is valid, that is, none is missing."""
         return not self.get_invalid_rules()
 
     def get_invalid_rules(self) -> list[MessageUpdateRule]:
@@ -157,7 +157,7 @@ class MessageMigrator:
         return list(found.values())
 
     def expand_rules(self, rules: Sequence[MessageUpdateRule]) -> list[MessageUpdateRule]:
-        """Return the rules and the rules that these depend on, without duplicates."""
+        """Return the rules and all rules that they depend on, without duplicates."""
         expanded = []
         for rule in self.filter_rules_unique(rules):
             expanded += [rule, *self.expand_rules(rule.sub_rules)]
@@ -317,7 +317,7 @@ class MessageMigrator:
     # -- the scaffold
 
     def _build(self) -> None:
-        """Link each type's explicit rules, and the last of them to the next type name or the installed class."""
+        """Link each type's explicit rules; link the last of them to the next type name or the installed class."""
         ends = []
         for type_, chain in list(self.rulechains.items()):
             self.rename_map[type_] = self._names_of(type_)
@@ -383,7 +383,7 @@ class MessageMigrator:
             end.next = self._node(end.new_class, None, rule)
 
     def _path_to_nowhere(self, old_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the path for a type that is not installed; the path ends with a rule for the user to write."""
+        """Return the path for a type that is not installed. The path ends with a rule that the user must write."""
         steps = self.scaffold_range(old_class._type, "")
         steps = self._from_start(steps, old_class) or steps
         last = steps[-1].new_class if steps else old_class

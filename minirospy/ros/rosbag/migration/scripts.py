@@ -1,4 +1,4 @@
-"""The programs of ROS's package rosbag that migrate messages: `rosrun rosbag fixbag.py ...`."""
+"""The programs in ROS's package rosbag that migrate messages, run as `rosrun rosbag fixbag.py ...`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["SCRIPTS"]
 
 
 def _with_definition_of_md5sum(connection: Connection) -> Connection:
-    """Return the connection with the definition that its md5sum belongs to, if rules or packages have it."""
+    """Return the connection with the definition that matches its md5sum, if rules or packages contain it."""
     from minirospy.core.idl.load import get_message_class
     from minirospy.introspect.bags import class_of_connection
 
@@ -111,4 +111,4 @@ SCRIPTS: dict[str, Script] = {
     "fixbag_batch.py": _fixbag_batch,
     "makerule.py": _makerule,
 }
-"""The programs by their names."""
+"""The programs by name."""

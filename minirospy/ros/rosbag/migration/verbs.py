@@ -98,7 +98,7 @@ def _check_rule_file(path: str, *, append: bool) -> None:
 
 
 def write_rules(path: str, migrator: MessageMigrator, rules: Sequence[MessageUpdateRule]) -> int:
-    """Write the missing rules to a file for the user to complete; if a type has moved, prompt for its new name."""
+    """Write the missing rules to a file for the user to complete. If a type has moved, prompt for its new name."""
     left = migrator.filter_rules_unique(rules)
     if not left:
         print(f"\nNo additional rule files needed to be generated.  {path} not created.")

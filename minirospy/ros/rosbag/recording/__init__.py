@@ -1,4 +1,4 @@
-"""Recording topics into bags and playing bags: two nodes based on `client/`, and pure code that makes their decisions.
+"""Records topics into bags and plays bags, with two nodes based on `client/`, and pure code that makes their decisions.
 
 `options` and `splits` (which topics to record, into which files) and `schedule` (when to publish which message) are pure;
 `recorder` and `player` are the nodes, `disk` writes files in a thread, `keys` reads single keys from a terminal.
@@ -7,5 +7,5 @@ Source: http://wiki.ros.org/rosbag/Commandline.
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# These modules import ROS 1 messages, but in a sourced ROS 2 its packages of the same names would be found first.
+# These modules import ROS 1 messages. In a sourced ROS 2, its packages of the same names would be found first.
 prefer_ros1()

@@ -1,4 +1,4 @@
-"""One file in a recording: the disk thread writes it as ``NAME.active``, and renames it when it is complete."""
+"""A file in a recording. The disk thread writes it as ``NAME.active``, and renames it when it is complete."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ class FileWriter(Protocol):
 class BagFile:
     """A bag that is being recorded. Call its methods with ``lock`` held.
 
-    ``on_error(file, error, lost)`` is called in the disk thread if the disk or a compression fails. By then the file is
-    readable and has its final name, but lacks ``lost`` messages (-1: the file could not be completed). Raise OSError if the
-    file cannot be created.
+    ``on_error(file, error, lost)`` is called in the disk thread if the disk or a compression fails. By then the file has
+    its final name and is readable, but ``lost`` messages are missing (-1: the file could not be completed). Raise OSError
+    if the file cannot be created.
     """
 
     def __init__(
@@ -149,7 +149,7 @@ class BagFile:
             self._salvage(error)
 
     def _give_up(self, error: Exception) -> None:
-        """Complete the file after its queued writes, because a chunk could not be compressed."""
+        """Complete the file after its queued writes, because compressing a chunk has failed."""
         self._is_closed = True
         self._disk.submit(lambda: self._salvage(error))
 
@@ -157,7 +157,7 @@ class BagFile:
         with self._lock:
             if self._is_closed:
                 return
-            # Stop further writes.
+            # Prevent further writes.
             self._is_closed = True
         self._salvage(error)
 

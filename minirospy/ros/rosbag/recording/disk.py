@@ -1,4 +1,4 @@
-"""Files that a thread writes, so that the caller does not wait for the disk.
+"""Writes files in a thread, so that the caller does not wait for the disk.
 
 :attr:`DiskThread.pending` counts the queued bytes; the caller decides how to limit them.
 """
@@ -65,7 +65,7 @@ class DiskThread:
 class QueuedFile:
     """A new file with the stream methods that a bag's writer needs.
 
-    Calls are queued; a call from the disk thread itself runs immediately.
+    Calls are queued, except that a call from the disk thread runs immediately.
 
     At the first error, ``on_error(error)`` is called in the disk thread, and the file's other queued calls are dropped.
     Raise OSError if the file cannot be created.
@@ -77,7 +77,8 @@ class QueuedFile:
         self._on_error = on_error
         self._position = 0
         self.failed = False
-        # The name contains the time, so an attacker can guess it: open_file follows no symbolic link.
+        # Use open_file, which follows no symbolic links, because an attacker can guess the name, which contains the
+        # time.
         opened = open_file(path, os.O_RDWR | os.O_CREAT | os.O_TRUNC)
         self._file = os.fdopen(opened, "r+b", buffering=0)
 
@@ -95,9 +96,9 @@ class QueuedFile:
         return data
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Seek from the start, or to the end."""
+        """Seek relative to the start or the end of the file."""
         if whence == os.SEEK_END:
-            # No seek is needed: the writer seeks to the header and then back to the end, without writing after that.
+            # Do not seek: the writer seeks to the header and then back to the end, without writing after that.
             return self._position
         self._position = offset
         self._do(lambda: self._file.seek(offset))

@@ -10,7 +10,10 @@ __all__ = ["ReceivedFrame", "frame_class", "parts_of"]
 
 
 class ReceivedFrame(AnyMsg):
-    """A received message of any type: ``frame`` contains its bytes, valid only during the callback unless it is ``bytes``."""
+    """A received message of any type.
+
+    ``frame`` contains its bytes, valid only during the callback unless ``frame`` is ``bytes``.
+    """
 
     __slots__ = ["frame"]
     frame: Buffer
@@ -22,14 +25,14 @@ class ReceivedFrame(AnyMsg):
 
 
 def parts_of(frame: Buffer) -> tuple[Buffer, bytes]:
-    """Return a frame's bytes in two parts; the second is empty unless a large message was received in two parts."""
+    """Return a frame's bytes in two parts; the second part is empty unless a large message was received in two parts."""
     if isinstance(frame, SplitFrame):
-        # A memoryview on the frame contains only the first part.
+        # A memoryview of the frame contains only the first part.
         return memoryview(frame), frame.tail
     return frame, b""
 
 
 def frame_class(type_: str, md5sum: str, definition: str) -> type[AnyMsg]:
-    """Return a message class with this type that is published from its serialized bytes, ``_buff``."""
+    """Return a message class with this type whose messages are published from their serialized bytes, ``_buff``."""
     fields = {"_type": type_, "_md5sum": md5sum, "_full_text": definition, "__slots__": []}
     return type("StoredFrame", (AnyMsg,), fields)

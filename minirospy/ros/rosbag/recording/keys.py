@@ -33,7 +33,7 @@ def read_keys(on_key: Callable[[str], object]) -> Iterator[None]:
     finally:
         stop.set()
         if thread:
-            # The thread restores the terminal before it exits.
+            # Wait for the thread, because it restores the terminal before it exits.
             thread.join(10.0)
 
 
@@ -68,7 +68,7 @@ class _Terminal:
         self._before: list[object] | None = None
 
     def set_up(self) -> bool:
-        """Switch the terminal to single keys. Return False in the background, because a read there would stop the process."""
+        """Switch the terminal to single keys. Return False in the background, because reading there would stop the process."""
         if os.tcgetpgrp(self._number) != os.getpgrp():
             self._before = None
             return False

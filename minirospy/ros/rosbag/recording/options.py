@@ -30,7 +30,7 @@ class RecordOptions(NamedTuple):
     regex: bool = False
     exclude: str = ""
     node: str = ""
-    prefix: str = ""  # file name without .bag, or the part of the name before the date
+    prefix: str = ""  # file name without .bag, or the part of the file name before the date
     append_date: bool = True
     split: bool = False
     max_splits: int = 0
@@ -38,7 +38,7 @@ class RecordOptions(NamedTuple):
     max_duration: int = 0
     buffer_size: int = 256 * MEGABYTE
     chunk_size: int = 768 * KILOBYTE
-    limit: int = 0  # messages per topic
+    limit: int = 0  # maximum number of messages per topic
     min_space: int = 2**30
     min_space_text: str = "1G"
     compression: str = "none"
@@ -49,7 +49,7 @@ class RecordOptions(NamedTuple):
 
     @property
     def follows_master(self) -> bool:
-        """Return whether topics may be added during the recording, so that the master must be queried every second."""
+        """Return whether topics may be added during the recording; if so, the master is queried every second."""
         return self.all_topics or self.regex or bool(self.node)
 
     @property
@@ -87,8 +87,8 @@ def parse_size(text: str) -> int:
 def topic_filter(options: RecordOptions, subscribed_by_node: bool = False) -> Callable[[str], bool]:
     """Return a predicate that tells whether to record a topic, given its global name.
 
-    ``subscribed_by_node``: for topics found by ``--node``, which need not match the expressions. Expressions match whole
-    names. Raise UsageError if an expression is invalid.
+    Expressions must match the whole name. With ``subscribed_by_node``, topics found by ``--node`` need not match any
+    expression. Raise UsageError if an expression is invalid.
     """
     exclude = _compiled(options.exclude) if options.exclude else None
     patterns = [_compiled(topic) for topic in options.topics] if options.regex else []

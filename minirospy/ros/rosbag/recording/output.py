@@ -1,4 +1,4 @@
-"""A player's output: this process's node for `rosbag play`; another output for a player inside a program."""
+"""The output of a player: by default this process's node, for `rosbag play`, or another one for a player in a program."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["CLOCK", "Controls", "NodeOutput", "Output"]
 
 _SECOND = 10**9
-# GIL switch interval in seconds: the reading thread may delay a due message by this
+# GIL switch interval in seconds: the maximum time by which the reading thread may delay a due message
 _SWITCH_SECONDS = 0.00005
 
 _STAMP = struct.Struct("<4xII")  # start of a Header: sequence number (skipped), then the time stamp
@@ -46,22 +46,25 @@ class Controls(Protocol):
 
 
 class Output(Protocol):
-    """The destination of a player's messages. Its methods are called in the player's thread."""
+    """The destination of a player's messages. All methods are called in the player's thread."""
 
     def open(self, player: Controls) -> None:
-        """Stop the player when the connection to the graph shuts down. This method is called first."""
+        """Prepare the output, so that the player ends when the connection to the graph is shut down.
+
+        This method is called first.
+        """
 
     def advertise(self, connections: Sequence[tuple[int, Connection]]) -> None:
-        """Advertise the topics to be played: the connections, each with its bag's number."""
+        """Advertise the topics to be played, given as connections, each with its bag's number."""
 
     def offer(self, player: Controls) -> None:
-        """Offer ways to control the player, such as a service."""
+        """Offer controls for the player, such as a service."""
 
     def has_all_subscribers(self) -> bool:
         """Return whether each topic has a subscriber."""
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """Return the context in which messages are played; while in it, ``on_key`` is called with each typed key."""
+        """Return the context manager within which messages are played; meanwhile, ``on_key`` is called with each typed key."""
 
     def publish(self, number: int, message: StoredMessage) -> None:
         """Publish a message from the bag with this number."""
@@ -77,13 +80,13 @@ class Output(Protocol):
 
 
 class _Outlet:
-    """A recorded publisher. Its messages are sent by one publisher that all recorded publishers of the topic share."""
+    """A recorded publisher. All recorded publishers of a topic share one actual publisher."""
 
     def __init__(self, publisher: client.Publisher[client.AnyMsg], is_latched: bool) -> None:
         self.publisher = publisher
         self.message = publisher.data_class()
         self.is_latched = is_latched
-        self.last: bytes | None = None  # the last message, if latched
+        self.last: bytes | None = None  # the last message, if the publisher is latched
 
     def publish(self, body: bytes) -> None:
         self.message._buff = body
@@ -93,7 +96,7 @@ class _Outlet:
 
 
 class _LateSubscribers(client.SubscribeListener):
-    """Sends the last message of each latched recorded publisher to late subscribers, because a topic stores only one message."""
+    """Sends late subscribers the last message from each latched recorded publisher, because a topic stores only one message."""
 
     def __init__(self) -> None:
         self.outlets: list[_Outlet] = []
@@ -156,7 +159,8 @@ class NodeOutput:
         """Shorten the GIL switch interval, and read keys, while the block runs."""
         interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_SECONDS)
-        # Exclude existing objects from garbage collection: visiting all imported modules takes milliseconds.
+        # Exclude existing objects from garbage collection, because traversing all imported modules takes
+        # milliseconds.
         gc.freeze()
         try:
             with read_keys(on_key):

@@ -25,11 +25,12 @@ from minirospy.ros.rosbag.recording.schedule import PlayOptions, Schedule, Statu
 
 __all__ = ["Phase", "Playback", "PlayerState"]
 
-_LEAD = 10**9 // 500  # ns; delay of the first message, so that starting threads do not make it late
+# ns; delay before the first message, so that it is not late because threads are still starting
+_LEAD = 10**9 // 500
 
 
 class Phase(enum.Enum):
-    """The phase of a playback; the module's text has the transitions."""
+    """The phase of a playback; the module's docstring describes the transitions."""
 
     OPENING = enum.auto()
     READY = enum.auto()
@@ -47,17 +48,18 @@ class PlayerState(NamedTuple):
 
 
 class Playback:
-    """The rules of a playback. Only :meth:`end` is thread-safe: the caller locks the other methods."""
+    """The rules for a playback. Only :meth:`end` is thread-safe: callers of other methods must hold a lock."""
 
     def __init__(self, options: PlayOptions) -> None:
         self.phase = Phase.OPENING
-        self.is_fresh = True  # no message has been published since the start or the last seek
-        self.is_ended = False  # the shutdown was requested: possible in each phase, and set without the lock
-        self.options = options  # control() changes whether it loops and publishes /clock
+        self.is_fresh = True  # True if no message has been published since the start or the last seek
+        # shutdown was requested; this is possible in any phase, and set without the lock
+        self.is_ended = False
+        self.options = options  # control() changes its settings for looping and /clock
         self.seek_to: int | None = None  # the requested bag time, until the reader takes it
         self._span = (0, 0)  # bag times of the first and last message; set in OPENING
-        self._starts_paused = options.paused  # used until PLAYING
-        self._schedule: Schedule | None = None  # None in OPENING
+        self._starts_paused = options.paused  # used before PLAYING
+        self._schedule: Schedule | None = None  # None while OPENING
 
     # --- transitions
 
@@ -66,13 +68,13 @@ class Playback:
         self._span = first, last
 
     def accept_control(self, wall: int) -> None:
-        """Enter READY: from now on seeks and other requests have an effect."""
+        """Enter READY. From now on, seeks and other requests have an effect."""
         self.phase = Phase.READY
-        # A paused schedule: its clock must not advance until playing starts.
+        # Start with a paused schedule, whose clock does not advance until playing starts.
         self._schedule = Schedule(self.options._replace(paused=True), *self._span, wall)
 
     def start(self, wall: int) -> None:
-        """Enter PLAYING, applying the requests made before."""
+        """Enter PLAYING, and apply earlier requests."""
         self.phase = Phase.PLAYING
         if self._schedule is None:
             options = self.options._replace(paused=self._starts_paused)
@@ -81,7 +83,7 @@ class Playback:
             self._schedule.set_paused(False, wall)
 
     def restart(self, wall: int, *, keeps_schedule: bool) -> None:
-        """Return to the first message, for ``--loop``. ``keeps_schedule``: keep the rate, which may have been changed."""
+        """Return to the first message, for ``--loop``. With ``keeps_schedule``, keep the current rate."""
         if keeps_schedule:
             self._running.seek(self._span[0], wall)
         else:
@@ -112,7 +114,7 @@ class Playback:
         is_looping: bool | None = None,
         has_clock: bool | None = None,
     ) -> None:
-        """Pause or resume, set the rate, seek to a bag time, loop, or publish /clock. None leaves a setting as it is.
+        """Pause or resume, set the rate, seek to a bag time, loop, or publish /clock. None leaves a setting unchanged.
 
         Resuming at the end without a seek returns to the first message.
         """
@@ -128,7 +130,7 @@ class Playback:
         if seek is not None:
             self.seek_to = min(max(seek, self._span[0]), self._span[1])
             self.is_fresh = True
-            # state() reports this time until the files have been read from there.
+            # state() reports this time until the files have been read from that position.
             schedule.seek(self.seek_to, wall)
         if is_paused is not None:
             self.set_paused(is_paused, wall)
@@ -147,7 +149,7 @@ class Playback:
         return changed
 
     def press(self, key: str, wall: int) -> None:
-        """Perform the command of a key: space toggles paused, s steps, t toggles the topics to pause at."""
+        """Perform the command for a key: space toggles paused, s steps, t toggles the topics to pause at."""
         if not (schedule := self._schedule):
             return
         if key == " ":
@@ -170,14 +172,14 @@ class Playback:
     # --- messages
 
     def take_seek(self) -> int | None:
-        """Return the requested bag time and forget the request; None if there is none."""
+        """Return the requested bag time and clear the request, or return None if there is none."""
         start, self.seek_to = self.seek_to, None
         return start
 
     def arrive(self, start: int, wall: int) -> None:
-        """Continue at ``start``, where the files have been read, unless another seek has been requested meanwhile."""
+        """Continue at ``start``, from which the files are now read, unless another seek has been requested in the meantime."""
         if self.seek_to is None:
-            # Keep the steps that were requested meanwhile.
+            # Keep the steps that were requested in the meantime.
             self._running.seek(start, wall, keeps_steps=True)
 
     def offer(self, time: int, topic: str, wall: int) -> None:
@@ -192,7 +194,7 @@ class Playback:
         assert schedule
         wait = schedule.poll(wall)
         if wait is None:
-            # Set together with the new time: a client that sees this time counts its steps from here.
+            # Set it together with the new time, because a client that sees this time counts its steps from here.
             self.is_fresh = False
         return wait
 
@@ -220,7 +222,7 @@ class Playback:
 
     @property
     def stays_at_end(self) -> bool:
-        """Return whether there is still nothing to do after the last message."""
+        """Return whether the player must keep waiting after the last message."""
         return not self.is_ended and self.seek_to is None and not self.options.loop
 
     @property

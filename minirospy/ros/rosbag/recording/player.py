@@ -21,15 +21,15 @@ from minirospy.ros.rosbag.recording.sources import Bags, ReadAhead, Selection
 __all__ = ["Player"]
 
 _SECOND = 10**9
-_TICK = _SECOND // 10  # ns; interval of the status line and of shutdown checks
+_TICK = _SECOND // 10  # ns; interval between status lines and between shutdown checks
 
-_STALLED_SECONDS = 5.0  # at the end, give up on a subscriber that has read nothing for this long
+_STALLED_SECONDS = 5.0  # seconds; at the end, give up on a subscriber that has read nothing for this long
 
 
 class Player:
-    """Plays bags on this process's node (init_node has been called), or on another ``output``.
+    """Plays bags through this process's node, or through another ``output``; init_node() must have been called for a node.
 
-    What requests do is decided by a :class:`Playback`, which this class locks, supplies with the time and the messages.
+    A :class:`Playback` decides the effect of requests; this class provides the lock, the time and the messages.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Player:
         returning.
         """
         self.on_change: Callable[[], object] = lambda: None
-        """Called in the player's thread when :meth:`state` changes by itself: after each message, and at the end."""
+        """Called in the player's thread when :meth:`state` changes without a request: after each message, and at the end."""
         self._output = output or NodeOutput(options)
         self._bags = bags
         self._options = options
@@ -56,7 +56,7 @@ class Player:
         self._next_line = 0  # wall time of the next status line
 
     def run(self) -> int:
-        """Play until the end, or until the node shuts down; return the exit status. Raise BagFormatError."""
+        """Play until the end, or until the node shuts down; return the exit status. Raise BagFormatError if a bag is damaged."""
         self._output.open(self)
         options = self._options
         times = self._bags.times()
@@ -79,7 +79,7 @@ class Player:
             with self._lock:
                 self._playback.accept_control(time.perf_counter_ns())
             self._on_ready(first[1].time, last)
-        # From here on only the reading thread uses the files.
+        # From here on, only the reading thread uses the files.
         messages = ReadAhead(self._bags.messages(selection))
         with contextlib.closing(messages):
             self._wait_before(latched)
@@ -101,7 +101,7 @@ class Player:
         is_looping: bool | None = None,
         has_clock: bool | None = None,
     ) -> None:
-        """Pause or resume, set the rate, seek to a time in the bag, loop, or publish /clock. None leaves a setting as it is.
+        """Pause or resume, set the rate, seek to a time in the bag, loop, or publish /clock. None leaves a setting unchanged.
 
         Thread-safe.
         """
@@ -129,7 +129,7 @@ class Player:
 
     @property
     def is_looping(self) -> bool:
-        """Return whether playing restarts at the end."""
+        """Return whether playback restarts when it reaches the end."""
         return self._playback.options.loop
 
     def set_paused(self, paused: bool) -> bool:
@@ -189,7 +189,7 @@ class Player:
                         break
                     self._publish(number, message)
             if not self._playback.is_ended and not self._options.quiet:
-                # Show the final state, even if the last status line was printed a moment ago.
+                # Show the final state, even if a status line has just been printed.
                 self._show_status(time.perf_counter_ns())
             if self._on_ready and not self.is_looping:
                 self._wait_at_end()
@@ -214,7 +214,7 @@ class Player:
             self.on_change()
 
     def _wait_for_slow_subscribers(self) -> None:
-        """Wait while subscribers read the queued messages, which are lost when this process exits."""
+        """Wait until subscribers have read the queued messages, which would be lost when this process exits."""
         left, end = 0, 0.0
         while not self._playback.is_ended and (waiting := self._output.waiting_bytes()):
             now = time.monotonic()
@@ -237,7 +237,7 @@ class Player:
             self._playback.leave_end()
 
     def _read_from(self, start: int, messages: ReadAhead, selection: Selection) -> ReadAhead:
-        """Return the messages from ``start`` on; first publish those that were latched before it."""
+        """Return the messages from ``start`` on, after publishing those that were latched before ``start``."""
         messages.join()
         selection = selection._replace(start=start)
         for number, message in self._bags.last_latched(selection):
@@ -264,7 +264,7 @@ class Player:
                     return False
                 wait = playback.poll(now)
             if wait is None:
-                # When stepping, /clock shows the message's time before the message is published.
+                # When stepping, publish the message's time on /clock before the message.
                 self._tick(now)
                 return True
             now = self._wait.until(min(wait, self._next_line) if not self._options.quiet else wait)

@@ -1,4 +1,4 @@
-"""Waits until a point in time, with microsecond precision; the wait can be interrupted."""
+"""Waits until a given time with microsecond precision; the wait can be interrupted."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from minirospy.base.clock import SignalSafeEvent
 
 __all__ = ["PreciseWait"]
 
-# how close to the deadline to switch from waiting on the event, which is imprecise, to sleeping
+# within this time before the deadline, sleep instead of waiting on the event, which is imprecise
 _EVENT_NS = 5_000_000
 
-_TIMER_SLACK = 29  # Linux's PR_SET_TIMERSLACK: sets how late the kernel may wake a thread; 50 us by default
+# Linux's PR_SET_TIMERSLACK, which sets by how much the kernel may delay a thread's wake-up; by default 50 us
+_TIMER_SLACK = 29
 
 
 class PreciseWait:
@@ -23,7 +24,7 @@ class PreciseWait:
     """
 
     def __init__(self) -> None:
-        # A signal handler may set the event in the thread that waits on it.
+        # Use an event that a signal handler can set in the thread that is waiting on it.
         self._event = SignalSafeEvent()
         self._spin_ns = 150_000
         if sys.platform.startswith("linux"):
@@ -34,7 +35,7 @@ class PreciseWait:
                     self._spin_ns = 40_000
 
     def wake(self) -> None:
-        """Interrupt the current wait, or the next one, if that wait is longer than 5 ms."""
+        """Interrupt the current wait; if it ends within 5 ms, interrupt the next long wait instead."""
         self._event.set()
 
     def until(self, wall: int) -> int:

@@ -1,7 +1,7 @@
 """The node that records topics: `rosbag record`. Messages are written as received, without deserializing.
 
-The workers that receive messages write them into the current chunk; complete chunks are queued for the disk thread. So only
-the disk limits the recording. If the disk is too slow, messages are dropped and counted per topic.
+The workers that receive messages write them into the current chunk; complete chunks are queued for the disk thread.
+Therefore only the disk limits the recording. If the disk is too slow, messages are dropped and counted per topic.
 Source: http://wiki.ros.org/rosbag/Commandline#record.
 """
 
@@ -41,7 +41,7 @@ _PATIENCE_SECONDS = 2.0
 
 
 class _Topic:
-    """A recorded topic: its subscriber, and how many more messages to record (-1: no limit)."""
+    """A recorded topic: its subscriber, and the number of messages left to record (-1: no limit)."""
 
     def __init__(self, name: str, left: int) -> None:
         self.name = name
@@ -93,7 +93,7 @@ class Recorder:
         self._executor = ThreadPoolExecutor(workers) if self.options.compression != "none" else None
         self._disk = DiskThread(self._disk_thread_failed)
         self._splits = Splits(self.options, self._clock())
-        # Complete the file in a thread: Ctrl-C does not interrupt it, and the process exits only after it.
+        # Complete the file in a thread, so that Ctrl-C does not interrupt it, and the process exits only after it.
         finisher = threading.Thread(target=self._finish, name="rosbag-finisher")
         finisher.start()
         is_interrupted = False
@@ -103,7 +103,7 @@ class Recorder:
             if self._file and self._check_space():
                 self._record()
         except KeyboardInterrupt:
-            # This is a second Ctrl-C, or the shutdown has interrupted a registration.
+            # This is a second Ctrl-C, or the shutdown interrupted a registration.
             is_interrupted = True
         finally:
             self._stop.set()
@@ -167,7 +167,7 @@ class Recorder:
         )
 
     def _follow_master(self) -> None:
-        """Subscribe to topics that are new on the master."""
+        """Subscribe to topics that are new at the master."""
         master = current_session().master
         try:
             state = master.get_system_state()
@@ -184,7 +184,10 @@ class Recorder:
                     self._subscribe(name)
 
     def _check_space(self) -> bool:
-        """Warn if the disk is nearly full, and stop recording before it is full; return whether there is space left."""
+        """Return whether there is disk space left.
+
+        Warn if there is little, and stop recording if there is less than the minimum.
+        """
         file, least, text = self._file, self.options.min_space, self.options.min_space_text
         if not file:
             return False
@@ -216,7 +219,7 @@ class Recorder:
             client.logwarn("rosbag record buffer exceeded.  Dropped messages: %s", _counts(new))
 
     def _end_finished(self) -> None:
-        """Unsubscribe from topics that have reached their message limit. Stop when all topics have."""
+        """Unsubscribe from topics that have reached their message limit. Stop when all topics have reached it."""
         for topic in self._topics.values():
             if not topic.left and topic.subscriber:
                 topic.subscriber.unregister()
@@ -233,7 +236,7 @@ class Recorder:
         # Do not join() the thread: on Python 3.10 and 3.11 an interrupted join() marks the thread as finished.
         while not self._finished.is_set():
             try:
-                # Calling is_shutdown() marks this wait as clean-up, which the shutdown does not interrupt.
+                # Call is_shutdown(), which marks this wait as clean-up that the shutdown must not interrupt.
                 client.is_shutdown()
                 if is_interrupted or time.monotonic() > patience:
                     is_interrupted, patience = False, math.inf
@@ -282,7 +285,7 @@ class Recorder:
             return
 
         client.loginfo("Recording to '%s'.", name)
-        # Stamp latched messages with the time of this file's first message, because they are written first.
+        # Give latched messages the time of this file's first message, because they are written first.
         for (topic, _), (header, body, tail) in self._latched.items():
             self._file.write(topic, header, now, body, tail)
         if self._announcement:
@@ -299,7 +302,7 @@ class Recorder:
             file.close()
 
     def _split(self, now: int) -> None:
-        """Continue in the next file if a limit is reached."""
+        """Continue in the next file if a limit has been reached."""
         while self._file:
             action = self._splits.check(self._file.size, now)
             if action is Next.CONTINUE:
@@ -334,7 +337,8 @@ class Recorder:
             most = self.options.buffer_size
             size = len(body) + len(tail)
             if most and self._waiting(self._file) + size > most:
-                # Free memory: otherwise, compressed chunks are written only when the next message arrives.
+                # Write compressed chunks now to free memory; otherwise, they are written only when the next message
+                # arrives.
                 self._file.write_ready()
                 if (waiting := self._waiting(self._file)) and waiting + size > most:
                     self.dropped[topic.name] += 1

@@ -1,4 +1,4 @@
-"""The timing of `rosbag play`: when to publish each message, and which time /clock shows. Pure: wall times are arguments.
+"""The timing of `rosbag play`: computes when to publish each message, and the time for /clock. Pure: wall times are arguments.
 
 All times are integers in nanoseconds: either bag time, or wall time from any monotonic clock.
 Source: http://wiki.ros.org/rosbag/Commandline#play.
@@ -54,11 +54,11 @@ class Status(NamedTuple):
     time: int
     played: int
     length: int
-    delay: int  # delay of the rate control topic; used in state DELAYED
+    delay: int  # how far the rate control topic lags; used in state DELAYED
 
 
 class Schedule:
-    """Decides when to publish each message.
+    """Computes when to publish each message.
 
     ``offer`` a message, call ``poll`` until it returns None, then publish the message.
     """
@@ -175,7 +175,7 @@ class Schedule:
         return True
 
     def step(self) -> None:
-        """If paused, make the current message due now, or the next one to be offered."""
+        """If paused, make the current message due now, or if there is none, the next one to be offered."""
         if self._paused:
             self._steps += 1
 
@@ -192,7 +192,7 @@ class Schedule:
         if not self._period or wall < self._next_tick:
             return None
         self._advance(wall)
-        # Skip the messages for the time while the process was suspended, instead of publishing them in a burst.
+        # Skip the messages that were due while the process was suspended, instead of publishing them in a burst.
         self._next_tick = max(self._next_tick + self._period, wall)
         return self._clock
 

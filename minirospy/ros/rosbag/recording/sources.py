@@ -1,7 +1,4 @@
-"""Reads messages from several bags in time order; a thread reads them ahead.
-
-Therefore neither reading nor decompressing delays a message that is due.
-"""
+"""Reads messages from several bags in time order. A thread reads ahead, so that reading does not delay due messages."""
 
 from __future__ import annotations
 
@@ -111,7 +108,7 @@ def open_reader(path: Path, opened: ExitStack) -> BagReader:
 
 
 class ReadAhead:
-    """Iterates over messages that a thread reads ahead, some thousands at most. Iterate once, then close."""
+    """Iterates over messages that a thread reads ahead, up to a few thousand. Iterate once, then close."""
 
     def __init__(self, messages: Iterator[tuple[int, StoredMessage]]) -> None:
         self._ready: queue.Queue[list[tuple[int, StoredMessage]] | Exception | None] = queue.Queue(_BATCHES)
@@ -123,7 +120,7 @@ class ReadAhead:
         self._thread.start()
 
     def __iter__(self) -> Iterator[tuple[int, StoredMessage]]:
-        """Yield the messages; re-raise an exception that reading them raised."""
+        """Yield the messages; re-raise any exception that occurred while reading them."""
         while (item := self._ready.get()) is not None:
             if isinstance(item, Exception):
                 raise item
@@ -134,7 +131,7 @@ class ReadAhead:
         self._first.wait()
 
     def close(self) -> None:
-        """Request the thread to stop."""
+        """Tell the thread to stop."""
         self._stop.set()
 
     def join(self) -> None:
@@ -186,7 +183,7 @@ def _last_time(reader: BagReader, selection: Selection) -> int:
     wanted = _wanted(reader, selection)
     end = selection.end
     found = {chunk.start_time for chunk in reader.chunks if end is None or chunk.start_time <= end}
-    # A bag without chunks has no chunk start times, so read all its messages.
+    # A bag without chunks has no chunk start times, so all its messages must be read.
     starts: list[int | None] = [*sorted(found, reverse=True)] or [selection.start]
     for start in starts:
         newest = deque(reader.messages(wanted, start, end), maxlen=1) if wanted else ()

@@ -1,4 +1,4 @@
-"""Splits a recording: decides when the next file starts, how the files are named, and which of them to delete. Pure."""
+"""Splits a recording into files: decides when to start the next file, how to name it, and which files to delete. Pure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from minirospy.ros.rosbag.recording.options import RecordOptions
 __all__ = ["Next", "Splits", "file_name"]
 
 
-_MAX_EMPTY = 100  # maximum number of empty files written after a long silence, as in ROS
+_MAX_EMPTY = 100  # maximum number of empty files to write after a long time without messages, as in ROS
 
 
 class Next(enum.Enum):
@@ -22,7 +22,7 @@ class Next(enum.Enum):
 
 
 class Splits:
-    """The files in a recording that started at ``start``; times are ROS times in nanoseconds."""
+    """The files in a recording that started at ``start``. Times are ROS times in nanoseconds."""
 
     def __init__(self, options: RecordOptions, start: int) -> None:
         self._options = options
@@ -33,7 +33,7 @@ class Splits:
     def check(self, size: int, now: int) -> Next:
         """Return the action for a file with ``size`` bytes.
 
-        After SPLIT, call this method again: several splits may be due after a silence.
+        After SPLIT, call this method again, because several splits may be due after a time without messages.
         """
         options = self._options
         if options.max_size and size > options.max_size:
@@ -52,7 +52,7 @@ class Splits:
         if not self._options.max_splits:
             return []
         self._kept.append(name)
-        # The list does not contain the file that is being written.
+        # The list does not contain the file that is currently being written.
         surplus = len(self._kept) - self._options.max_splits
         removed, self._kept = self._kept[: max(0, surplus)], self._kept[max(0, surplus) :]
         return removed
@@ -62,7 +62,7 @@ class Splits:
 
 
 def file_name(options: RecordOptions, count: int, now: float) -> str:
-    """Return the name of file number ``count``, opened at ``now``: seconds since 1970, formatted as local time."""
+    """Return the name of file number ``count``. ``now`` (seconds since 1970) is the time at which it is opened."""
     parts = [options.prefix.removesuffix(options.extension)] if options.prefix else []
     if options.append_date:
         parts.append(time.strftime("%Y-%m-%d-%H-%M-%S", time.localtime(now)))

@@ -72,7 +72,7 @@ __all__ = [
     "found_lz4",
 ]
 
-found_lz4 = True  # whether LZ4 is available; programs check this name
+found_lz4 = True  # set if LZ4 is available; programs check this name
 
 
 class Compression:
@@ -89,26 +89,26 @@ TypesAndTopicsTuple = namedtuple("TypesAndTopicsTuple", ["msg_types", "topics"])
 
 
 class _Pieces(list[bytes]):
-    """The buffer into which a message's ``serialize`` writes."""
+    """A buffer to which a message's ``serialize`` writes."""
 
     __slots__ = ()
     write = list.append
 
 
 class Options(TypedDict, total=False):
-    """The compression and size for chunks that are written from now on."""
+    """The compression and size of the chunks that will be written."""
 
     compression: str
     chunk_threshold: int
 
 
 class Bag(OpenedBag):
-    """A bag that is read, written or appended to.
+    """A bag that is open for reading, writing or appending.
 
     ``f`` is a path or an open binary file, which close() closes; ``mode`` is r, w or a; ``chunk_threshold`` is in bytes.
     ``allow_unindexed``: open a bag that was not closed, so that reindex() can be called. ``options`` may contain compression
-    and chunk_threshold. ``skip_index``: the info text shows no rates. Raise ValueError if an argument is invalid,
-    ROSBagException if the bag is, OSError if the file cannot be opened.
+    and chunk_threshold. ``skip_index``: show no rates in the info text. Raise ValueError if an argument is invalid,
+    ROSBagException if the bag is invalid, OSError if the file cannot be opened.
     """
 
     def __init__(
@@ -142,7 +142,7 @@ class Bag(OpenedBag):
             with as_ros_errors():
                 opening[mode](f, allow_unindexed)
             self._create_reader()
-            # minirospy reads the index on demand, but a program's subclass may read it now, to show the progress.
+            # minirospy reads the index on demand, but a program's subclass may read it now to show the progress.
             if mode == "r" and not skip_index and isinstance(self._reader, _BagReader200):
                 self._reader.prepare()
             self._connection_indexes_read = not skip_index
@@ -288,7 +288,8 @@ class Bag(OpenedBag):
             body = pieces[0] if len(pieces) == 1 else b"".join(pieces)
             md5sum = msg._md5sum
         if type(body) is not bytes:
-            # Raise an error for an unsuitable body before part of it is written to the chunk.
+            # Convert the body first, so that an unsuitable one raises an error before part of it is written to the
+            # chunk.
             body = body.encode() if isinstance(body, str) else bytes(memoryview(body))
 
         number = self._written.get((topic, md5sum))
@@ -394,7 +395,7 @@ class Bag(OpenedBag):
         return info.as_text(self._summary(frequencies=not self._skip_index))
 
     def _get_yaml_info(self, key: str | None = None) -> str | None:
-        """Return the info as YAML, or the value for a key such as ``topics[0].type``; None if there is no such key."""
+        """Return the info as YAML, or the value for a key such as ``topics[0].type``, or None if there is no such key."""
         text = info.as_yaml(self._summary(frequencies=not self._skip_index))
         if not key:
             return text
@@ -432,7 +433,7 @@ class Bag(OpenedBag):
                     kind = kinds[rank]
                     if kind is None:
                         kind = kinds[rank] = _get_message_type(connection)
-                    # Create the message without calling its constructor, which is slow: deserialize sets every field.
+                    # Create the message without its constructor, which is slow; deserialize() sets every field.
                     if raw:
                         position = at if chunk is None else (chunk, at)
                         message = connection.datatype, data[body:after], connection.md5sum, position, kind
@@ -451,7 +452,7 @@ class Bag(OpenedBag):
             raise_as_ros(error)
 
     def _summary(self, *, frequencies: bool) -> info.Summary:
-        # The real module still has the data in memory after close(); minirospy opens the bag again.
+        # The real module still has the data in memory after close(), so open the bag again here.
         if self._file is None and self._filename is not None:
             with Bag(self._filename, skip_index=True) as bag:
                 return bag._summary(frequencies=frequencies)

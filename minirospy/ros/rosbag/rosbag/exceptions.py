@@ -1,4 +1,4 @@
-"""rosbag's exceptions, and the conversion from minirospy's bag errors to them."""
+"""rosbag's exceptions, and the conversion of minirospy's bag errors to them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The private parts of rosbag.bag: records as objects, which rqt_bag and other programs access by their private names."""
+"""The private parts of rosbag.bag: records as objects, which rqt_bag and other programs use."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def make_time() -> Callable[[int], Time]:
 
 
 class _ConnectionInfo:
-    """A connection: ``id``, ``topic``, the header's fields, and ``header`` itself."""
+    """A connection: ``id``, ``topic``, the header's fields, and the ``header``."""
 
     def __init__(self, id: int, topic: str, header: Header) -> None:
         fields = {
@@ -117,7 +117,7 @@ class _ChunkHeader:
 
 
 class _IndexEntry:
-    """A message's time and position; entries compare by time. ``chunk_pos`` is None in version 1.2 bags."""
+    """A message's time and position. Entries compare by time. ``chunk_pos`` is None for version 1.2 bags."""
 
     __slots__ = ["chunk_pos", "offset", "time"]
 
@@ -177,7 +177,7 @@ class _Index(Sequence[_IndexEntry]):
 
 
 _message_types: dict[str, type[Message]] = {}
-"""Message classes by md5sum; rosbag has a dict with this name."""
+"""Message classes by md5sum; the dict has the same name in ROS's rosbag."""
 
 
 def _get_message_type(info: _ConnectionInfo) -> type[Message]:

@@ -43,7 +43,7 @@ __all__ = [
 
 
 def checkbag(migrator: MessageMigrator, inbag: str) -> list[Migration]:
-    """Return the path for each type in a bag that needs migration, and its missing rules.
+    """Return, for each type in a bag that needs migration, its path and the missing rules.
 
     Raise ROSBagException if the bag cannot be read.
     """
@@ -52,12 +52,12 @@ def checkbag(migrator: MessageMigrator, inbag: str) -> list[Migration]:
 
 
 def checkmessages(migrator: MessageMigrator, messages: Iterable[type[Message]]) -> list[Migration]:
-    """Return the path for each message class that needs migration, and its missing rules."""
+    """Return, for each message class that needs migration, its path and the missing rules."""
     return check_classes(migrator, messages)
 
 
 def fixbag(migrator: MessageMigrator, inbag: str, outbag: str) -> bool:
-    """Write a bag with its messages migrated; return whether all could be migrated.
+    """Write a bag with its messages migrated; return whether all messages could be migrated.
 
     Raise ROSBagException if the bag cannot be read.
     """

@@ -1,4 +1,4 @@
-"""The file behind a rosbag.Bag, opened to read, write or append, and its reader and writer."""
+"""The base class of rosbag.Bag, which opens a file to read, write or append, and creates its reader and writer."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class OpenedBag(PrivateBag):
         self._version: int | None = None
         self._mode = mode
         self._source: BagReader | None = None
-        """The file's reader. It is not named ``_reader``, because programs may replace that attribute of the real module."""
+        """The file's reader. It is not named ``_reader``, because programs may replace the attribute of that name."""
         self._writer: BagWriter | None = None
-        self._is_read = False  # whether a read may have moved the file's position since the last write
+        self._is_read = False  # set if a read may have moved the file's position since the last write
 
     def _current(self) -> BagReader:
         """Return the reader, which also has the connections and chunks written so far."""

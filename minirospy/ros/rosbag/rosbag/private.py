@@ -1,4 +1,4 @@
-"""The names in rosbag.Bag that are private in the real module but used by rqt_bag and other programs."""
+"""The names in rosbag.Bag that are private in the real module, but used by rqt_bag and other programs."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class BagMessage(NamedTuple):
 
 
 class BagMessageWithConnectionHeader(NamedTuple):
-    """A message, and its publisher's connection header."""
+    """A message together with its publisher's connection header."""
 
     topic: str
     message: object
@@ -54,11 +54,11 @@ class PrivateBag(ABC):
 
     _connection_indexes_read = False  # True once the index has been read, or if it is read on demand
     _chunks_of_program: Iterable[_ChunkInfo] | None = None
-    """The list of chunks that a program has set in place of the bag's own, or None."""
+    """The list of chunks that a program has set in place of the bag's own; None if it has not."""
 
     @abstractmethod
     def _current(self) -> BagReader:
-        """Return the reader, which also has the connections and chunks written so far."""
+        """Return the reader, which also covers the connections and chunks written so far."""
 
     @abstractmethod
     def flush(self) -> None:
@@ -197,7 +197,7 @@ class PrivateBag(ABC):
 
 
 def nanoseconds_of(stamp: Time | None) -> int | None:
-    """Return a time limit in nanoseconds, or None for time 0, as in the real module.
+    """Return a time limit in nanoseconds, or None for time 0, as the real module does.
 
     Raise TypeError if it is not a rospy.Time.
     """

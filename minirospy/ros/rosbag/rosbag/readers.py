@@ -1,4 +1,4 @@
-"""The classes used for rosbag.Bag's ``_reader``: programs use them to read single messages, or to show the indexing progress."""
+"""The classes of rosbag.Bag's ``_reader``, which programs use to read single messages or show the indexing progress."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class _BagReader200(_BagReader):
     """The reader for a version 2.0 bag."""
 
     def prepare(self) -> None:
-        """If a subclass overrides how the index is read, read it now."""
+        """Read the index now if a subclass overrides how it is read."""
         if type(self)._read_connection_index_records is not _BagReader200._read_connection_index_records:
             self._read_connection_index_records()
 

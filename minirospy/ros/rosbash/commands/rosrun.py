@@ -38,14 +38,14 @@ _NO_EXECUTABLE = 3
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return the program's exit status, or one defined in minirospy.command.command if it cannot be run."""
     words = list(sys.argv[1:] if argv is None else argv)
-    # The program decides how to handle signals.
+    # Do not handle interrupts, because the program decides how to handle signals.
     return run("rosrun", lambda: _rosrun(words), heeds_interrupts=False)
 
 
 def _rosrun(words: list[str]) -> int:
     prefix: list[str] = []
     debug = False
-    # Parse by hand: words after EXECUTABLE belong to the program, even if they look like options for rosrun.
+    # Parse by hand, because words after EXECUTABLE belong to the program, even if they look like options for rosrun.
     while words and words[0].startswith("-"):
         option, equals, value = words.pop(0).partition("=")
         if option in ("-h", "--help"):
@@ -142,7 +142,7 @@ def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> 
 def become(command: list[str]) -> int:
     """Replace this process by the program, which then receives its signals and determines its exit status."""
     if sys.platform == "win32":
-        # On Windows, exec detaches the program from the console: wait for it instead, and leave Ctrl-C to it.
+        # On Windows, exec detaches the program from the console, so wait for it instead, and let it handle Ctrl-C.
         try:
             with guard_children(), subprocess.Popen(command) as popen:
                 while True:

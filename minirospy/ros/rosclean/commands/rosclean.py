@@ -1,7 +1,7 @@
 """rosclean: show the disk usage of log files, and remove them.
 
-Source: http://wiki.ros.org/rosclean. The output is identical to that of ROS; sizes are counted in disk blocks, as du does. If
-the prompt gets no reply (no terminal, an empty pipe), nothing is removed.
+Source: http://wiki.ros.org/rosclean. The output is identical to that of ROS; sizes are counted in disk blocks, as du
+does. If there is no reply to the prompt (no terminal, or an empty pipe), nothing is removed.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def _agreed(command: str) -> bool:
 
 
 def _remove_oldest(folder: Path, excess: int) -> None:
-    """Remove entries in a folder, oldest modification first, until ``excess`` bytes have been removed."""
+    """Remove entries in a folder, starting with the oldest, until ``excess`` bytes have been removed."""
     entries = [path for path in folder.iterdir() if not path.is_symlink()]
     for path in sorted(entries, key=lambda path: path.stat().st_mtime):
         if excess <= 0:
@@ -150,7 +150,7 @@ def disk_usage(folder: Path) -> int:
 
 
 def human_size(size: float) -> str:
-    """Return a size as `du -h` prints it: 4.0K, 11M; rounded up."""
+    """Return a size as `du -h` prints it, rounded up: 4.0K, 11M."""
     if size < 1024:
         return f"{size:.0f}"
     for unit in "KMGT":

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["FAMILY", "main"]
 
-_LEVELS = {name.lower(): level for level, name in LEVEL_NAMES.items()}  # name -> level in rosgraph_msgs/Log
+# levels in rosgraph_msgs/Log by name
+_LEVELS = {name.lower(): level for level, name in LEVEL_NAMES.items()}
 
 _COLOURS = {"debug": 92, "info": 97, "warn": 93, "error": 91, "fatal": 95}
 
@@ -173,4 +174,5 @@ FAMILY = Family(
     ),
     "Type rosconsole <command> -h for more detailed usage, e.g. 'rosconsole list -h'",
     is_node=True,
+    wording={},
 )

@@ -1,9 +1,9 @@
 """rosdep: list the dependencies of packages that are not available here, and how to install them.
 
-Tutorials use `rosdep install --from-paths src --ignore-src -r -y`. ROS's rosdep queries a database on the network and runs
-the system's package manager. This one downloads and installs nothing: minirospy provides ROS's packages; for any other
-missing dependency it prints the command that installs it.
-Source: http://docs.ros.org/en/independent/api/rosdep/html/commands.html.
+Tutorials use `rosdep install --from-paths src --ignore-src -r -y`. ROS's rosdep queries a database on the network and
+runs the system's package manager. This command downloads and installs nothing, because minirospy provides ROS's packages.
+For any other missing dependency, it prints the command that installs it. Source:
+http://docs.ros.org/en/independent/api/rosdep/html/commands.html.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _PYTHON_PACKAGES: dict[str, tuple[str, str]] = {
     "yaml": ("yaml", "PyYAML"),
     "zmq": ("zmq", "pyzmq"),
 }
-"""Name in a rosdep key -> (module, name on PyPI), if they differ from the name in the key."""
+"""Python packages in rosdep keys whose module or PyPI name differs from the name in the key, as (module, PyPI name)."""
 _TOOLS = frozenset(
     """
     cmake python python3 python-catkin-pkg python3-catkin-pkg python3-catkin-pkg-modules python-catkin-tools
@@ -101,8 +101,7 @@ def _missing(
     """Return the missing keys, each with the packages that depend on it.
 
     Raise NotFoundError if a package does not exist, ManifestError if its manifest is invalid, UsageError if no package is
-    given
-    or a folder does not exist.
+    given or a folder does not exist.
     """
     from minirospy.workspace.build import PROVIDED
     from minirospy.workspace.manifest import Kind, read_manifest
@@ -148,7 +147,7 @@ def _is_installed(key: str) -> bool:
 
 
 def _says(keys: dict[str, list[str]]) -> Iterator[str]:
-    """Yield a line for each key: the packages that depend on it, and how to install it."""
+    """Yield a line for each key, with the packages that depend on it and how to install it."""
     for key, packages in keys.items():
         module = _module(key)
         how = install_command(module[1]) if module else "no package of Python or of ROS here"

@@ -1,4 +1,4 @@
-"""rosgraph: print which nodes publish to which, and the services; repeat every second until Ctrl-C.
+"""rosgraph: print which nodes publish to which others, and the services, every second until Ctrl-C.
 
 Source: http://wiki.ros.org/rosgraph. The output is identical to that of ROS, with sorted names. All data comes from the
 master, so a node that hangs causes no delay.
@@ -37,7 +37,7 @@ Usage:
 
 
 class _RosgraphParser(Parser):
-    """Prints ROS's help before this command's own, and also on a usage error, as ROS does."""
+    """Prints ROS's help before its own help, and also on a usage error, as ROS does."""
 
     def format_help(self) -> str:
         return _ROS_HELP + super().format_help()
@@ -78,7 +78,13 @@ def _text(nodes: dict[str, Neighbours], services: Sequence[str]) -> str:
     return "\n".join([*lines, ""])
 
 
-COMMAND = Command("rosgraph", _parser, _rosgraph, wording={"master": NO_MASTER}, misuse_status=_MISUSE)
+COMMAND = Command(
+    "rosgraph",
+    _parser,
+    _rosgraph,
+    wording={"master": NO_MASTER._replace(status=0)},
+    misuse_status=_MISUSE,
+)
 
 if __name__ == "__main__":
     sys.exit(main())

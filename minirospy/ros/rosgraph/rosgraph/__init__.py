@@ -1,11 +1,8 @@
-"""rosgraph: the Master API, names and the environment, for Python programs."""
+"""rosgraph: the Master API, graph names and environment variables, for Python programs."""
 
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
-
-from minirospy.base.names import parse_arguments
-from minirospy.ros.submodules import on_first_use
 
 if TYPE_CHECKING:
     from minirospy.ros.rosgraph.rosgraph import masterapi as masterapi
@@ -38,9 +35,10 @@ __all__ = [
     "myargv",
 ]
 
-__getattr__ = on_first_use("rosgraph", "roslogging", "xmlrpc")
-
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:
-    """Return the command line without remappings and private parameters, as `rospy.myargv` does."""
-    return parse_arguments(sys.argv if argv is None else argv).plain
+    """Return the command line without each argument that contains ``:=``.
+
+    `rospy.myargv` keeps those that do not start with a name.
+    """
+    return [argument for argument in (sys.argv if argv is None else argv) if ":=" not in argument]

@@ -1,4 +1,4 @@
-"""This machine's addresses, and connection headers, as in ROS's rosgraph.network.
+"""Functions for this machine's addresses and for connection headers, as in ROS's rosgraph.network.
 
 Source: http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/TCPROS.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import socket
 import struct
+import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -46,15 +47,28 @@ class ROSHandshakeException(Exception):
 
 
 def get_address_override() -> str | None:
-    """Return ROS_HOSTNAME, or ROS_IP, or None if neither is set. With MINIROSPY_LOCAL=1 return localhost."""
+    """Return the command line's ``__hostname:=`` or ``__ip:=``, or ROS_HOSTNAME, or ROS_IP, or None if none is set.
+
+    With MINIROSPY_LOCAL=1 return localhost. Programs append to sys.argv and set variables at any time, so both are read at
+    each call. Raise ValueError if the argument contains a second ``:=``.
+    """
     if is_local(os.environ):
         return "localhost"
+    for argument in sys.argv:
+        if argument.startswith(("__hostname:=", "__ip:=")):
+            if argument.count(":=") > 1:
+                raise ValueError(f"invalid ROS command-line remapping argument '{argument}'")
+            return argument.partition(":=")[2]
     return os.environ.get(ROS_HOSTNAME) or os.environ.get(ROS_IP) or None
 
 
 def get_host_name() -> str:
     """Return the host name at which other nodes reach this machine."""
-    return Environment.read().host
+    return _environment().host
+
+
+def _environment() -> Environment:
+    return Environment.read(host=get_address_override() or "")
 
 
 def get_local_address() -> str:
@@ -93,13 +107,13 @@ def use_ipv6() -> bool:
 
 
 def get_bind_address(address: str | None = None) -> str:
-    """Return the address to which servers bind."""
-    return (Environment.read(host=address) if address else Environment.read()).bind_host
+    """Return the address that servers should bind to."""
+    return (Environment.read(host=address) if address else _environment()).bind_host
 
 
 def create_local_xmlrpc_uri(port: int) -> str:
     """Return the XML-RPC URI for a server on this machine."""
-    return f"http://{Environment.read().uri_host}:{port}/"
+    return f"http://{_environment().uri_host}:{port}/"
 
 
 def parse_http_host_and_port(url: str) -> tuple[str, int]:

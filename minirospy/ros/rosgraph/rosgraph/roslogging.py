@@ -1,4 +1,4 @@
-"""rosgraph.roslogging: the names used in logging configuration files, and by programs that subclass its classes."""
+"""rosgraph.roslogging: the names used in logging configuration files, and in programs that subclass its classes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class LoggingException(Exception):
 
 
 class RospyLogger(logging.Logger):
-    """rospy's logger class. minirospy finds a call's line without it; the class exists for programs that patch it."""
+    """rospy's logger class. minirospy does not need it to find a call's line, but programs patch it."""
 
 
 def configure_logging(
@@ -48,7 +48,7 @@ def configure_logging(
     return str(path)
 
 
-# These are private names in ROS's module that programs read and change.
+# Programs read and change these private names of ROS's module.
 _color_reset = "\033[0m"
 _logging_to_rospy_names = {
     "DEBUG": ("DEBUG", "\033[32m"),

@@ -5,6 +5,7 @@ It is based on Python's xmlrpc; minirospy's own nodes do not use it.
 
 from __future__ import annotations
 
+import errno
 import logging
 import threading
 from collections.abc import Callable
@@ -46,6 +47,25 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
 
     def __init__(self, addr: tuple[str, int], log_requests: int = 1) -> None:
         super().__init__(addr, SilenceableXMLRPCRequestHandler, bool(log_requests))
+        self._serving = threading.Lock()
+        self._is_serving = False  # shutdown() would wait forever if serve_forever() was never called
+        self._is_closed = False
+
+    def serve_forever(self, poll_interval: float = 0.5) -> None:
+        """Handle requests until :meth:`close` is called; return immediately if it was called before."""
+        with self._serving:
+            if self._is_closed:
+                return
+            self._is_serving = True
+        super().serve_forever(poll_interval)
+
+    def close(self) -> None:
+        """Stop handling requests, and close the socket."""
+        with self._serving:
+            self._is_closed = True
+        if self._is_serving:
+            self.shutdown()
+        self.server_close()
 
     def handle_error(self, request: object, client_address: object) -> None:
         """Log an error, such as a disconnected peer, at debug level only."""
@@ -53,7 +73,7 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
 
 
 class XmlRpcHandler:
-    """The base class for the methods served by an :class:`XmlRpcNode`; names with a leading underscore are not served."""
+    """The base class for objects whose methods an :class:`XmlRpcNode` serves, except names with a leading underscore."""
 
     def _ready(self, uri: str) -> None:
         """Handle the server's start at ``uri``; subclasses override this method."""
@@ -86,9 +106,9 @@ class XmlRpcNode:
         if self.is_shutdown:
             return
         self.is_shutdown = True
-        if self.server is not None:
-            self.server.shutdown()
-            self.server.server_close()
+        server, self.server = self.server, None
+        if server is not None:
+            server.close()
         if isinstance(self.handler, XmlRpcHandler):
             self.handler._shutdown(reason)
 
@@ -97,21 +117,44 @@ class XmlRpcNode:
         threading.Thread(target=self.run, daemon=True).start()
 
     def set_uri(self, uri: str) -> None:
-        """Set the URI, replacing the one derived from the environment."""
+        """Set the node's URI; the server calls this when it starts."""
         self.uri = uri
 
     def run(self) -> None:
         """Run the server in the calling thread until :meth:`shutdown` is called."""
         try:
-            self.server = ThreadingXMLRPCServer((get_bind_address(), int(self.port or 0)), log_requests=False)
-            self.port = self.server.server_address[1]
-            self.set_uri(self.uri or create_local_xmlrpc_uri(self.port))
-            self.server.register_multicall_functions()
-            self.server.register_instance(self.handler)
-            if isinstance(self.handler, XmlRpcHandler):
-                self.handler._ready(str(self.uri))
-            self.server.serve_forever(poll_interval=0.1)
+            self._run()
         except Exception as error:  # reported through ``on_run_error``
             if self.on_run_error is None:
                 raise
             self.on_run_error(error)
+
+    def _run(self) -> None:
+        """Start the server and handle requests; subclasses override this to do something before or after."""
+        self._run_init()
+        if self.server is not None:
+            self.server.serve_forever(poll_interval=0.1)
+
+    def _run_init(self) -> None:
+        """Start the server and set ``uri``, without handling requests. Raise OSError if the port is not available."""
+        address, port = get_bind_address(), int(self.port or 0)
+        _log.info("XML-RPC server binding to %s:%d", address, port)
+        try:
+            server = self.server = ThreadingXMLRPCServer((address, port), log_requests=False)
+        except OSError as error:
+            why = f": {error.strerror}"
+            if error.errno == errno.EADDRINUSE:
+                why = f", port {port} is already in use"
+            text = f"ERROR: Unable to start XML-RPC server{why}"
+            _log.error(text)
+            print(text)
+            raise
+
+        self.port = server.server_address[1]
+        self.set_uri(create_local_xmlrpc_uri(self.port))
+        _log.info("Started XML-RPC server [%s]", self.uri)
+        server.register_multicall_functions()
+        server.register_instance(self.handler)
+        if isinstance(self.handler, XmlRpcHandler):
+            self.handler._ready(str(self.uri))
+        _log.info("xml rpc node: starting XML-RPC server")

@@ -38,7 +38,7 @@ class LaunchOptions(NamedTuple):
 
     what: list[str]
     args: dict[str, str]
-    """Name -> value of each ``name:=value``."""
+    """The value for each ``name:=value`` on the command line, by name."""
     nodes: bool
     files: bool
     find_node: str | None
@@ -70,7 +70,7 @@ class LaunchOptions(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return the exit status as in minirospy.command.command, or 1 if a required node failed."""
+    """Run the command; return 1 if a required node failed, otherwise an exit status as in minirospy.command.command."""
     return COMMAND.main(argv)
 
 
@@ -297,7 +297,7 @@ def _seconds(text: str) -> float:
 
 
 def _warn_of_unknown(args: Iterable[str], spec: LaunchSpec) -> None:
-    """Warn about arguments that no file declares: real roslaunch ignores them, but most are typing errors."""
+    """Warn about arguments that no file declares. Real roslaunch ignores them, but most are typos."""
     for name in args:
         if name not in spec.args:
             warn(_unknown(name, spec))
@@ -379,7 +379,7 @@ _SHOWS: dict[str, Callable[[LaunchSpec, str, Packages], None]] = {
     "dump_params": _show_params,
     "node_args": _show_command,
 }
-"""If several of these options are given, the first one in this table applies."""
+"""The options that print information, with their functions. If several are given, the first one in this table applies."""
 
 COMMAND = Command("roslaunch", _parser, with_options(LaunchOptions, _roslaunch))
 

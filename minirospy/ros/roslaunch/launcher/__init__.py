@@ -1,1 +1,1 @@
-"""roslaunch: turns launch files into running nodes."""
+"""roslaunch: loads launch files and runs their nodes."""

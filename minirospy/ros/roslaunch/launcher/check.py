@@ -1,4 +1,4 @@
-"""Errors in launch files, found without running the nodes."""
+"""Finds errors in launch files without running their nodes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["faults_of", "find_problems", "problem_line"]
 
 
 def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[LaunchSpec, Problems]:
-    """Return the files' spec, and all problems: errors in the files, missing programs, undeclared machines."""
+    """Return the files' spec and all problems: errors in the files, missing programs, and undeclared machines."""
     problems: Problems = []
     spec = load_sources(sources, packages, problems=problems)
     for node in spec.runnables():
@@ -29,7 +29,7 @@ def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[
 def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False) -> Problems:
     """Return a launch file's errors.
 
-    With ``ignore_unset_args``, return none if an arg has no value, because the missing value may cause the other errors.
+    With ``ignore_unset_args``, return no errors if an arg has no value, because the missing value may cause other errors.
     """
     _, problems = find_problems([LaunchSource(file, None, {})], packages)
     is_unset = any(problem.text.startswith("requires the '") for problem in problems)

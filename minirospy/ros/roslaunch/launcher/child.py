@@ -1,4 +1,4 @@
-"""The roslaunch process on another machine: ssh starts it, it runs the nodes that its parent sends, and exits with its parent.
+"""The roslaunch process on another machine, started through ssh. It runs the nodes that its parent sends.
 
 Source: http://wiki.ros.org/roslaunch/Architecture.
 """
@@ -75,7 +75,7 @@ class _Child(Launcher):
         }
 
     def look_after_parent(self, done: threading.Event) -> None:
-        """Poll the parent; stop the run if the parent no longer responds."""
+        """Poll the parent regularly, and stop the run if the parent no longer responds."""
         missed = 0
         while not done.wait(_HEARTBEAT_SECONDS):
             try:

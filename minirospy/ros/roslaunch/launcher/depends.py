@@ -1,4 +1,4 @@
-"""The dependencies of launch files: nodes, files and packages, and the packages that package.xml does not declare.
+"""Finds the dependencies of launch files: nodes, files and packages, and packages missing in package.xml.
 
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-deps.
 """
@@ -19,7 +19,7 @@ __all__ = ["FileNeeds", "file_needs", "missing_declarations", "package_of"]
 
 
 class FileNeeds(NamedTuple):
-    """The dependencies of one launch file: its nodes' (package, program), the files that it includes, and all packages."""
+    """The dependencies of one launch file: its nodes as (package, program), the files that it includes, and all packages."""
 
     nodes: tuple[tuple[str, str], ...]
     includes: tuple[str, ...]
@@ -55,7 +55,7 @@ def file_needs(
 
 
 def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False) -> dict[str, list[str]]:
-    """Return the packages that launch files need but their package's package.xml does not declare: package -> sorted names.
+    """Return the packages that launch files need but package.xml does not declare, sorted, by the package that lacks them.
 
     With ``tests``, test dependencies also count as declared. Raise ManifestError if a package.xml is invalid.
     """

@@ -1,4 +1,4 @@
-"""Parse a launch file's text into tags with line numbers. Pure.
+"""Parses a launch file's text into tags with line numbers. Pure.
 
 Source: http://wiki.ros.org/roslaunch/XML.
 """
@@ -38,7 +38,7 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
         "master": ["auto", "type", "uri"],
     }.items()
 }
-"""Tag name -> the attributes that the tag may have."""
+"""The attributes that each tag may have, by tag name."""
 
 _TRUTH = {"true": True, "false": False}
 _CONDITIONS = {**_TRUTH, "1": True, "0": False}
@@ -59,7 +59,7 @@ def parse_document(text: bytes, file: str) -> Element:
 
 
 class Tag:
-    """An XML element that resolves substitutions: its methods return attribute values and create errors with its line number."""
+    """An XML element whose attributes are returned with substitutions resolved, and whose errors contain its line number."""
 
     def __init__(self, element: Element, file: str, substitution: Substitution) -> None:
         self.element = element
@@ -148,7 +148,10 @@ class Tag:
         return text or choices[0]
 
     def applies(self) -> bool:
-        """Return whether the tag's ``if`` or ``unless`` lets it apply. Raise LaunchError if it has both, or an invalid value."""
+        """Return whether the tag applies, according to its ``if`` or ``unless``.
+
+        Raise LaunchError if it has both, or an invalid value.
+        """
         if self.has("if") and self.has("unless"):
             raise self.error("cannot set both 'if' and 'unless' on the same tag")
         for key in ("if", "unless"):
@@ -163,7 +166,7 @@ class Tag:
         return True
 
     def warn_of_attributes(self, warn: Callable[[LaunchError], None]) -> None:
-        """Warn about each attribute that this tag does not support: most are typing errors."""
+        """Warn about each attribute that this tag does not support, because most are typos."""
         known = ATTRIBUTES[self.name]
         for key in self.element.attributes:
             if key not in known:

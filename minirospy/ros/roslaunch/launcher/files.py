@@ -1,4 +1,4 @@
-"""Find the launch files that a command line or an ``<include>`` names, and suggest similar names for a missing file."""
+"""Finds the launch files named on a command line or in an ``<include>``, and suggests similar names if one is missing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MAX_LAUNCH_FILE = 16 * 1024 * 1024  # bytes; a launch file for a hundred robots
 
 
 class LaunchFileNotFoundError(MinirospyError):
-    """A launch file on the command line does not exist; ``ros_text`` is ROS's message, ``hint`` a suggestion."""
+    """A launch file named on the command line does not exist; ``ros_text`` is ROS's message, ``hint`` a suggestion."""
 
     def __init__(self, ros_text: str, hint: str) -> None:
         super().__init__(ros_text, hint)
@@ -36,7 +36,7 @@ class LaunchFileNotFoundError(MinirospyError):
 def find_files(what: list[str], packages: Packages) -> list[str]:
     """Return the launch files that a command line names: PACKAGE FILE, or files.
 
-    Raise LaunchFileNotFoundError if a file is not found, MinirospyError if a word is an argument written incorrectly.
+    Raise LaunchFileNotFoundError if a file is not found, MinirospyError if an argument is malformed.
     """
     for word in what:
         name, equals, value = word.partition("=")
@@ -91,7 +91,7 @@ def near_files(file: str) -> str:
             return ""
         folder, package = wanted.parent, _package_of(wanted)
         for files in (folder.iterdir() if folder.is_dir() else (), package.rglob("*.*") if package else ()):
-            # Compare names without their suffixes, which are the same for all launch files.
+            # Compare names without suffixes, which are the same for all launch files.
             known: dict[str, Path] = {}
             for path in files:
                 if path.suffix in (".launch", ".xml", ".test") and path.name != "package.xml":

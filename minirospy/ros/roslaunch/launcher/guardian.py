@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable
 _UNREGISTER_SECONDS = 60.0
 
 SYSTEM_ENDS_THEM = "system-ends-them"
-"""The last argument if the system terminates a killed roslaunch's processes, as Windows does."""
+"""The last command-line argument if the system terminates a killed roslaunch's processes, as Windows does."""
 
 
 def watch(
@@ -68,7 +68,7 @@ def send(pid: int, name: str) -> bool:
     if sys.platform == "win32":
         import subprocess
 
-        # A process in another console receives no signals, so kill the process with all its descendants.
+        # Processes in another console receive no signals, so kill the process and all its descendants.
         subprocess.run(["taskkill", "/F", "/T", "/PID", str(pid)], capture_output=True, check=False)
         return False
     try:
@@ -87,7 +87,7 @@ def is_running(pid: int) -> bool:
     except ProcessLookupError:
         return False
     except OSError:
-        # macOS has no /proc, but its first process reaps zombies immediately.
+        # macOS has no /proc, but its init process reaps zombies immediately.
         return True
 
 
@@ -98,6 +98,6 @@ if __name__ == "__main__":
         float(sys.argv[1]),
         float(sys.argv[2]),
         sys.argv[3],
-        # Other processes may already have reused these process ids.
+        # Leave the processes alone, because other processes may have reused these process ids already.
         (lambda *_: None) if leaves_them else end_groups,
     )

@@ -86,7 +86,7 @@ class LiveTable:
         with contextlib.suppress(psutil.Error):
             top = psutil.Process(pid)
             for each in (top, *top.children(recursive=True)):
-                # psutil reports the CPU load since the previous call on the same object, so reuse the object.
+                # Reuse the object, because psutil reports the CPU load since the previous call on the same object.
                 known = self._known.setdefault(each.pid, each)
                 with contextlib.suppress(psutil.Error):
                     cpu += known.cpu_percent()

@@ -1,4 +1,4 @@
-"""Load launch files into a LaunchSpec. Reads files, but runs nothing except ``<param command=...>``.
+"""Loads launch files into a LaunchSpec. It reads files, and runs the programs of ``<param command=...>``, but no others.
 
 Source: http://wiki.ros.org/roslaunch/XML.
 """
@@ -39,18 +39,19 @@ __all__ = [
 
 STDIN = "<stdin>"
 _MAX_INCLUDE_DEPTH = 50
-# files per launch; a chain of 26 files, each of which includes the next one twice, would load 67,108,863
+# maximum number of files per launch; in a chain of 26 files, each of which includes the next twice, 67,108,863 files
+# would be read
 _MAX_INCLUDES = 10_000
 
 Problems = list[LaunchError]
 
 
 class _TooManyIncludesError(LaunchError):
-    """A launch includes too many files."""
+    """A launch includes more files than allowed."""
 
 
 class LaunchSource(NamedTuple):
-    """A launch file, its content (None: read the file), and its args' values."""
+    """A launch file, its content (None: read it from the file), and the values for its args."""
 
     file: str
     text: bytes | None
@@ -61,8 +62,8 @@ class LaunchSource(NamedTuple):
 class _Scope:
     """The settings that a tag inherits from the enclosing tags. ``private``: parameters that every following node receives.
 
-    ``machine`` is the default machine. It is the only setting that still applies after the end of the group or include that
-    declares it.
+    ``machine`` is the default machine. Unlike other settings, it still applies after the group or include that declares
+    it has ended.
     """
 
     namespace: str = "/"
@@ -74,7 +75,7 @@ class _Scope:
 
 @dataclass
 class _Args:
-    """A file's args: ``given`` by name, or ``passed`` by an including file with ``pass_all_args``."""
+    """The values for a file's args: those ``given`` by name, and those ``passed`` by an including file with ``pass_all_args``."""
 
     given: dict[str, str]
     passed: dict[str, str] = field(default_factory=dict)
@@ -117,7 +118,7 @@ def load_sources(
             reader.report(error)
 
     for name in used:
-        # A used arg counts as known, even if no <arg> declares it.
+        # An arg that is used counts as known, even if no <arg> declares it.
         spec.args.setdefault(name, ArgDoc(name, None, None))
 
     _check_names(spec, problems)
@@ -126,7 +127,7 @@ def load_sources(
 
 def _check_names(spec: LaunchSpec, problems: Problems | None) -> None:
     seen: dict[str, NodeSpec] = {}
-    # A <test> may have the same name as a node: they conflict only if the test's program registers under that name.
+    # A <test> may have the same name as a node; they conflict only if the test's program registers under that name.
     for node in spec.nodes:
         other = seen.setdefault(node.name, node)
         if other is not node:
@@ -208,7 +209,7 @@ class _File:
                 self._substitution.used.add(tag.element.attributes.get("name", ""))
             return reader(tag, scope) if tag.applies() else scope
         except _TooManyIncludesError:
-            # Abort loading: otherwise every open file would report the error once for each of its includes.
+            # Abort loading; otherwise, every open file would report the error once for each of its includes.
             raise
         except LaunchError as error:
             self.report(error)
@@ -303,7 +304,7 @@ class _File:
         for key, name in zip(("from", "to"), pair, strict=True):
             if not names.is_legal_name(names.canonicalize(name)):
                 raise tag.error(f"remap {key} [{name}] is not a valid ROS name")
-        # The last remap of a name wins, and is placed last.
+        # The last remapping of a name wins, and is placed last.
         others = tuple(remap for remap in scope.remaps if remap[0] != pair[0])
         return replace(scope, remaps=(*others, pair))
 
@@ -317,9 +318,12 @@ class _File:
                 raise tag.error(
                     f"<machine>: '{key}' is not supported since ROS Fuerte: use env-loader instead"
                 )
-        if tag.element.children:
-            child = next(tag.children())
-            raise child.error(f"<machine>: <{child.name}> has no place in it: use env-loader instead")
+        for child in tag.children():
+            if child.name == "env":
+                raise child.error(
+                    "<machine>: <env> tag is not supported since ROS Fuerte: use env-loader instead"
+                )
+            self._spec.warnings.append(child.error(f"unrecognized '{child.name}' tag in <machine> tag"))
 
         timeout = tag.number("timeout", 10.0)
         if timeout <= 0:
@@ -360,7 +364,7 @@ class _File:
         return scope
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
-        """Store a node's parameter as private to the node, even if its name starts with a slash or tilde."""
+        """Store a parameter set inside a node as private to the node, even if its name starts with a slash or tilde."""
         self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", param_value(tag))
 
     def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:

@@ -28,7 +28,7 @@ _START_SECONDS = 60.0
 class LaunchMaster:
     """The master that a launch's nodes use.
 
-    ``pause(seconds)`` waits, and raises KeyboardInterrupt if the run is stopped in the meantime.
+    ``pause(seconds)`` must wait, and raise KeyboardInterrupt if the run is stopped in the meantime.
     """
 
     def __init__(self, environment: Environment, output: Output, pause: Callable[[float], None]) -> None:
@@ -38,7 +38,7 @@ class LaunchMaster:
         self._proxy = MasterProxy(environment.master_uri, "/roslaunch")
         self.run_id = ""
         """The name of the run's log folder, and the master's /run_id."""
-        self.has_logs = True  # whether log files can be written
+        self.has_logs = True  # set if log files can be written
 
     @property
     def log_folder(self) -> Path:
@@ -66,7 +66,8 @@ class LaunchMaster:
         Raise MasterUnreachableError if the master URI names another machine, MinirospyError if the process cannot be started.
         """
         if not self._environment.master_is_local:
-            # Make the call for its error, which states the reason: an unknown host name, a suspended master.
+            # Make this call for its error message, which states the reason, such as an unknown host name or a
+            # suspended master.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
         self._output.print("auto-starting new master")
@@ -93,9 +94,10 @@ class LaunchMaster:
             self._pause(0.02)
 
         if self.run_id:
-            # A program that launches may have set the run id, which names the folder for the log files.
+            # Set the run id explicitly, because a program that launches may have set its own, which names the log
+            # folder.
             self._proxy.set_param("/run_id", self.run_id)
-        # If the master cannot write its log, it has already printed a warning.
+        # Do not warn again: if the master cannot write its log, it has already printed a warning.
         self.find_run_id(warns=False)
 
     def find_run_id(self, *, warns: bool = True) -> None:
@@ -118,7 +120,7 @@ class LaunchMaster:
         try:
             self._output.print(f"... logging to {self._output.log_to(self.log_folder)}")
         except OSError as error:
-            # A full or read-only disk must not stop the nodes.
+            # Start the nodes even if the disk is full or read-only.
             self.has_logs = False
             if warns:
                 why = error.strerror or error

@@ -37,8 +37,8 @@ class NodeStarter:
         environ = node_environment(node, self._environment)
         screen = self._uses_screen(node)
         if not screen or not sys.stdout.isatty():
-            # Make a node's output appear immediately. On a terminal, Python already flushes each line, and writes
-            # whole lines, so that lines from other nodes do not interrupt them.
+            # Make a node's output appear immediately. On a terminal, Python flushes each line anyway, and writes
+            # whole lines, so that output from other nodes does not interrupt them.
             environ.setdefault("PYTHONUNBUFFERED", "1")
         folder = self._made(folder)
 
@@ -56,7 +56,7 @@ class NodeStarter:
         return process
 
     def _made(self, folder: Path) -> Path:
-        """Create a node's working folder and return it; return the temporary folder if ROS_HOME is not writable."""
+        """Create a node's working folder and return it; if ROS_HOME is not writable, return the temporary folder."""
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:

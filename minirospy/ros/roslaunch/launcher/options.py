@@ -1,4 +1,4 @@
-"""The settings for a launch: the options of `roslaunch`."""
+"""The settings for a launch, from the options of `roslaunch`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["RunOptions"]
 class RunOptions:
     """The options for running a spec.
 
-    ``screen``, ``log``: send the output of all nodes there, whatever the launch file sets; ``log_errors``: also log the nodes'
+    ``screen``, ``log``: send the output of all nodes there, regardless of the launch file; ``log_errors``: also log the nodes'
     stderr. ``required``: treat every node as required. ``local``: skip the nodes of other machines.
     ``strict``: stop the launch if a node cannot be started. ``watch``: restart a node if its files change.
     ``name`` is shown in the terminal's title.

@@ -25,11 +25,11 @@ class Output:
     """Prints lines to stdout and stderr; adds colours and titles on a terminal.
 
     ``listener`` also receives (level, text) for each line: a child roslaunch sends them to its parent.
-    ``title``: whether the terminal's title may be set. ``has_color`` is determined when a line is printed.
+    ``title`` allows it to set the terminal's title. ``has_color`` is determined when a line is printed.
     """
 
     handlers: ClassVar[list[Callable[[int, str], None]]] = []
-    """Functions of the user's program that receive (level, text) for each line."""
+    """Functions from the user's program that receive (level, text) for each line."""
 
     def __init__(self, *, title: bool = True, listener: Callable[[int, str], None] | None = None) -> None:
         self._may_title = title
@@ -69,7 +69,7 @@ class Output:
         stream = sys.stderr if level == ERROR else sys.stdout
         # Write each line in a single call, because nodes write to the same terminal.
         shown = f"{colour}{text}{_PLAIN}" if colour and stream.isatty() else text
-        # The process that reads the output (`| head`) may have exited; still terminate the nodes in order.
+        # If the process that reads the output (`| head`) has exited, still terminate the nodes in order.
         with contextlib.suppress(BrokenPipeError):
             stream.write(shown + "\n")
             stream.flush()

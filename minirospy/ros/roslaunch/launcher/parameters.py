@@ -1,4 +1,4 @@
-"""Evaluate ``<param>`` and ``<rosparam>``. Reads files, and runs the commands of ``<param command=...>``.
+"""Evaluates ``<param>`` and ``<rosparam>``: reads files, and runs the commands in ``<param command=...>``.
 
 Source: http://wiki.ros.org/roslaunch/XML/param, http://wiki.ros.org/roslaunch/XML/rosparam.
 """
@@ -27,11 +27,13 @@ from minirospy.workspace.packages import Packages, built_in_roots, is_python
 __all__ = ["param_value", "rosparam_values"]
 
 _XACRO = ("xacro", "xacro.py")
-_STYLE = re.compile(r"\x1b\[[0-9;]*m")  # terminal colours
+_STYLE = re.compile(r"\x1b\[[0-9;]*m")  # matches terminal colours
 _ERROR = re.compile(r"\berror: ", re.IGNORECASE)
-_ERRORS_KEPT = 65_536  # bytes at the end of a command's stderr that are searched for the reason
+# number of bytes at the end of a command's stderr in which to look for the reason of a failure
+_ERRORS_KEPT = 65_536
 _ERRORS_SECONDS = 1.0
-_MAX_VALUE = 64 * 1024 * 1024  # bytes in a file or a command's output; the master accepts no larger request
+# maximum size in bytes of a file or of a command's output; the master rejects larger requests
+_MAX_VALUE = 64 * 1024 * 1024
 _WAYS = ("value", "textfile", "binfile", "command")
 
 
@@ -143,7 +145,7 @@ def _run(words: list[str]) -> tuple[int, bytes, str]:
             process.wait()
             raise
         finally:
-            # Processes that the command left running then get a broken pipe.
+            # Close the pipe, so that processes that the command left running get a broken pipe.
             process.stdout.close()
     finally:
         os.close(writing)
@@ -153,7 +155,7 @@ def _run(words: list[str]) -> tuple[int, bytes, str]:
 
 
 def _reason(errors: str) -> str:
-    """Return the first line that contains "error", as xacro prints; else the last line, which in a traceback is the error."""
+    """Return the first line that contains "error", as in xacro's output; else the last line, which ends a traceback."""
     lines = [line.strip() for line in errors.splitlines() if line.strip()]
     return next((line for line in lines if _ERROR.search(line)), lines[-1] if lines else "")
 
@@ -164,14 +166,14 @@ def _pass_on(reading: int, end: bytearray) -> None:
         while chunk := pipe.read(_ERRORS_KEPT):
             end += chunk
             del end[:-_ERRORS_KEPT]
-            # Without stderr, another file may use descriptor 2.
+            # If the program has no stderr, another file may use descriptor 2.
             if sys.__stderr__ is not None:
                 with contextlib.suppress(OSError), open(2, "wb", closefd=False) as errors:
                     errors.write(chunk)
 
 
 def _command_words(words: list[str]) -> list[str]:
-    """Return the command to run: this interpreter for a package's Python program, as for nodes; minirospy's xacro for xacro.
+    """Return the command to run. As for nodes, Python programs run with this interpreter; `xacro` runs minirospy's xacro.
 
     A launch file thus finds xacro even if no virtual environment is active, and never uses the xacro from ROS 2.
     """

@@ -1,4 +1,4 @@
-"""The processes that roslaunch starts: each in its own process group, terminated in steps, and never left running."""
+"""Processes that roslaunch starts, each in its own process group. They are terminated in steps, and never left running."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Timeouts:
 
 @dataclass(eq=False)
 class Process:
-    """A started process; ``node`` is None for the master. ``starts``: the number of times that it was started."""
+    """A started process. ``node`` is None for the master; ``starts`` counts how often it was started."""
 
     name: str
     command: Sequence[str]
@@ -45,9 +45,9 @@ class Process:
     stdout_file: Path | None = None
     starts: int = 1
     started: float = field(default_factory=time.monotonic)
-    is_ending: bool = False  # its exit was requested, so the exit is not reported
+    is_ending: bool = False  # its exit was requested, so do not report the exit
 
-    is_restarting: bool = False  # restart after its exit, because its file changed
+    is_restarting: bool = False  # restart it after its exit, because its file has changed
 
     @property
     def pid(self) -> int:
@@ -109,7 +109,7 @@ class Guardian:
         self._children.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        # A parent that is killed while it starts a process outside its job leaves that process behind, suspended.
+        # If a parent is killed while it starts a process outside its job, that process would remain, suspended.
         return start_outside_of_job(
             [sys.executable, "-I", "-S", *self._words],
             stdin=subprocess.PIPE,
@@ -179,8 +179,8 @@ def end_processes(
             process.is_ending = True
             if words:
                 warn(f"[{process.name}] {words}")
-            # Fails if the process has exited, or on Windows without a console. In both cases there is nothing to wait
-            # for.
+            # send_signal fails if the process has exited, or on Windows without a console; then there is nothing to
+            # wait for.
             with contextlib.suppress(OSError):
                 step(process.popen)
                 notified.append(process)
@@ -191,14 +191,14 @@ def end_processes(
 
     if not _WINDOWS:
         for process in processes:
-            # Kills processes that a node left running in its group.
+            # Also kill processes that a node left running in its group.
             with contextlib.suppress(OSError):
                 os.killpg(process.pid, signal.SIGKILL)
     return killed
 
 
 def _own_group() -> _Group:
-    """Return options that shield a process from Ctrl-C in the terminal: roslaunch terminates its nodes in order."""
+    """Return the options that shield a process from Ctrl-C, because roslaunch terminates its nodes in order."""
     if sys.platform == "win32":
         return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
     return {"start_new_session": True}

@@ -1,6 +1,7 @@
-"""Removes the registrations that exited nodes leave at the master.
+"""Removes the registrations at the master of nodes that have exited.
 
-Also a program that the guardian of a killed roslaunch runs:
+The guardian of a killed roslaunch runs this module as a program:
+
 ``python -m minirospy.ros.roslaunch.launcher.registrations MASTER_URI NODE ...``.
 """
 
@@ -20,14 +21,15 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy, SystemState
 
 __all__ = ["DeadNodes", "main", "unregister_dead"]
 
-# seconds; a host refuses connections to an exited process immediately, so only a hanging process takes this long
+# seconds to wait for a node; if its process has exited, the connection is refused immediately, so only hanging
+# processes take this long
 _ANSWER_SECONDS = 5.0
 
 _MAX_CONCURRENT = 16
 
 
 class DeadNodes:
-    """Unregisters nodes whose processes have exited, in a thread; one pass handles all exits since the previous pass."""
+    """Unregisters nodes whose processes have exited, in a thread. One pass handles all exits since the previous pass."""
 
     def __init__(self, master_uri: str) -> None:
         self._master_uri = master_uri
@@ -62,8 +64,8 @@ class DeadNodes:
 def unregister_dead(master_uri: str, nodes: Collection[str]) -> list[str]:
     """Unregister those of ``nodes`` (global names) that have exited; return their names.
 
-    A new node with one of these names, and a node that runs or hangs, remain registered. If the master does not respond,
-    nothing is changed.
+    A node that is running or hangs stays registered, and so does a new node with one of these names. If the master does not
+    respond, nothing is changed.
     """
     if not nodes:
         return []

@@ -1,8 +1,8 @@
-"""Nodes on other machines: ssh starts a roslaunch on each machine, which runs the nodes there and reports events.
+"""Runs nodes on other machines. ssh starts a roslaunch on each machine, which runs the nodes there and reports events.
 
-The calls between the two are those of ROS 1, so either side may be a real roslaunch: the child calls
-``register``, ``log`` and ``process_died`` of the parent; the parent calls ``launch`` and ``shutdown`` of the child.
-Source: http://wiki.ros.org/roslaunch/Architecture, http://wiki.ros.org/roslaunch/XML/machine.
+The two processes use ROS 1's calls, so either may be a real roslaunch: the child calls ``register``, ``log`` and
+``process_died`` of the parent; the parent calls ``launch`` and ``shutdown`` of the child. Source:
+http://wiki.ros.org/roslaunch/Architecture, http://wiki.ros.org/roslaunch/XML/machine.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Monitor(Protocol):
     """The part of the launcher that RemoteMachines uses."""
 
     def guard(self, process: Process) -> None:
-        """Terminate a process if roslaunch is killed."""
+        """Ensure that the process is terminated if roslaunch is killed."""
 
     def remote_ended(self, node: NodeSpec | None, name: str, code: int) -> None:
         """Report that a process on another machine has exited."""
@@ -103,7 +103,7 @@ class _Child:
     has_registered: threading.Event = field(default_factory=threading.Event)
     running: set[str] = field(default_factory=set)
     ended: set[str] = field(default_factory=set)
-    """Exited processes; a process may exit before ``launch`` has returned that it started."""
+    """Names of exited processes; a process may exit before ``launch`` has reported its start."""
 
 
 class RemoteMachines:
@@ -236,7 +236,7 @@ class RemoteMachines:
         except (RpcError, ValueError) as error:
             text = f"remote roslaunch child [{child.name}] cannot launch its nodes: {error}"
             raise LaunchError(machine.file, machine.line, text) from None
-        # A real roslaunch returns "Process<name-1>".
+        # Real roslaunch returns "Process<name-1>".
         child.running |= {name.removeprefix("Process<").removesuffix(">") for name in succeeded}
         child.running -= child.ended
         for name in failed:
@@ -277,5 +277,5 @@ class RemoteMachines:
 
 
 def launch_text(nodes: Sequence[NodeSpec]) -> str:
-    """Return a launch file with these nodes, for the roslaunch process that runs them."""
+    """Return a launch file with these nodes, for the remote roslaunch process that runs them."""
     return "\n".join(["<launch>", *(node.to_xml() for node in nodes), "</launch>", ""])

@@ -1,6 +1,6 @@
 """Runs a LaunchSpec: starts, watches and terminates its nodes.
 
-The parts are in separate files: the master (``master.py``), a node's process (``node_start.py``), the run
+Its parts are in separate modules: the master (``master.py``), a node's process (``node_start.py``), the run
 (``supervisor.py``), other machines (``remote.py``), termination (``process.py``, ``registrations.py``).
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools, http://wiki.ros.org/roslaunch/Architecture.
 """
@@ -41,7 +41,7 @@ class Launcher:
     """Runs a spec's nodes until all have exited or a caller stops them."""
 
     _numbers: ClassVar[Iterator[int]] = itertools.count(1)
-    """Numbers the processes of all launches in this program, so that process names and log files are unique."""
+    """A counter shared by all launches in this program, so that process names and log files are unique."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class Launcher:
 
     @property
     def processes(self) -> list[Process]:
-        """The watched nodes that were started, including those pending a restart."""
+        """The started nodes that are watched, including those that will be restarted."""
         return self.supervisor.processes
 
     @property
@@ -109,7 +109,7 @@ class Launcher:
     # --- starting
 
     def start(self, *, wait: bool = False) -> None:
-        """Show the summary, find or start a master, set the parameters, start the nodes.
+        """Print the summary, find or start a master, set the parameters, and start the nodes.
 
         Raise LaunchError if a node cannot be run, MasterUnreachableError if the master cannot be started here, MinirospyError
         for other failures, KeyboardInterrupt if the run is stopped in the meantime.
@@ -133,7 +133,7 @@ class Launcher:
         if not had_master:
             self._output.print(f"setting /run_id to {self.run_id}", bold=True)
             self._output.print("started core service [/rosout]")
-            # Skip the first number: in ROS, a roslaunch that starts the master uses it for /rosout.
+            # Skip the first number, which a roslaunch that starts the master uses for /rosout in ROS.
             next(self._numbers)
 
         self.set_parameters()
@@ -243,11 +243,14 @@ class Launcher:
         return process
 
     def guard(self, process: Process) -> None:
-        """Terminate a process if roslaunch is killed."""
+        """Ensure that the process is terminated if roslaunch is killed."""
         self._ready_guardian().add(process)
 
     def _ready_guardian(self) -> Guardian:
-        """Return the guardian. Called before a process starts, so that the guardian covers the process from the beginning."""
+        """Return the guardian, creating it if needed.
+
+        Call this before starting a process, so that the process is always covered.
+        """
         if self._guardian is None:
             self._guardian = Guardian(self._options.timeouts, self._environment.master_uri)
         return self._guardian
@@ -289,7 +292,7 @@ class Launcher:
             self._on_end(process)
 
     def _on_end(self, process: Process) -> None:
-        """React to a node's exit; a hook for subclasses."""
+        """Handle a node's exit; a hook for subclasses."""
 
     # --- ending
 

@@ -15,9 +15,9 @@ __all__ = ["ArgDoc", "LaunchSpec", "MachineSpec", "NodeSpec", "ParameterCommand"
 class NodeSpec:
     """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` include those of the enclosing groups.
 
-    ``name`` ends with a slash if a ``<test>`` has no name: its parameters are set in that namespace, and ``named()``
-    generates its name before it runs. ``output`` and ``cwd`` are empty if the file does not set them, which means ``log`` and
-    ``ROS_HOME``.
+    If a ``<test>`` has no name, ``name`` is a namespace that ends with a slash. The test's parameters are set in it, and
+    ``named()`` generates a name before the test runs. ``output`` and ``cwd`` are empty if the file does not set them,
+    which means ``log`` and ``ROS_HOME``.
     """
 
     name: str
@@ -47,7 +47,7 @@ class NodeSpec:
         return self.name.rpartition("/")[0] + "/"
 
     def named(self) -> NodeSpec:
-        """Return the node with a name: if it has none, a generated unique one."""
+        """Return the node; if it has no name, return a copy with a unique generated name."""
         if self.base_name:
             return self
         base = "".join(c if c.isalnum() else "_" for c in self.type)
@@ -105,7 +105,7 @@ class MachineSpec:
 
 @dataclass(frozen=True)
 class ParameterCommand:
-    """A ``<rosparam>`` that deletes ``name`` (global) at the master, or dumps its namespace into ``file``."""
+    """A ``<rosparam>`` that deletes the namespace ``name`` at the master, or dumps it into ``file``."""
 
     name: str
     file: str | None = None
@@ -113,7 +113,7 @@ class ParameterCommand:
 
 @dataclass(frozen=True)
 class ArgDoc:
-    """An ``<arg>`` of the first file: its default (None if it is required) and its doc."""
+    """An ``<arg>`` in the first file, with its default (None if it is required) and its doc."""
 
     name: str
     default: str | None
@@ -124,7 +124,7 @@ class ArgDoc:
 class LaunchSpec:
     """The combined content of all files.
 
-    ``params``: name -> value; ``clear``: namespaces to delete; ``commands``: run at the parameter server
+    ``params``: values by name; ``clear``: namespaces to delete; ``commands``: run at the parameter server
     before the parameters are set; ``files``: the files that were read, each once; ``includes``: (file, included
     file); ``args``: declarations of the first file; ``machines``: by name; ``warnings``: content that was ignored.
     """
@@ -150,7 +150,7 @@ class LaunchSpec:
         return (node for node in self.runnables() if node.base_name)
 
     def machine_of(self, node: NodeSpec) -> MachineSpec | None:
-        """Return the machine on which the node runs; None means this one. Raise LaunchError if the machine is unknown."""
+        """Return the machine on which a node runs, or None for this machine. Raise LaunchError if the machine is unknown."""
         name = node.machine
         if name in ("", "localhost"):
             return None

@@ -26,8 +26,9 @@ _ONE = {
     "arg": "$(arg name) takes one arg",
     "anon": "$(anon name) takes one name",
 }
-_MAX_SUBSTITUTED = 64 * 1024 * 1024  # characters per load; an arg that repeats other args doubles the size
-_MAX_SHOWN = 200  # characters shown of a string in an error message
+# maximum number of characters produced per load, because an arg that repeats another one doubles the size
+_MAX_SUBSTITUTED = 64 * 1024 * 1024
+_MAX_SHOWN = 200  # maximum number of characters shown of a string in an error message
 _VERBS = (*_ONE, "optenv", "dirname", "eval")
 
 
@@ -39,8 +40,8 @@ class SubstitutionError(ValueError):
 class Substitution:
     """The values for one file's substitutions.
 
-    ``used``: every arg that was used, in any file. ``unset``: args that are declared without a value, with the error
-    message for their use.
+    ``used`` contains every arg that was used, in any file. ``unset`` contains the args declared without a value, each with the
+    error message for its use.
     """
 
     packages: Packages
@@ -157,13 +158,13 @@ class Substitution:
 
 
 def _shown(text: str) -> str:
-    """Return a string for an error message: on one line, cut to ``_MAX_SHOWN`` characters."""
+    """Return a string for an error message, on one line and truncated to ``_MAX_SHOWN`` characters."""
     text = " ".join(text[: _MAX_SHOWN + 1].split()) if "\n" in text else text
     return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}..."
 
 
 class _Names(dict[str, object]):
-    """The names in an expression: Python's names and those from ``math``, then the args' values."""
+    """The names available in an expression: Python's, those from ``math``, and the args' values."""
 
     def __init__(self, substitution: Substitution, known: dict[str, object]) -> None:
         super().__init__(known)
@@ -180,14 +181,14 @@ def convert(text: str, type_: str) -> object:
 
     Raise ValueError if the type is unknown or the text does not match it.
     """
-    kind = type_.lower()
+    kind = type_.strip().lower()
     if kind in ("", "auto"):
         return _guess(text)
     if kind in ("str", "string"):
         return text
     if kind == "int":
         return int(text)
-    if kind in ("double", "float"):
+    if kind == "double":  # ROS refuses "float"
         return float(text)
     if kind in ("bool", "boolean"):
         if text.strip().lower() not in ("true", "1", "false", "0"):

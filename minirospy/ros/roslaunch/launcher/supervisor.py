@@ -19,8 +19,8 @@ __all__ = ["Supervisor"]
 _RESPAWN_SECONDS = 0.1  # minimum interval between two starts of a node that exits immediately
 
 _SLICE = 0.5
-"""Seconds. The main thread, which receives signals, waits in slices: a signal just before a wait, and any signal on Windows,
-takes effect only after the slice. Changed files and processes on other machines are checked between slices.
+"""Seconds. The main thread, which receives signals, waits in slices, because a signal just before a wait, and on Windows any
+signal, takes effect only after the slice. Changed files and remote processes are checked between slices.
 """
 
 _BAR = "=" * 80
@@ -53,7 +53,7 @@ class _Stop(NamedTuple):
 
 
 class _NoMoreNodes(NamedTuple):
-    """No more nodes will be started: the run is over when the current ones have exited."""
+    """No more nodes will be started, so the run is over when the current ones have exited."""
 
 
 _Event = _Exited | _Ended | _RemoteExited | _Stop | _NoMoreNodes
@@ -89,9 +89,9 @@ class Supervisor:
         self._restarts: list[tuple[float, Process]] = []
 
         self.on_change: Callable[[], object] = lambda: None
-        """Called in any thread after a process has started or exited, or after its exit was requested."""
+        """Called, in any thread, after a process has started or exited, or its exit has been requested."""
         self.processes: list[Process] = []
-        """The watched nodes that were started, including those pending a restart."""
+        """The started nodes that are watched, including those that will be restarted."""
         self.master: Process | None = None
         """The master, if this launch has started one."""
         self.stopped_by = ""
@@ -99,7 +99,7 @@ class Supervisor:
 
     @property
     def is_anything_left(self) -> bool:
-        """Return whether a process is running or pending a restart."""
+        """Return whether a process is running or will be restarted."""
         return bool(self.processes) or self.master is not None or self._is_remote_running()
 
     def add(self, process: Process) -> None:
@@ -109,7 +109,7 @@ class Supervisor:
         self.on_change()
 
     def add_master(self, process: Process) -> None:
-        """Watch a master: the run is over when it exits."""
+        """Watch a master; when it exits, the run is over."""
         self.master = process
         self._attend(process)
 
@@ -191,7 +191,7 @@ class Supervisor:
         threading.Thread(target=wait, name=f"wait-{process.name}", daemon=True).start()
 
     def _next_event(self) -> _Event | None:
-        """Return the next event, or None after a slice without events, when due restarts and changed files have been handled."""
+        """Return the next event. After a slice without events, handle due restarts and changed files, and return None."""
         pauses = [_SLICE, *(max(0.0, when - self._clock()) for when, _ in self._restarts)]
         try:
             return self._events.get(timeout=min(pauses))
@@ -252,7 +252,7 @@ class Supervisor:
         return 0 if event.code == 0 else 1
 
     def _forget_restart(self, process: Process) -> None:
-        """Stop watching a process that was terminated while it was pending a restart."""
+        """Stop watching a process that was terminated before its pending restart."""
         others = [each for each in self._restarts if each[1] is not process]
         if len(others) < len(self._restarts) and not process.is_restarting:
             self._restarts = others

@@ -1,4 +1,4 @@
-"""Detect changes in nodes' files, for `roslaunch --watch`."""
+"""Detects changes in nodes' files, for `roslaunch --watch`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["FileWatch"]
 
 
 class FileWatch:
-    """Checks a node's program, and the Python modules in its package's ``src`` folder."""
+    """Watches a node's program, and the Python modules in its package's ``src`` folder."""
 
     def __init__(self, packages: Packages) -> None:
         self._packages = packages
@@ -27,7 +27,7 @@ class FileWatch:
         """Return a file that has changed since the node was added, or since the last call."""
         before, now = self._seen.get(node.name, {}), self._times(node)
         self._seen[node.name] = now
-        # A missing file is most likely being rewritten, so it does not count as changed.
+        # Ignore a missing file, because it is probably being rewritten.
         return next((path for path, when in now.items() if before.get(path) != when), None)
 
     def _times(self, node: NodeSpec) -> dict[Path, int]:

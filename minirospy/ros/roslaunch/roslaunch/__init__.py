@@ -1,4 +1,4 @@
-"""roslaunch. Source: http://wiki.ros.org/roslaunch/API%20Usage."""
+"""roslaunch's Python API. Source: http://wiki.ros.org/roslaunch/API%20Usage."""
 
 from __future__ import annotations
 
@@ -58,11 +58,11 @@ NAME = "roslaunch"
 
 
 def configure_logging(uuid: str) -> None:
-    """Accept ROS's call and do nothing: roslaunch always logs to roslaunch-HOST-PID.log in the run's folder."""
+    """Do nothing; accepted for compatibility. roslaunch always logs to roslaunch-HOST-PID.log in the run's folder."""
 
 
 def write_pid_file(options_pid_fn: str | None, options_core: bool, port: int | None) -> None:
-    """Write the process id to the given file; for a core without a given file, to roscore-PORT.pid in ROS_HOME."""
+    """Write the process id to the given file. For a core, the default is roscore-PORT.pid in ROS_HOME."""
     if not options_pid_fn and options_core:
         home = os.environ.get("ROS_HOME") or os.path.join(os.path.expanduser("~"), ".ros")
         options_pid_fn = os.path.join(home, f"roscore-{port or DEFAULT_MASTER_PORT}.pid")

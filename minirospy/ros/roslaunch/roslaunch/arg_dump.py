@@ -1,4 +1,4 @@
-"""roslaunch.arg_dump."""
+"""roslaunch.arg_dump: the arguments of launch files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["get_args"]
 
 
 def get_args(roslaunch_files: Sequence[LaunchFile]) -> dict[str, tuple[str | None, str | None]]:
-    """Return the args that launch files declare: name -> (doc, default)."""
+    """Return the args that launch files declare, as a dict from name to (doc, default)."""
     packages, found = chosen_packages(), {}
     for each in roslaunch_files:
         file, argv = (each, []) if isinstance(each, str) else each

@@ -105,7 +105,7 @@ class ROSLaunchConfig:
         )
 
     def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> None:
-        """Add a parameter; a parameter below another one is a configuration error."""
+        """Add a parameter. It is a configuration error if its name is below another parameter's."""
         for parent in namespaces_of(p.key):
             if parent in self.params:
                 self.add_config_error(f"parameter [{p.key}] conflicts with parent parameter [{parent}]")
@@ -194,7 +194,7 @@ def get_roscore_filename() -> str | None:
 
 
 def _as_read(value: object) -> object:
-    """Return a parameter's value as programs receive it: a file's content becomes an xmlrpc.client.Binary."""
+    """Return a parameter's value in the type that programs receive: a file's content becomes an xmlrpc.client.Binary."""
     if not isinstance(value, bytes):
         return value
     from xmlrpc.client import Binary

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import logging
 import socket
 import uuid
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 from xml.sax.saxutils import escape
@@ -146,7 +147,7 @@ class Machine:
 
     @property
     def spec(self) -> MachineSpec:
-        """Return the machine as a launch file declares it."""
+        """Return the machine as a MachineSpec."""
         return MachineSpec(
             self.name, self.address, self.env_loader or "", self.user or "", self.password or "", self.ssh_port,
             self.timeout,
@@ -160,7 +161,7 @@ class Machine:
         )
 
     def config_equals(self, m2: object) -> bool:
-        """Return whether another machine has the same address and setup, regardless of its name."""
+        """Return whether the other machine has the same address and setup, regardless of its name."""
         return isinstance(m2, Machine) and self.config_key() == m2.config_key()
 
     def __eq__(self, other: object) -> bool:
@@ -208,8 +209,8 @@ class Node:
         args: str | None = "",
         respawn: bool = False,
         respawn_delay: float = 0.0,
-        remap_args: Iterable[tuple[str, str]] | None = None,
-        env_args: Iterable[tuple[str, str]] | None = None,
+        remap_args: Sequence[Sequence[str]] | None = None,
+        env_args: Sequence[tuple[str, str]] | None = None,
         output: str | None = None,
         cwd: str | None = None,
         launch_prefix: str | None = None,
@@ -243,8 +244,9 @@ class Node:
         self.machine: Machine | None = None
         self.process_name: str | None = None
 
-        self.remap_args = [list(pair) for pair in remap_args or ()]
-        self.env_args = [tuple(pair) for pair in env_args or ()]
+        # The caller's own list, as in ROS, also if the caller changes it later.
+        self.remap_args: Sequence[Sequence[str]] = remap_args or []
+        self.env_args: Sequence[tuple[str, str]] = env_args or []
         self.output = output
         self.cwd = cwd
         self.launch_prefix = launch_prefix or None
@@ -253,11 +255,11 @@ class Node:
 
     @classmethod
     def of(cls, spec: NodeSpec) -> Node:
-        """Return the node that a launch file declares."""
+        """Convert a node from a launch file."""
         return cls(
             spec.package, spec.type, spec.base_name, spec.namespace, spec.machine or None, spec.args, spec.respawn,
-            spec.respawn_delay, spec.remaps, spec.env, spec.output or None, spec.cwd or None, spec.launch_prefix, spec.required,
-            spec.file,
+            spec.respawn_delay, [[*pair] for pair in spec.remaps], [*spec.env], spec.output or None, spec.cwd or None,
+            spec.launch_prefix, spec.required, spec.file,
         )  # fmt: skip
 
     def give_name(self) -> None:
@@ -305,7 +307,7 @@ class Node:
 
     @property
     def spec(self) -> NodeSpec:
-        """Return the node as a launch file declares it."""
+        """Return the node as a NodeSpec."""
         return NodeSpec(
             name=f"{self.namespace}{self.name or ''}",
             package=self.package,
@@ -336,8 +338,8 @@ class Test(Node):
         namespace: str | None = "/",
         machine_name: str | None = None,
         args: str | None = "",
-        remap_args: Iterable[tuple[str, str]] | None = None,
-        env_args: Iterable[tuple[str, str]] | None = None,
+        remap_args: Sequence[Sequence[str]] | None = None,
+        env_args: Sequence[tuple[str, str]] | None = None,
         time_limit: float | None = None,
         cwd: str | None = None,
         launch_prefix: str | None = None,
@@ -373,11 +375,12 @@ class Test(Node):
 
     @classmethod
     def of_test(cls, spec: TestSpec) -> Test:
-        """Return the test that a launch file declares."""
+        """Convert a test from a launch file."""
         node = spec.node
         return cls(
-            spec.test_name, node.package, node.type, node.base_name, node.namespace, node.machine or None, node.args, node.remaps,
-            node.env, spec.time_limit, node.cwd or None, node.launch_prefix, spec.retry, node.file,
+            spec.test_name, node.package, node.type, node.base_name, node.namespace, node.machine or None, node.args,
+            [[*pair] for pair in node.remaps], [*node.env], spec.time_limit, node.cwd or None, node.launch_prefix, spec.retry,
+            node.file,
         )  # fmt: skip
 
 
@@ -393,7 +396,7 @@ def _quoted(value: object) -> str:
 
 
 class _Handler:
-    """Receives one kind of lines: either errors or all others."""
+    """Receives either the error lines or all other lines."""
 
     def __init__(self, function: Callable[[str], object], *, errors: bool) -> None:
         self._function = function
@@ -401,7 +404,10 @@ class _Handler:
 
     def __call__(self, level: int, text: str) -> None:
         if (level >= ERROR) == self.errors:
-            self._function(text)
+            try:
+                self._function(text)
+            except Exception:  # the program's own function; as in ROS, the line is printed anyway
+                logging.getLogger("roslaunch").debug("a handler of roslaunch's output raised", exc_info=True)
 
 
 def add_printlog_handler(h: Callable[[str], object]) -> None:

@@ -50,7 +50,7 @@ def roslaunch_deps(
     use_test_depends: bool = False,
     ignore_unset_args: bool = False,
 ) -> tuple[str | None, dict[str, RoslaunchDeps], dict[str, set[str]]]:
-    """Return the first file's package, each file's dependencies, and, by package, those that its package.xml does not declare.
+    """Return the first file's package, each file's dependencies, and by package, those that package.xml does not declare.
 
     Raise RoslaunchDepsException if a file or package.xml is invalid.
     """

@@ -1,4 +1,4 @@
-"""roslaunch.launch: run a configuration that a program has built."""
+"""roslaunch.launch: runs a configuration that a program has built."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class ROSLaunchRunner:
         return [str(process) for process in monitor.procs], [node.base_name for node in self._launcher.failed]
 
     def launch_node(self, node: Node, core: bool = False) -> tuple[Process | str, bool]:
-        """Start another node: return (its process, True), or (its name, False) if it fails to start.
+        """Start another node. Return (its process, True), or (its name, False) if it fails to start.
 
         Raise RLException after a shutdown.
         """
@@ -151,11 +151,11 @@ class ROSLaunchRunner:
         )
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Notify a listener when a process exits."""
+        """Add a listener, which is notified when a process exits."""
         self._launcher.listeners.append(l)
 
     def spin(self) -> None:
-        """Wait until all nodes have exited or a signal arrives; then terminate the rest. Without nodes, return immediately."""
+        """Wait until all nodes have exited, or terminate them on a signal. Without nodes, return immediately."""
         monitor = self._monitor()
         try:
             if self._launcher.supervisor.is_anything_left:
@@ -169,7 +169,7 @@ class ROSLaunchRunner:
             self.stop()
 
     def spin_once(self) -> bool:
-        """Return whether the run continues; handles pending signals."""
+        """Handle pending signals; return whether the run continues."""
         return self.pm is not None and self.pm.mainthread_spin_once()
 
     def stop(self) -> None:
@@ -185,7 +185,7 @@ class ROSLaunchRunner:
             monitor.close()
 
     def _end_with_program(self) -> None:
-        # A forked child of the program must not stop the nodes when it exits.
+        # A forked child of the program must not stop the nodes when the child exits.
         if os.getpid() == self._pid:
             self.stop()
 
@@ -210,7 +210,7 @@ def master_options(timeout: float | None, logger_level: str | bool) -> tuple[str
 
 
 def replacement_of(module: str, name: str, ours: Function) -> Function:
-    """Return the program's replacement for a function in roslaunch's modules, else the original.
+    """Return the function with which a program has replaced one in roslaunch's modules, or else the original.
 
     For example, programs disable roslaunch's signal handlers with ``roslaunch.pmon._init_signal_handlers = ...``.
     """
@@ -219,7 +219,7 @@ def replacement_of(module: str, name: str, ours: Function) -> Function:
 
 
 def unify_clear_params(params: Iterable[str]) -> list[str]:
-    """Return the namespaces to delete, each with a trailing slash, without those inside another."""
+    """Return the namespaces to delete, each with a trailing slash, omitting those inside another."""
     names = [name if name.endswith("/") else f"{name}/" for name in params]
     return [
         name

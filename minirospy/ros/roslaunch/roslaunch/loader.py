@@ -1,4 +1,4 @@
-"""roslaunch.loader."""
+"""roslaunch.loader: conversion of parameter values."""
 
 from __future__ import annotations
 

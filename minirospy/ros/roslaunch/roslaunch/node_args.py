@@ -1,4 +1,4 @@
-"""roslaunch.node_args."""
+"""roslaunch.node_args: nodes and their command lines."""
 
 from __future__ import annotations
 

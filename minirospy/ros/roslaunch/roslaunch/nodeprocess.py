@@ -1,4 +1,4 @@
-"""roslaunch.nodeprocess."""
+"""roslaunch.nodeprocess: the process of a node."""
 
 from minirospy.ros.roslaunch.launcher.process import Timeouts
 from minirospy.ros.roslaunch.roslaunch.core import Machine, Master, Node, RLException

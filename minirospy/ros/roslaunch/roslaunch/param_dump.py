@@ -1,4 +1,4 @@
-"""roslaunch.param_dump."""
+"""roslaunch.param_dump: the parameters of launch files."""
 
 from __future__ import annotations
 

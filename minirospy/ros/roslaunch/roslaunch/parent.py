@@ -1,4 +1,4 @@
-"""Launching from a program: the classes of roslaunch.parent, roslaunch.scriptapi and roslaunch.launch.
+"""Runs launch files from a program, with the classes of roslaunch.parent, roslaunch.scriptapi and roslaunch.launch.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """
@@ -87,21 +87,21 @@ class ROSLaunchParent:
         try:
             runner.launch()
         except RLException:
-            # Allow another attempt.
+            # Allow another attempt to start.
             self.runner = None
             raise
         if auto_terminate and self.pm:
             self.pm.registrations_complete()
 
     def spin(self) -> None:
-        """Wait until all nodes have exited or a signal arrives; then terminate the rest."""
+        """Wait until all nodes have exited, or terminate them on a signal."""
         if self.runner is None:
             raise RLException("parent not started yet")
         if self.runner.pm:
             self.runner.spin()
 
     def spin_once(self) -> bool:
-        """Return whether the run continues; handles pending signals."""
+        """Handle pending signals; return whether the run continues."""
         return self.runner is not None and self.runner.spin_once()
 
     def shutdown(self) -> None:
@@ -110,7 +110,7 @@ class ROSLaunchParent:
             self.runner.stop()
 
     def _load_config(self) -> None:
-        """Fill ``config``; programs override this to fill it differently."""
+        """Load the launch files into ``config``; programs override this method to fill ``config`` differently."""
         load = replacement_of("roslaunch.config", "load_config_default", load_config_default)
         self.config = load(
             self.roslaunch_files, self.port, roslaunch_strs=self.roslaunch_strs, verbose=self.verbose

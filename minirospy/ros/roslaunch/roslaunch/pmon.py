@@ -1,4 +1,4 @@
-"""Processes that a program launches: the classes of roslaunch.pmon and roslaunch.nodeprocess, based on a Launcher.
+"""Manages the processes that a program launches: the classes of roslaunch.pmon and roslaunch.nodeprocess, based on a Launcher.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """
@@ -42,7 +42,7 @@ __all__ = [
 
 
 class ProcessListener:
-    """Is notified when processes exit."""
+    """The base class for objects that are notified when processes exit."""
 
     def process_died(self, process_name: str, exit_code: int) -> None:
         """Handle the exit of a process; called in one of roslaunch's threads."""
@@ -86,7 +86,7 @@ class ApiLauncher(Launcher):
 
 
 class Process:
-    """A node's process: running, or created by create_node_process() and not started yet."""
+    """A node's process, which is either running, or created by create_node_process() and not started yet."""
 
     def __init__(self, launcher: ApiLauncher, node: NodeSpec, name: str) -> None:
         self.name = name
@@ -122,7 +122,7 @@ class Process:
 
     @property
     def pid(self) -> int:
-        """The process id; -1 before it is started."""
+        """The process id, or -1 before the process is started."""
         return self.process.pid if self.process else -1
 
     @property
@@ -196,7 +196,7 @@ class Process:
         return f"process has died [pid {self.pid}, exit code {self.exit_code}, cmd {command}].\n{files}"
 
     def register(self, launcher: ApiLauncher) -> None:
-        """Let another launcher watch the process once it has started."""
+        """Add the process to another launcher, which watches the process once it has started."""
         self._launcher = launcher
 
 
@@ -204,13 +204,13 @@ class ProcessMonitor:
     """The processes of a launch."""
 
     _living: ClassVar[weakref.WeakSet[ProcessMonitor]] = weakref.WeakSet()
-    """The monitors whose processes are terminated by a signal."""
+    """The monitors whose processes a signal terminates."""
 
     def __init__(self, launcher: ApiLauncher) -> None:
         self._launcher = launcher
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
-        self.is_watching = False  # whether watch() was called
+        self.is_watching = False  # set once watch() has been called
         self._living.add(self)
 
     @property
@@ -270,13 +270,13 @@ class ProcessMonitor:
         self._launcher.supervisor.end_with_nodes()
 
     def add_process_listener(self, l: ProcessListener) -> None:
-        """Notify a listener when a process exits."""
+        """Add a listener, which is notified when a process exits."""
         self._launcher.listeners.append(l)
 
     def watch(self) -> None:
-        """Watch the processes in a thread, and terminate them when it stops.
+        """Watch the processes in a thread, which terminates them when it stops.
 
-        It stops after shutdown(), or after registrations_complete() when all processes have exited.
+        The thread stops after shutdown(), or after registrations_complete() when all processes have exited.
         """
 
         def watch() -> None:
@@ -285,7 +285,7 @@ class ProcessMonitor:
             finally:
                 self.close()
 
-        # If the program is killed, this thread stops too; then the guardian terminates the nodes.
+        # If the program is killed, this thread stops too, and the guardian terminates the nodes.
         self._thread = threading.Thread(target=watch, name="roslaunch", daemon=True)
         self.is_watching = True
         self._thread.start()
@@ -304,7 +304,7 @@ class ProcessMonitor:
         if threading.current_thread() is self._thread:
             return
         end = math.inf if timeout is None else time.monotonic() + timeout
-        # Wait in slices: on Windows a wait without timeout ignores signals.
+        # Wait in slices, because on Windows a wait without timeout ignores signals.
         while not self.done and (left := end - time.monotonic()) > 0:
             self._ended.wait(min(0.5, left))
 
@@ -313,7 +313,7 @@ class ProcessMonitor:
         self.join()
 
     def mainthread_spin_once(self) -> bool:
-        """Return whether the monitor is still watching; handles pending signals."""
+        """Handle pending signals; return whether the monitor is still watching."""
         return not self._ended.wait(0.01)
 
     def shutdown(self) -> None:
@@ -344,7 +344,7 @@ def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
 
 
 def create_node_process(run_id: str | None, node: Node, master_uri: str) -> Process:
-    """Return a process for a node, not started yet. Raise NodeParamsException if the node has no program."""
+    """Return a process for a node; it is not started yet. Raise NodeParamsException if the node has no program."""
     node.give_name()
     launcher = ApiLauncher(
         LaunchSpec(), Environment.read()._replace(master_uri=master_uri), run_id=run_id or ""
@@ -367,7 +367,7 @@ def pmon_shutdown() -> None:
 
 
 class _Handler:
-    """A signal handler that stops everything that this program launched, and then calls the previous handler."""
+    """A signal handler that stops everything that this program has launched, and then calls the previous handler."""
 
     def __init__(self, number: signal.Signals) -> None:
         self._before = signal.getsignal(number)
@@ -396,5 +396,5 @@ _init_signal_handlers = init_signal_handlers
 
 
 def rl_signal(sig: int, stackframe: FrameType | None) -> None:
-    """Handle a signal: stop everything that this program launched."""
+    """Stop everything that this program has launched, when a signal arrives."""
     pmon_shutdown()

@@ -1,4 +1,4 @@
-"""roslaunch.rlutil."""
+"""roslaunch.rlutil: checks, terminal titles and arguments of roslaunch."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def check_log_disk_usage() -> None:
 
 
 def check_roslaunch(f: str, use_test_depends: bool = False, ignore_unset_args: bool = False) -> str | None:
-    """Return a launch file's errors, including missing programs, one per line; None if there are none."""
+    """Return a launch file's errors, including missing programs, one per line, or None if there are none."""
     return "\n".join(map(str, faults_of(f, chosen_packages(), ignore_unset_args=ignore_unset_args))) or None
 
 
@@ -55,7 +55,7 @@ def update_terminal_name(ros_master_uri: str) -> None:
 
 
 def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: bool) -> str:
-    """Return the run id: the given one, the master's, or a new one if no master responds."""
+    """Return the run id: the given one, else the master's, or a new one if no master responds."""
     if options_runid:
         return options_runid
     master = MasterProxy(Environment.read().master_uri, "/roslaunch")

@@ -1,4 +1,4 @@
-"""roslaunch.scriptapi: start nodes one by one from a program."""
+"""roslaunch.scriptapi: starts nodes one by one from a program."""
 
 from __future__ import annotations
 

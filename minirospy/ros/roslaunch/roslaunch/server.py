@@ -1,4 +1,4 @@
-"""roslaunch.server: the names that programs import from it."""
+"""roslaunch.server: the names that programs import from this module."""
 
 from minirospy.ros.roslaunch.roslaunch.core import RLException
 from minirospy.ros.roslaunch.roslaunch.pmon import Process, ProcessListener

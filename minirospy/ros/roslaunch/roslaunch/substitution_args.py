@@ -1,7 +1,7 @@
-"""roslaunch.substitution_args: `$(find ...)` and the other substitution arguments, one by one.
+"""roslaunch.substitution_args: resolves `$(find ...)` and the other substitution arguments, all or one by one.
 
-Programs that parse launch files themselves also call the single steps: they collect a string's arguments, resolve
-some kinds of arguments, or set ``_rospack`` so that ``$(find ...)`` searches other folders. Source:
+Programs that parse launch files themselves also call the single steps, to collect a string's arguments or to resolve some
+kinds of arguments, or they set ``_rospack`` so that ``$(find ...)`` searches other folders. Source:
 http://wiki.ros.org/roslaunch/XML#substitution_args.
 """
 
@@ -58,7 +58,7 @@ Context: TypeAlias = dict[str, dict[str, str]]
 """The values of args and anonymous names, under the keys ``arg`` and ``anon``; ``filename`` is the launch file."""
 
 Command: TypeAlias = Callable[[str, str, list[str], Context], str]
-"""Resolves one kind of argument: (text, the argument in the text, the argument's words, context) -> text."""
+"""Resolves one kind of argument. Its parameters are the text, the argument in it, the argument's words, and the context."""
 
 _VALID = ["find", "env", "optenv", "dirname", "anon", "arg"]
 _MODULE = "roslaunch.substitution_args"
@@ -102,7 +102,7 @@ def resolve_args(
         "arg": _arg,
     }
     resolved = _resolve_args(arg_str, context, resolve_anon, first)
-    # The path after $(find ...) may contain the results of the other arguments.
+    # Resolve the other arguments first, because the path after $(find ...) may contain their results.
     return _resolve_args(resolved, context, resolve_anon, {"find": _find})
 
 
@@ -222,7 +222,7 @@ def _eval_find(pkg: str) -> str:
 
 
 def _find(resolved: str, a: str, args: list[str], context: Context) -> str:
-    """Resolve ``$(find PKG)``; replace a path after it with the package's program or file of that name, if there is one."""
+    """Resolve ``$(find PKG)``. If a path follows, replace the whole with the package's program or file of that name, if any."""
     if len(args) != 1:
         raise SubstitutionException(f"$(find pkg) command only accepts one argument [{a}]")
     before, after = _split_command(resolved, a)
@@ -315,7 +315,7 @@ class _DictWrapper:
 def _eval(s: str, context: Context) -> str:
     """Return a Python expression's value as a string.
 
-    Raise SubstitutionException if the expression contains a double underscore, or any exception that the expression raises.
+    Raise SubstitutionException if the expression contains a double underscore, or any exception from the expression.
     """
     anons, args = context.setdefault("anon", {}), context.setdefault("arg", {})
     functions: dict[str, object] = {

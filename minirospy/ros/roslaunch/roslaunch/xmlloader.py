@@ -1,4 +1,4 @@
-"""roslaunch.xmlloader: load launch files into a configuration."""
+"""roslaunch.xmlloader: loads launch files into a configuration."""
 
 from __future__ import annotations
 

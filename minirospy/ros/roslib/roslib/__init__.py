@@ -1,4 +1,4 @@
-"""roslib. Source: http://wiki.ros.org/roslib."""
+"""roslib: functions for packages, manifests and stacks. Source: http://wiki.ros.org/roslib."""
 
 from typing import TYPE_CHECKING
 
@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
 __all__ = ["is_interactive", "load_manifest", "set_interactive"]
 
-__getattr__ = on_first_use("roslib", "manifest", "stacks")
+__getattr__ = on_first_use("roslib", "manifest", "message", "names", "stacks")
 
 _interactive = [False]
 
 
 def is_interactive() -> bool:
-    """Return whether set_interactive() marked the process as interactive."""
+    """Return the value that set_interactive() has set: whether the process is interactive."""
     return _interactive[0]
 
 

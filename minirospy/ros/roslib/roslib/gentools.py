@@ -1,6 +1,7 @@
 """roslib.gentools: md5sums and full texts of definition files, computed from their dependencies.
 
-The functions exchange a dict of a definition's dependencies: ``package``, ``spec``, ``deps``, ``uniquedeps`` and ``files``.
+The functions use a dict that describes a definition's dependencies, with the keys ``package``, ``spec``, ``deps``,
+``uniquedeps`` and ``files``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""roslib.message: genpy's names, in their former module."""
+"""roslib.message: re-exports genpy's names, which were in this module before."""
 
 from minirospy.ros.genpy.genpy.message import (
     DeserializationError,

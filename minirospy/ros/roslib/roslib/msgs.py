@@ -1,4 +1,4 @@
-"""roslib.msgs: queries about types, and genmsg's functions under their former names."""
+"""roslib.msgs: queries about message types, and genmsg's functions under their former names."""
 
 from minirospy.core.idl.load import Catalogue
 from minirospy.ros.genmsg.genmsg.msgs import (

@@ -1,4 +1,4 @@
-"""roslib.names: rosgraph's names, and resource names (``package/name``)."""
+"""roslib.names: rosgraph's functions for names, and resource names (``package/name``)."""
 
 from minirospy.ros.genmsg.genmsg.names import (
     PRN_SEPARATOR,

@@ -1,4 +1,4 @@
-"""roslib.network: rosgraph's names, in their former module."""
+"""roslib.network: re-exports rosgraph's names, which were in this module before."""
 
 from minirospy.ros.rosgraph.rosgraph.network import (
     ROS_HOSTNAME,

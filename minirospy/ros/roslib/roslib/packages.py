@@ -142,7 +142,7 @@ def _files(folder: Path, package: str, name: str) -> Iterator[Path]:
 
 def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] | None = None) -> list[str]:
     """Return the files with this name below a folder; follow links, and skip folders whose name starts with a dot."""
-    # On Windows, programs may be named without a suffix, and case is ignored.
+    # On Windows, programs may be named without their suffix, and case is ignored.
     suffixes = ("", ".exe", ".bat", ".py") if os.name == "nt" else ("",)
     wanted = [os.path.normcase(resource_name + suffix) for suffix in suffixes]
     found, seen = [], set()
@@ -150,7 +150,7 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
     for path, folders, names in os.walk(d, followlinks=True):
         real = os.path.realpath(path)
         if real in seen:
-            # Following a link to a parent folder would never end.
+            # Do not follow a link to a parent folder, because the search would never end.
             folders.clear()
             continue
         seen.add(real)

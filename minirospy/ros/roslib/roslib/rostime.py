@@ -1,4 +1,4 @@
-"""roslib.rostime: genpy's names, in their former module."""
+"""roslib.rostime: re-exports genpy's names, which were in this module before."""
 
 from minirospy.base.times import Duration, Time, TVal
 

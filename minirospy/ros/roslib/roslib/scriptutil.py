@@ -1,4 +1,4 @@
-"""roslib.scriptutil: the master proxy for old scripts."""
+"""roslib.scriptutil: provides the master proxy that old scripts use."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class InvalidROSStackException(ROSStackException):
 def list_stacks_by_path(
     path: str, stacks: list[str] | None = None, cache: dict[str, str] | None = None
 ) -> list[str]:
-    """Append the stacks below a folder to ``stacks``, and store their folders in ``cache``; return ``stacks``."""
+    """Append the stacks below a folder to ``stacks``, store their folders in ``cache``, and return ``stacks``."""
     found = [] if stacks is None else stacks
     for folder in folders_with(STACK_FILE, path):
         if (name := os.path.basename(folder)) not in found:
@@ -110,7 +110,7 @@ def expand_to_packages(
 
 
 def _paths(env: Mapping[str, str] | None) -> list[str] | None:
-    """Return the folders to search; None means the folders of this process's environment."""
+    """Return the folders to search, or None to search the folders in this process's environment."""
     return None if env is None else _folders(env)
 
 

@@ -40,8 +40,8 @@ __all__ = ["MASTER", "ROSCORE", "ROSMASTER", "main", "roscore", "rosmaster"]
 
 _LOG_BYTES = 10 * 1024 * 1024
 
-_ANSWER_SECONDS = 4.0
-"""Seconds for a master to respond on a busy machine. A master that needs longer to recover holds its journal's lock."""
+ANSWER_SECONDS = 4.0
+"""Seconds to wait for a response from a master on a busy machine. A master that is still recovering holds its journal's lock."""
 
 
 class _Options(NamedTuple):
@@ -92,7 +92,7 @@ def _parser(name: str) -> Parser:
     add("-p", "--port", type=int, help="master port. Only valid if master is launched")
     add("-v", dest="verbose", action="store_true", help="verbose printing")
 
-    # Accepted without effect: one loop in one process serves every client.
+    # Accepted without effect, because one loop in one process serves every client.
     parser.accept(
         "-w",
         "--numworkers",
@@ -189,7 +189,8 @@ def _master(
     if not timeout > 0:
         raise Misuse("the timeout is more than 0 seconds")
     if not all(each.strip(" ,") for each in allow):
-        # An empty value may come from an unset variable; it must not give every address access to the master.
+        # Reject an empty value, which may come from an unset variable: it must not give every address access to the
+        # master.
         raise Misuse("--allow wants a network, as 192.168.65.0/24, or an address")
 
     if environment.local:
@@ -205,7 +206,7 @@ def _master(
 
 
 def _environment(*, local: bool) -> Environment:
-    """Return a master's environment; only the port of a remote ROS_MASTER_URI is used."""
+    """Return the environment for a master. If ROS_MASTER_URI names another machine, only its port is used."""
     environ = dict(os.environ)
     local = is_local(environ) or local
     environ.pop("MINIROSPY_LOCAL", None)
@@ -275,7 +276,7 @@ async def _serve(name: str, environment: Environment, port: int, options: _Optio
         await _run(master, stop, rosout, run_id, quiet=options.quiet)
         keep = False
     finally:
-        # Remove the file while this master still owns the port: afterwards the file may belong to the next master.
+        # Remove the file while this master still owns the port; later, the file may belong to the next master.
         with contextlib.suppress(OSError):
             pid_file.unlink(missing_ok=True)
         await master.close(keep_journal=keep)
@@ -301,7 +302,7 @@ def _announce(master: Master, where: Sequence[str], log_file: Path | None, *, qu
 
 
 def _write_pid(path: Path) -> None:
-    """Write the process id to the file that scripts read, as in ROS."""
+    """Write the process id to a file that scripts read, as ROS does."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
         with private_files.open_text(path, "w") as file:
@@ -327,7 +328,7 @@ async def _run(
 
 
 def _status(environment: Environment, port: int) -> int:
-    """Print one line about the running master; for ROS's rosmaster, from its API's responses."""
+    """Print one line about the running master. For ROS's rosmaster, the information comes from calls to its API."""
     host = environment.master_address[0]
     uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     master = MasterProxy(uri, "/master_status")
@@ -380,7 +381,7 @@ def _warn_of_uri(environment: Environment, master: Master) -> None:
 
 
 def _most_clients() -> int:
-    """Raise the open-file limit; return the number of clients that it allows, with a reserve for other files."""
+    """Raise the open-file limit; return the number of clients that it allows, reserving some files for other uses."""
     if sys.platform == "win32":
         return 400
     import resource
@@ -395,7 +396,7 @@ def _most_clients() -> int:
 
 
 def _stop_event() -> asyncio.Event:
-    """Return an event that Ctrl-C, SIGTERM or a closed terminal sets (SIGHUP not under nohup)."""
+    """Return an event that is set by Ctrl-C, SIGTERM or a closed terminal (SIGHUP, except under nohup)."""
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
     numbers = [*interrupt_signals(), signal.SIGTERM]
@@ -405,7 +406,7 @@ def _stop_event() -> asyncio.Event:
         try:
             loop.add_signal_handler(number, stop.set)
         except NotImplementedError:
-            # On Windows the handler runs in the main thread, which also runs the loop, when the loop next wakes up.
+            # On Windows, the handler runs in the main thread, but only when the loop in this thread wakes up.
             signal.signal(number, lambda *_: loop.call_soon_threadsafe(stop.set))
     if sys.platform == "win32":
         _keep_waking(loop)
@@ -431,16 +432,16 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
     uri = f"http://{host}:{port}"
     silence = ""
     try:
-        RpcClient(f"http://127.0.0.1:{port}", timeout=_ANSWER_SECONDS).call("getPid", "/roscore")
+        RpcClient(f"http://127.0.0.1:{port}", timeout=ANSWER_SECONDS).call("getPid", "/roscore")
     except RpcError as failure:
         pid = _holder(journal) if journal and isinstance(failure, RpcUnreachable) else None
         if pid is None:
-            late = f" or by a suspended master (no answer within {_ANSWER_SECONDS:g} s)"
+            late = f" or by a suspended master (no answer within {ANSWER_SECONDS:g} s)"
             return MinirospyError(
                 f"port {port} is taken by another program{late if isinstance(failure, RpcTimeout) else ''}: "
                 f"choose one with `{name} -p PORT`"
             )
-        # The master is running, because its journal is still locked.
+        # The master is running, because its journal is still locked; it just does not respond.
         silence = (
             f"; it{f' (pid {pid})' if pid else ''} does not answer: it is suspended, or reads a large journal"
         )
@@ -480,7 +481,7 @@ class _Shown(logging.Handler):
 
 
 def _show(line: str) -> None:
-    """Print a line; a closed stdout (`roscore -v | head`) must not stop the master."""
+    """Print a line. If stdout is closed (`roscore -v | head`), continue without printing."""
     with contextlib.suppress(OSError):
         # Use a single write, because a thread prints the warning about ROS_MASTER_URI.
         print(f"{line}\n", end="", flush=True)
@@ -491,7 +492,7 @@ def _log_to_file(
 ) -> tuple[Path | None, Callable[[str], object]]:
     """Log to ``folder``/master.log; ``latest`` next to the folder links to it if links are supported.
 
-    Return the file, and the function that logs registrations. If the file cannot be written, the master runs without a log.
+    Return the file, and the function that logs registrations. If it cannot be written, the master runs without a log.
     """
     path = folder / "master.log"
     logger = logging.getLogger("minirospy")

@@ -1,4 +1,4 @@
-"""rosmaster: a master inside a program. Source: http://wiki.ros.org/rosmaster."""
+"""rosmaster: runs a master inside a program. Source: http://wiki.ros.org/rosmaster."""
 
 from __future__ import annotations
 

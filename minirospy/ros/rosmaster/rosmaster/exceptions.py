@@ -1,4 +1,4 @@
-"""rosmaster.exceptions."""
+"""rosmaster.exceptions: the error that rosmaster's classes raise."""
 
 __all__ = ["InternalException"]
 

@@ -1,4 +1,4 @@
-"""rosmaster.main: the command."""
+"""rosmaster.main: the command rosmaster."""
 
 from minirospy.ros.rosmaster.rosmaster import rosmaster_main
 

@@ -1,4 +1,4 @@
-"""rosmaster.master: a master inside a program, for example for tests."""
+"""rosmaster.master: runs a master inside a program, for example for tests."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["DEFAULT_MASTER_PORT", "Master"]
 
 
 class Master:
-    """A master that listens on ``port`` from :meth:`start` to :meth:`stop`, at the URI ``uri``. It stores nothing on disk."""
+    """A master that listens on ``port`` between :meth:`start` and :meth:`stop`; ``uri`` is its URI. It stores nothing on disk."""
 
     def __init__(self, port: int = DEFAULT_MASTER_PORT, num_workers: int = 3) -> None:
         self.port = port

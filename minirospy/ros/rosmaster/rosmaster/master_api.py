@@ -29,7 +29,7 @@ _CALLER_ID = "/master"
 
 
 class _Api(MasterApi):
-    """The tables and their responses; notifications for nodes are put into ``notices``."""
+    """The Master API's tables and responses. Notifications for nodes are put into ``notices``."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -47,7 +47,7 @@ class _Api(MasterApi):
         self.notices.put(action)
 
     def defer(self, uri: str, topic: str) -> None:
-        """Do nothing: a notification contains the state at the time when it is sent."""
+        """Do nothing. Deferring has no effect here, because a notification contains the state at the time when it is sent."""
 
     def stop(self) -> None:
         """Stop sending notifications."""
@@ -70,7 +70,7 @@ class ROSMasterHandler:
         threading.Thread(target=self._notify, name="rosmaster", daemon=True).start()
 
     def __getattr__(self, name: str) -> Callable[..., tuple[int, str, object]]:
-        # One method for each call in the table.
+        # Provide one method for each call in the table.
         if name.startswith("_") or name not in self._api.dispatcher.methods:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         return lambda *args: self._call(name, args)
@@ -118,5 +118,5 @@ class ROSMasterHandler:
 
 
 def _value(tree: ParameterTree, key: str) -> object:
-    """Return the value in a node's notification: {} if the parameter is not set."""
+    """Return the value for a node's notification, which is {} if the parameter is not set."""
     return tree.get(key) if tree.has(key) else {}

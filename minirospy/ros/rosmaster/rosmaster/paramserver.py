@@ -1,6 +1,6 @@
 """rosmaster.paramserver: the parameter tree.
 
-Keys are global names. A notify task is called with a list of ([(node, API)], key, value), one for each change.
+Keys are global names. A notify task is called with a list that has an entry ([(node, API)], key, value) for each change.
 """
 
 from __future__ import annotations
@@ -28,7 +28,12 @@ class ParamDictionary:
         return self._tree.names()
 
     def search_param(self, ns: str, key: str) -> str | None:
-        """Return the closest parameter, searched from a namespace upwards. Raise ValueError if the namespace is not global."""
+        """Return the closest parameter, searched from a namespace upwards.
+
+        Raise ValueError if the key is empty or private, or the namespace is not global.
+        """
+        if not key or key[0] == "~":
+            raise ValueError("invalid key")
         if not ns or ns[0] != "/":
             raise ValueError("namespace must be global")
         return self._tree.search(ns, key)
@@ -56,7 +61,7 @@ class ParamDictionary:
         self._notify(self._tree.delete(key), notify_task)
 
     def subscribe_param(self, key: str, registration_args: tuple[str, str]) -> object:
-        """Subscribe (node, API) to a parameter; return its value, {} if it is not set."""
+        """Subscribe (node, API) to a parameter; return its value, or {} if it is not set."""
         caller_id, uri = registration_args
         self._nodes[uri] = caller_id
         return self._tree.subscribe(key, caller_id, uri)

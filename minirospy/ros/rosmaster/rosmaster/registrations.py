@@ -1,7 +1,7 @@
 """rosmaster.registrations: tables of nodes' registrations, for programs that implement a master.
 
-A table maps a topic, service or parameter to the (name, API) of its nodes. Not thread-safe.
-Source: http://wiki.ros.org/ROS/Master_API for the responses of ``unregister``.
+A table maps a topic, service or parameter to the (name, API) of its nodes. Not thread-safe. Source of ``unregister``'s
+responses: http://wiki.ros.org/ROS/Master_API.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Registrations:
     def register(
         self, key: str, caller_id: str, caller_api: str | None, service_api: str | None = None
     ) -> None:
-        """Add a node. A new service provider replaces the old one. Raise InternalException if a service has no address."""
+        """Register a node. A new service provider replaces the old one. Raise InternalException if a service has no address."""
         node = (caller_id, caller_api)
         nodes = self.map.get(key)
         if nodes is None or service_api:
@@ -95,7 +95,7 @@ class Registrations:
     def unregister(
         self, key: str, caller_id: str, caller_api: str | None, service_api: str | None = None
     ) -> Answer:
-        """Remove a node from a name; return the Master API's response, whose value is the number of removed nodes."""
+        """Unregister a node from a name; return the Master API's response, whose value is the number of removed nodes."""
         done = f"Unregistered [{caller_id}] as provider of [{key}]"
         if service_api:
             if self.service_api_map is None:
@@ -128,7 +128,7 @@ class NodeRef:
         self.clear()
 
     def clear(self) -> None:
-        """Remove all registrations, but not the name and API."""
+        """Remove all registrations, but keep the node's name and API."""
         self.param_subscriptions: list[str] = []
         self.topic_subscriptions: list[str] = []
         self.topic_publications: list[str] = []
@@ -156,7 +156,7 @@ class NodeRef:
 
 
 def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
-    """Request that a node shut down; ignore a node that does not respond, because it has exited."""
+    """Request that a node shut down. Ignore a node that does not respond, because it has already exited."""
     with contextlib.suppress(OSError, Error):
         if node := xmlrpcapi(api):
             node.shutdown("/master", f"[{caller_id}] Reason: {reason}")

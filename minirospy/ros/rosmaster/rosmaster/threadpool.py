@@ -1,4 +1,4 @@
-"""rosmaster.threadpool: threads for calls to nodes; no two tasks with the same marker run at the same time."""
+"""rosmaster.threadpool: threads for calls to nodes. No two tasks with the same marker run at the same time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class _Task(NamedTuple):
 
 
 class MarkedThreadPool:
-    """Runs tasks in daemon threads, in order; the marker is a node, so that a slow node occupies only one thread."""
+    """Runs tasks in daemon threads, in order. The marker is a node, so that a slow node occupies only one thread."""
 
     def __init__(self, numThreads: int) -> None:
         self._changed = threading.Condition()
@@ -29,7 +29,7 @@ class MarkedThreadPool:
         self.set_thread_count(numThreads)
 
     def set_thread_count(self, newNumThreads: int) -> bool:
-        """Start or stop threads; return whether that is possible."""
+        """Start or stop threads to reach this count; return False if the count cannot be set."""
         with self._changed:
             if self._is_joining:
                 return False
@@ -57,7 +57,7 @@ class MarkedThreadPool:
             return True
 
     def join_all(self, wait_for_tasks: bool = True, wait_for_threads: bool = True) -> None:
-        """Stop the threads, after the queued tasks if requested; the pool can be reused afterwards."""
+        """Stop the threads; if requested, first run the queued tasks. The pool can be reused afterwards."""
         with self._changed:
             self._is_joining = True
             while wait_for_tasks and self._tasks and self._threads:
@@ -88,7 +88,7 @@ class MarkedThreadPool:
                 if task.on_result:
                     task.on_result(result)
             except Exception:
-                # The caller's task may raise any exception.
+                # Catch every exception, because the caller's task may raise any.
                 logging.getLogger("rosmaster.threadpool").exception("a task failed")
 
     def _next(self) -> _Task | None:

@@ -1,6 +1,7 @@
 """rosmaster.validators: checks for the arguments of master calls.
 
-Each function returns a check ``(value, caller_id) -> value``, which raises ParameterInvalid with rosmaster's messages.
+Each function returns a check, which is called with (value, caller_id). The check returns the value, or raises
+ParameterInvalid with rosmaster's message.
 """
 
 from __future__ import annotations
@@ -117,13 +118,20 @@ def valid_name(param_name: str, resolve: bool = True) -> Check:
 
 
 def is_topic(param_name: str) -> Check:
-    """Require a topic name; return the resolved name."""
-    return valid_name(param_name)
+    """Require a topic name other than the global namespace; return the resolved name."""
+
+    def check(value: object, caller_id: str) -> object:
+        name = valid_name_validator_unresolved(param_name, value, caller_id)
+        if name == "/":
+            raise ParameterInvalid(f"ERROR: parameter [{param_name}] cannot be the global namespace")
+        return resolve_name(name, caller_id)
+
+    return check
 
 
 def is_service(param_name: str) -> Check:
-    """Require a service name; return the resolved name."""
-    return valid_name(param_name)
+    """Require a service name other than the global namespace; return the resolved name."""
+    return is_topic(param_name)
 
 
 def is_api(paramName: str) -> Check:

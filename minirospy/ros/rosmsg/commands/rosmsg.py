@@ -14,7 +14,7 @@ from minirospy.command.parser import Misuse, Parser
 from minirospy.command.verbs import Family, HelpStatus, Verb
 from minirospy.introspect.interfaces import Interfaces, Kind
 
-__all__ = ["ROSMSG", "ROSSRV", "main", "main_srv"]
+__all__ = ["ROSMSG", "ROSSRV", "main", "main_srv", "reason_not_shown"]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -61,31 +61,16 @@ class _Verbs:
             try:
                 types = interfaces.find(name.removesuffix(f".{self.kind.value}"))
             except NotFoundError as error:
-                raise WordedError(error, RosText(self._cannot_show(name))) from error
+                raise WordedError(
+                    error,
+                    RosText(
+                        reason_not_shown(self.kind, name) if "/" in name else f"Could not find msg '{name}'"
+                    ),
+                ) from error
             for type_ in types:
                 if "/" not in name:
                     print(f"[{type_}]:")
                 print(interfaces.text(type_) if raw else interfaces.description(type_))
-
-    def _cannot_show(self, name: str) -> str:
-        """Return ROS's error message for a type that does not exist."""
-        from minirospy.workspace.packages import Packages
-
-        package, slash, base = name.partition("/")
-        if not slash:
-            return f"Could not find msg '{name}'"
-        refused = (
-            f"Unable to load msg [{name}]" if self.kind is Kind.MESSAGE else f"Unknown srv type [{name}]"
-        )
-        if "/" in base:
-            return f"{refused}: invalid name [{name}]"
-        packages = Packages()
-        try:
-            folder = packages.find(package) / self.kind.value
-        except NotFoundError:
-            searched = {name: [str(path / self.kind.value)] for name, path in packages.folders().items()}
-            return f"{refused}: Cannot locate message [{base}]: unknown package [{package}] on search path [{searched}]"
-        return f"{refused}: Cannot locate message [{base}] in package [{package}] with paths [['{folder}']]"
 
     def list_parser(self) -> Parser:
         return Parser(f"{self.command} list", f"List all {self.kind.word} types.", f"{self.command} list")
@@ -162,6 +147,25 @@ class _Verbs:
         return Interfaces(Packages(), self.kind)
 
 
+def reason_not_shown(kind: Kind, name: str) -> str:
+    """Return ROS's error message for a type that does not exist."""
+    from minirospy.workspace.packages import Packages
+
+    package, slash, base = name.partition("/")
+    if not slash:
+        package, base = "", name
+    refused = f"Unable to load msg [{name}]" if kind is Kind.MESSAGE else f"Unknown srv type [{name}]"
+    if "/" in base:
+        return f"{refused}: invalid name [{name}]"
+    packages = Packages()
+    try:
+        folder = packages.find(package) / kind.value
+    except NotFoundError:
+        searched = {name: [str(path / kind.value)] for name, path in packages.folders().items()}
+        return f"{refused}: Cannot locate message [{base}]: unknown package [{package}] on search path [{searched}]"
+    return f"{refused}: Cannot locate message [{base}] in package [{package}] with paths [['{folder}']]"
+
+
 def _names(name: str | None) -> list[str]:
     """Return the name from the command line, else the names from stdin."""
     if name is not None:
@@ -175,7 +179,7 @@ def _names(name: str | None) -> list[str]:
 
 
 def _invalid_package(name: str) -> str:
-    """Return ROS's error message for a package that does not exist, which includes the searched folders."""
+    """Return ROS's error message for a package that does not exist; the message lists the searched folders."""
     from minirospy.workspace.packages import Packages
 
     roots = (f"\nROS path [{number}]={root}" for number, root in enumerate(Packages().roots))

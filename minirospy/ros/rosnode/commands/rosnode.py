@@ -84,7 +84,7 @@ def _ping(node: str | None, all: bool, count: int) -> int:
         try:
             return _ping_one(graph, find_node(graph, name), count)
         except NodeUnreachableError as error:
-            raise WordedError(error, RosText(_no_answer(error))) from error
+            raise WordedError(error, RosText(_no_answer(error), 0)) from error
 
 
 def _no_node_to_ping() -> Misuse:
@@ -95,7 +95,7 @@ def _no_node_to_ping() -> Misuse:
     except MasterUnreachableError:
         return Misuse("please enter a node to ping", "Please enter a node to ping")
     available = "".join(f"\n{name}" for name in nodes)
-    # ROS prints the error twice, because its list of nodes contains the error message.
+    # Print the error twice, as ROS does, because its list of nodes contains the error message.
     ros = f"Please enter a node to ping. Available nodes are:{available}\n{_ping_parser().usage_line()}\n\n"
     return Misuse(
         f"please enter a node to ping: {' '.join(nodes) or 'there are none'}",
@@ -124,15 +124,13 @@ def _ping_one(graph: Graph, node: NodeAddress, count: int) -> int:
 def _ping_all(graph: Graph) -> int:
     nodes = graph.addresses(list_nodes(graph))
     print("Will ping the following nodes: \n" + "".join(f" * {node.name}\n" for node in nodes))
-    silent = 0
     for node in nodes:
         print(f"pinging {node.name} with a timeout of {_PING_SECONDS}s", flush=True)
         try:
             _ping_once(graph, node, [])
         except NodeUnreachableError as error:
             complain("rosnode", error, ros_text=_no_answer(error))
-            silent += 1
-    return 1 if silent else 0
+    return 0
 
 
 def _no_answer(error: NodeUnreachableError) -> str:
@@ -145,7 +143,7 @@ def _no_answer(error: NodeUnreachableError) -> str:
 
 
 def _ping_once(graph: Graph, node: NodeAddress, times: list[float]) -> None:
-    """Ping and print; append the milliseconds to ``times`` before the line is printed, in case Ctrl-C is pressed."""
+    """Ping and print the time. Append the milliseconds to ``times`` before printing, in case Ctrl-C is pressed."""
     times.append(ping_node(graph, node, _PING_SECONDS) * 1000.0)
     print(f"xmlrpc reply from {node.uri}\ttime={times[-1]:f}ms", flush=True)
 
@@ -202,7 +200,6 @@ def _info(nodes: Sequence[str], quiet: bool) -> int:
             except NotFoundError as error:
                 print(node_text(NodeDetail(error.name, None, [], [], [])))
                 complain("rosnode", error, ros_text=f"cannot contact [{error.name}]: unknown node")
-                failed += 1
                 continue
 
             print(node_text(detail))
@@ -287,7 +284,7 @@ def _kill_all(graph: Graph, nodes: Sequence[NodeAddress]) -> int:
 
 
 def _known(graph: Graph, names: list[str]) -> list[NodeAddress]:
-    """Return those of ``names`` that exist as nodes; print an error for each of the others."""
+    """Return those of ``names`` that are nodes; print an error for each other name."""
     found: list[NodeAddress] = []
     unknown: list[NotFoundError] = []
     for name in names:
@@ -371,7 +368,7 @@ FAMILY = Family(
             "test connectivity to node",
             _ping_parser,
             _ping,
-            {"node": RosText("cannot ping [{name}]: unknown node")},
+            {"node": RosText("cannot ping [{name}]: unknown node", 0)},
         ),
         Verb("list", "list active nodes", _list_parser, _list),
         Verb("info", "print information about node", _info_parser, _info),

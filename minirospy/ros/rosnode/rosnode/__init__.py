@@ -1,4 +1,4 @@
-"""rosnode: information about nodes, and shutting them down. Source: http://wiki.ros.org/rosnode."""
+"""rosnode: provides information about nodes, and shuts them down. Source: http://wiki.ros.org/rosnode."""
 
 from __future__ import annotations
 
@@ -65,7 +65,10 @@ class ROSNodeIOException(ROSNodeException):
 
 
 def get_node_names(namespace: str | None = None) -> list[str]:
-    """Return the names of the nodes at or below ``namespace``. Raise ROSNodeIOException if the master does not respond."""
+    """Return the names of the nodes in ``namespace``, or of all nodes.
+
+    Raise ROSNodeIOException if the master does not respond.
+    """
     with _graph() as graph:
         return nodes.list_nodes(graph, graph.resolve(namespace) if namespace else "/")
 
@@ -104,11 +107,10 @@ def get_node_connection_info_description(node_api: str, master: masterapi.Master
 def rosnode_ping(
     node_name: str, max_count: int | None = None, verbose: bool = False, skip_cache: bool = False
 ) -> bool:
-    """Return whether a node responds to ``max_count`` pings (None: until one fails).
+    """Return whether a node responds to ``max_count`` pings. With None, ping until one fails.
 
-    Raise ROSNodeIOException if the master does not respond. The reason for a failure is printed to stderr; everything
-    else only
-    with ``verbose``.
+    Raise ROSNodeIOException if the master does not respond. The reason for a failure is always printed to stderr,
+    everything else only with ``verbose``.
     """
     with _graph() as graph:
         name = graph.resolve(node_name)
@@ -148,7 +150,10 @@ def rosnode_ping_all(verbose: bool = False, skip_cache: bool = False) -> tuple[l
 
 
 def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
-    """Request that nodes shut down; return (notified nodes, unknown or unreachable nodes). Without a master, all are unknown."""
+    """Request that nodes shut down; return (notified nodes, unknown or unreachable nodes).
+
+    Without a master, all nodes are unknown.
+    """
     notified: list[str] = []
     unknown: list[str] = []
     try:
@@ -170,10 +175,10 @@ def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
 def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str]) -> None:
     """Unregister the nodes in ``blacklist`` from the master, and print their names.
 
-    Raise ConnectionRefusedError if no master responds, as in ROS.
+    Raise ConnectionRefusedError, as ROS does, if no master responds.
     """
     with _graph(master, ConnectionRefusedError) as graph:
-        # Called even if the list is empty, because an unreachable master is an error.
+        # Query the master even if the list is empty, because an unreachable master is an error.
         graph.state()
         for node in graph.addresses(blacklist):
             print(f"Unregistering {node.name}")
@@ -183,7 +188,7 @@ def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str])
 def cleanup_master_whitelist(master: masterapi.Master, whitelist: Sequence[str]) -> None:
     """Unregister all nodes except those in ``whitelist`` from the master.
 
-    Raise ConnectionRefusedError if no master responds, as in ROS.
+    Raise ConnectionRefusedError, as ROS does, if no master responds.
     """
     with _graph(master, ConnectionRefusedError) as graph:
         for node in graph.addresses(name for name in nodes.list_nodes(graph) if name not in whitelist):
@@ -217,7 +222,7 @@ def rosnode_listnodes(namespace: str | None = None, list_uri: bool = False, list
 
 
 def rosnode_info(node_name: str, quiet: bool = False) -> None:
-    """Print the output of `rosnode info`; ``quiet``: do not query the node.
+    """Print the output of `rosnode info`; with ``quiet``, do not query the node.
 
     Raise ROSNodeIOException if the master does not respond.
     """
@@ -244,13 +249,13 @@ def rosnode_cleanup() -> None:
 
 
 def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
-    """Run the command; ``argv`` starts with its name. Exit with its status, as in ROS."""
+    """Run the command, and exit with its status, as ROS does. ``argv`` starts with the command's name."""
     from minirospy.ros.rosnode.commands.rosnode import main
 
     sys.exit(main(list(sys.argv if argv is None else argv)[1:]))
 
 
-# Private functions of ROS that programs call.
+# The following private functions of ROS's rosnode are called by programs.
 
 
 def _command(argv: Sequence[str]) -> None:
@@ -296,7 +301,7 @@ def _announce(name: str) -> None:
 
 
 def _ping(graph: Graph, node: NodeAddress, verbose: bool) -> float | None:
-    """Return the duration of a ping in seconds; print an error and return None if the node does not respond."""
+    """Ping a node; return the duration in seconds. If the node does not respond, print an error and return None."""
     try:
         seconds = nodes.ping_node(graph, node, _PING_SECONDS)
     except NodeUnreachableError as error:
@@ -319,12 +324,12 @@ def _graph(
     master: masterapi.Master | None = None, unreachable: type[Exception] = ROSNodeIOException
 ) -> Iterator[Graph]:
     """Yield the graph of ``master`` (default: the environment's master); convert errors to this module's exceptions."""
-    # Old scripts pass a ServerProxy, which returns an object for any attribute, but never a string.
+    # Old scripts pass a ServerProxy, which returns some object for any attribute, but never a string.
     uri = getattr(master, "master_uri", None)
     try:
         with Graph(MasterProxy(uri, ID), NAME) if isinstance(uri, str) else Graph.open(NAME) as graph:
             yield graph
     except MasterUnreachableError as error:
-        raise unreachable(str(error)) from error
+        raise unreachable(error.ros_text) from error
     except MinirospyError as error:
         raise ROSNodeException(str(error)) from error

@@ -1,9 +1,9 @@
-"""rospack, rosstack: find packages and their dependencies.
+"""rospack and rosstack: find packages and their dependencies.
 
-rosstack treats metapackages as packages; rospack does not. Output, error messages and exit statuses are the same as
-those of ROS: http://docs.ros.org/api/rospack/html/commandline.html. The command line is parsed without argparse, for
-speed, because shells and scripts call `rospack find` often. Intended differences: an invalid package.xml is an error only
-for packages that depend on it, conditions are evaluated, and a dependency cycle is an error only for the packages in it.
+rosstack treats metapackages as packages; rospack does not. Output, error messages and exit statuses are the same as those
+of ROS: http://docs.ros.org/api/rospack/html/commandline.html. The command line is parsed without argparse for speed,
+because shells and scripts call `rospack find` often. Intended differences: an invalid package.xml is an error only for
+packages that depend on it, conditions are evaluated, and a dependency cycle is an error only for the packages in it.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class _Line(NamedTuple):
 
 
 class _Verb(NamedTuple):
-    """A verb: ``usage`` follows its name in the help; ``summary`` is the output of `rospack help VERB`."""
+    """A verb. ``usage`` follows its name in the help; ``summary`` is the output of `rospack help VERB`."""
 
     body: Callable[[_Line, Dependencies], None]
     usage: str
@@ -59,7 +59,7 @@ class _Verb(NamedTuple):
 
 
 class _Tool(NamedTuple):
-    """A command: its name, its word for a package, and its verbs."""
+    """A command: its name, its term for a package, and its verbs."""
 
     name: str
     thing: str
@@ -96,7 +96,7 @@ def _dispatch(words: list[str], tool: _Tool) -> int:
             print(_help(tool, line.package))
             return 0
         if not line.verb:
-            # rospack does not treat this as a failure.
+            # Exit with 0, because rospack does not treat this as a failure.
             complain("Error", f"no command given.  Try '{tool.name} help'")
             return 0
         tree = Dependencies(
@@ -232,7 +232,8 @@ def _depends_manifests(line: _Line, tree: Dependencies) -> None:
 
 
 def _depends_msgsrv(line: _Line, tree: Dependencies) -> None:
-    # rosbuild created these files when it generated messages; catkin packages do not contain them.
+    # Only check the package: rosbuild created these files when it generated messages, and catkin packages do not
+    # contain them.
     tree.all(_package(line))
     print()
 
@@ -256,7 +257,8 @@ def _rosdep0(line: _Line, tree: Dependencies) -> None:
 
 
 def _vcs(line: _Line, tree: Dependencies) -> None:
-    # <versioncontrol> is a tag in manifest.xml that does not exist in package.xml.
+    # Only check that the package exists: <versioncontrol> is a tag in manifest.xml that does not exist in
+    # package.xml.
     tree.folder(_package(line))
 
 
@@ -312,7 +314,7 @@ def _contains(line: _Line, tree: Dependencies) -> None:
 
 
 def _flags(attribute: str, prefix: str, keep: Callable[[str], bool]) -> Callable[[_Line, Dependencies], None]:
-    """Return a verb that prints the compiler or linker flags in <cpp> exports that ``keep`` selects, without ``prefix``."""
+    """Return a verb that prints those compiler or linker flags in <cpp> exports that ``keep`` accepts, without ``prefix``."""
 
     def body(line: _Line, tree: Dependencies) -> None:
         words = " ".join(_exported(line, tree, _package(line), "cpp", attribute)).split()

@@ -1,4 +1,4 @@
-"""rosparam: parameters in files and on the server. Source: http://wiki.ros.org/rosparam."""
+"""rosparam: reads and writes parameters in files and on the server. Source: http://wiki.ros.org/rosparam."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ __all__ = [
 NAME = "rosparam"
 NS = "_ns"
 
-# Programs that import rosparam can read deg(90) and rad(pi/2) with PyYAML's own loaders, as in ROS.
+# After importing rosparam, programs can read deg(90) and rad(pi/2) with PyYAML's own loaders, as in ROS.
 for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
     add_angles(_loader)
 
@@ -95,7 +95,7 @@ def set_param(param: str, value: str, verbose: bool = False) -> None:
 
 
 def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
-    """Set a parameter to a value; a dictionary does not delete the namespace's other parameters."""
+    """Set a parameter to a value. A dictionary is merged: it does not delete the namespace's other parameters."""
     with _graph() as graph:
         target = graph.resolve(param) if isinstance(param, str) else _resolve(graph, param)
         for name, single in parameters.set_parameter(graph, target, _with_bytes(value)):
@@ -113,7 +113,7 @@ def _with_bytes(value: object) -> object:
 
 
 def upload_params(ns: str, values: object, verbose: bool = False) -> None:
-    """Set all values below a namespace. Raise RosParamException if the root is set to anything but a dictionary."""
+    """Set all values in a namespace. Raise RosParamException if the root is set to anything but a dictionary."""
     check_sendable(ns)
     if ns == GLOBALNS and not isinstance(values, dict):
         raise RosParamException("global / can only be set to a dictionary")
@@ -144,12 +144,12 @@ def print_params(params: object, ns: str) -> None:
 
 
 def get_param_server() -> Master:
-    """Return the parameter server: the environment's master."""
+    """Return a proxy for the parameter server, which is the environment's master."""
     return Master("/" + NAME)
 
 
 def list_params(ns: str) -> list[str]:
-    """Return the names of the parameters below a namespace."""
+    """Return the names of the parameters in a namespace."""
     with _graph() as graph:
         check_sendable(ns)
         return parameters.list_parameters(graph, graph.resolve(ns))
@@ -183,7 +183,7 @@ def load_file(
 def load_str(
     str: str | bytes, filename: str, default_namespace: str | None = None, verbose: bool = False
 ) -> list[tuple[object, str]]:
-    """Return [(values, namespace)] for each document in a YAML string, which :func:`load_file` read from ``filename``."""
+    """Return [(values, namespace)] for each document in a YAML string that was read from ``filename``."""
     text = str.decode() if isinstance(str, bytes) else str
     try:
         documents = list(parse_documents(text, filename))
@@ -200,7 +200,7 @@ def load_str(
 
 
 def dump_params(filename: str, param: str, verbose: bool = False) -> None:
-    """Write the parameters below a name to a file.
+    """Write the parameters in a namespace to a file.
 
     Raise OSError if the file cannot be written, rosgraph.MasterError if there are no parameters.
     """
@@ -211,14 +211,14 @@ def dump_params(filename: str, param: str, verbose: bool = False) -> None:
 
 
 def yamlmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command; ``argv`` starts with its name. Exit the program on failure, as in ROS."""
+    """Run the command, and exit the program if it fails, as ROS does. ``argv`` starts with the command's name."""
     from minirospy.ros.rosparam.commands.rosparam import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
         sys.exit(status)
 
 
-# Private functions of ROS that programs call.
+# The following private functions of ROS's rosparam are called by programs.
 
 _rosparam_cmd_delete = _rosparam_cmd_list = yamlmain
 
@@ -239,7 +239,7 @@ def _fullusage() -> NoReturn:
 
 
 def _resolve(graph: Graph, param: str) -> str:
-    """Return a parameter's global name. An empty name would mean the namespace, and therefore all parameters in it.
+    """Return a parameter's global name. Raise MasterError for an empty name, which would mean all parameters in the namespace.
 
     A value that is not a string raises the same error as in ROS, which sends the value to the master: TypeError if XML-RPC
     does not support its type.
@@ -263,6 +263,6 @@ def _named() -> Iterator[None]:
     try:
         yield
     except MasterUnreachableError as error:
-        raise RosParamIOException(str(error)) from error
+        raise RosParamIOException(error.ros_text) from error
     except MinirospyError as error:
         raise RosParamException(str(error)) from error

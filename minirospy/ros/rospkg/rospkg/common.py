@@ -1,4 +1,4 @@
-"""rospkg.common: file names, and the error for a name that is not found."""
+"""rospkg.common: file names, and the error for names that are not found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""rospkg.distro: the environment's ROS distribution."""
+"""rospkg.distro: determines the environment's ROS distribution."""
 
 from __future__ import annotations
 

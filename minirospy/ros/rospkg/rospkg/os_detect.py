@@ -1,7 +1,7 @@
 """rospkg.os_detect: detects the operating system's name, version and codename.
 
-All Linux distributions specify them in /etc/os-release, so one class replaces rospkg's detectors for single distributions.
-The environment variable ``ROS_OS_OVERRIDE`` (``ubuntu:22.04:jammy``) takes precedence.
+All Linux distributions specify these in /etc/os-release, so one class replaces rospkg's detectors for single
+distributions. The environment variable ``ROS_OS_OVERRIDE`` (``ubuntu:22.04:jammy``) takes precedence.
 """
 
 from __future__ import annotations
@@ -89,11 +89,11 @@ _OF_FDO = {
     "raspbian": OS_DEBIAN, "rhel": OS_RHEL, "rocky": OS_ROCKY, "sailfishos": OS_SAILFISHOS, "slackware": OS_SLACKWARE,
     "tizen": OS_TIZEN, "ubuntu": OS_UBUNTU, "zorin": OS_ZORIN,
 }  # fmt: skip
-"""ID in /etc/os-release -> rospkg's name."""
+"""Maps an ID in /etc/os-release to rospkg's name for the system."""
 
 
 class OsNotDetected(Exception):
-    """The running operating system is not the one that the detector detects."""
+    """The running operating system is not the one that the detector supports, or no detector supports it."""
 
 
 def read_os_release(filename: str | None = None) -> dict[str, str] | None:
@@ -130,11 +130,11 @@ class OsDetector:
         raise NotImplementedError("is_os unimplemented")
 
     def get_version(self) -> str:
-        """Return the system's version. Raise OsNotDetected if another system is running."""
+        """Return the system's version. Raise OsNotDetected if this is not the system that is running."""
         raise NotImplementedError("get_version unimplemented")
 
     def get_codename(self) -> str:
-        """Return the system's codename. Raise OsNotDetected if another system is running."""
+        """Return the system's codename. Raise OsNotDetected if this is not the system that is running."""
         raise NotImplementedError("get_codename unimplemented")
 
 
@@ -150,11 +150,11 @@ class FdoDetect(OsDetector):
         return self.release_info is not None
 
     def get_version(self) -> str:
-        """Return VERSION_ID. Raise OsNotDetected if another system is running."""
+        """Return VERSION_ID. Raise OsNotDetected if this is not the system that is running."""
         return self._info().get("VERSION_ID", "")
 
     def get_codename(self) -> str:
-        """Return VERSION_CODENAME. Raise OsNotDetected if another system is running."""
+        """Return VERSION_CODENAME. Raise OsNotDetected if this is not the system that is running."""
         release = self._info()
         codename = release.get("VERSION_CODENAME", "")
         if not codename and "(" in (version := release.get("VERSION", "")):
@@ -168,7 +168,7 @@ class FdoDetect(OsDetector):
 
 
 class LsbDetect(FdoDetect):
-    """Detects a Linux distribution by its name from `lsb_release`, which os-release contains in lower case."""
+    """Detects a Linux distribution by the name that `lsb_release` prints; os-release contains the same name in lower case."""
 
     def __init__(self, lsb_name: str, get_version_fn: object = None) -> None:
         self.lsb_name = lsb_name
@@ -192,13 +192,13 @@ class _Platform(OsDetector):
         return platform.system() == self.system
 
     def get_version(self) -> str:
-        """Return the system's version. Raise OsNotDetected if another system is running."""
+        """Return the system's version. Raise OsNotDetected if this is not the system that is running."""
         if not self.is_os():
             raise OsNotDetected("called in incorrect OS")
         return self._version()
 
     def get_codename(self) -> str:
-        """Return an empty codename. Raise OsNotDetected if another system is running."""
+        """Return an empty codename. Raise OsNotDetected if this is not the system that is running."""
         if not self.is_os():
             raise OsNotDetected("called in incorrect OS")
         return ""
@@ -238,7 +238,7 @@ class FreeBSD(_Platform):
 
 
 class OsDetect:
-    """Detects the operating system with a list of detectors; the first one that matches wins."""
+    """Detects the operating system with a list of detectors; the first one that matches is used."""
 
     default_os_list: list[tuple[str, OsDetector]] = []
 

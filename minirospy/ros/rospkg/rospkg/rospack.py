@@ -38,7 +38,7 @@ _Manager = TypeVar("_Manager", bound="ManifestManager")
 
 
 class ManifestManager:
-    """Packages or stacks below the given folders. Results are cached: create a new object to see changes on disk."""
+    """Finds packages or stacks below the given folders. Results are cached, so create a new object to see changes on disk."""
 
     def __init__(self, ros_paths: Sequence[str] | None = None) -> None:
         self._ros_paths = get_ros_paths() if ros_paths is None else list(ros_paths)
@@ -100,7 +100,7 @@ class ManifestManager:
                 if name in self.get_depends(other, implicit):
                     found.append(other)
             except InvalidManifest:
-                # One invalid manifest must not affect other packages.
+                # Ignore an invalid manifest, so that it does not affect other packages.
                 continue
         return found
 
@@ -113,7 +113,7 @@ class ManifestManager:
         self._custom[key] = value
 
     def _load_manifest(self, name: str) -> Manifest:
-        # Programs call this method, although it is private in rospkg, too.
+        # Programs call this method, although it is also private in rospkg.
         return self.get_manifest(name)
 
     def _folders(self) -> dict[str, Path]:
@@ -140,7 +140,7 @@ class ManifestManager:
             if each not in found:
                 found[each] = None
                 self._visit(each, found)
-                # Move the package after its dependencies.
+                # Move the package behind its dependencies.
                 found[each] = found.pop(each)
 
 
@@ -148,7 +148,7 @@ class RosPack(ManifestManager):
     """Finds packages."""
 
     def get_rosdeps(self, package: str, implicit: bool = True) -> Names:
-        """Return a package's dependencies that are not packages; with ``implicit``, also the dependencies of its dependencies.
+        """Return a package's dependencies that are not packages; with ``implicit``, also those of packages it depends on.
 
         Raise ResourceNotFound if a package does not exist, InvalidManifest if a manifest cannot be parsed.
         """
@@ -207,7 +207,7 @@ def get_package_name(path: str) -> str | None:
 def expand_to_packages(
     names: Sequence[str], rospack: RosPack, rosstack: RosStack
 ) -> tuple[list[str], list[str]]:
-    """Return (packages, unknown names), with metapackages replaced by their packages."""
+    """Return (packages, unknown names) for the given names, with metapackages replaced by their packages."""
     packages, unknown = [], []
     for name in dict.fromkeys(names):
         if name in rospack.list():

@@ -1,4 +1,4 @@
-"""The part of `import rospy` in addition to `minirospy.client`: rospy's submodules, which programs access directly."""
+"""Completes `import rospy`: adds rospy's submodules, which programs access directly, to `minirospy.client`."""
 
 from typing import TYPE_CHECKING
 

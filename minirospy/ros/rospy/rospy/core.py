@@ -1,4 +1,4 @@
-"""rospy.core: the node life cycle, in addition to the names of `minirospy.client`.
+"""rospy.core: functions for the node's life cycle, in addition to the names in `minirospy.client`.
 
 Source: the behaviour of rospy.core; its internal log functions write to the log file only.
 """
@@ -131,7 +131,7 @@ def _base_logger(
     level: str = "info",
     once: bool = False,
 ) -> None:
-    """Log with the position of the caller's caller, as rospy's log functions do; programs wrap it in the same way.
+    """Log with the source position of the caller's caller, as rospy's log functions do; programs wrap this function similarly.
 
     ``level`` is a logging.Logger method name (``warning``), ``kwargs`` may contain ``logger_name``.
     """
@@ -156,12 +156,12 @@ def is_initialized() -> bool:
 
 
 def is_shutdown_requested() -> bool:
-    """Return whether a shutdown has started; while its hooks run, is_shutdown() is still false."""
+    """Return whether a shutdown has started. While its hooks run, is_shutdown() still returns False."""
     return current_session().lifecycle.is_shutdown_requested
 
 
 def add_preshutdown_hook(h: Callable[[object], object]) -> None:
-    """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() is still false.
+    """Call ``h(reason)`` after the hooks of on_shutdown, while is_shutdown() still returns False.
 
     Raise TypeError if ``h`` is not callable.
     """
@@ -170,7 +170,7 @@ def add_preshutdown_hook(h: Callable[[object], object]) -> None:
 
 
 def add_shutdown_hook(h: Callable[[object], object]) -> None:
-    """Call ``h(reason)`` after is_shutdown() has become true. Raise TypeError if ``h`` is not callable."""
+    """Call ``h(reason)`` after is_shutdown() has started to return True. Raise TypeError if ``h`` is not callable."""
     lifecycle = current_session().lifecycle
     lifecycle.add_hook(_given_reason(h), lifecycle.interrupts)
 
@@ -206,7 +206,14 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 
 def is_topic(param_name: str) -> Validator:
     """Return a check that the argument ``param_name`` is a topic name. The check raises ParameterInvalid if it is not."""
-    return valid_name(param_name)
+    resolved = valid_name(param_name)
+
+    def check(param_value: object, caller_id: str) -> str:
+        if param_value == "/":
+            raise ParameterInvalid(f"ERROR: parameter [{param_name}] cannot be the global namespace")
+        return resolved(param_value, caller_id)
+
+    return check
 
 
 def _given_reason(h: Callable[[object], object]) -> Callable[[], object]:

@@ -1,4 +1,4 @@
-"""Internal variables of rospy that programs read and set: each is a property of its module.
+"""rospy's internal variables that programs read and set, as properties of their modules.
 
 `import rospy` imports this module last, because it needs the others.
 """
@@ -11,8 +11,10 @@ from typing import Any
 
 import rospy.client
 import rospy.core
+import rospy.names
 import rospy.rostime
 
+from minirospy.client.identity import Identity
 from minirospy.client.session import current_session, replace_session
 from minirospy.client.time import get_rostime
 from minirospy.ros.rospy.rospy.rostime import (
@@ -30,9 +32,9 @@ _Put = Callable[[Any], object]
 
 
 def _install(module: ModuleType, **names: tuple[_Get, _Put]) -> None:
-    """Add attributes to ``module``; each has a function that returns the value, and one that sets it.
+    """Add attributes to ``module``; for each, ``names`` has a function that returns its value, and one that sets it.
 
-    Deleting an attribute restores its previous value, because unittest.mock ends a patch in this way.
+    Deleting an attribute restores its previous value, because unittest.mock deletes it at the end of a patch.
     """
 
     def attribute(get: _Get, put: _Put) -> property:
@@ -57,7 +59,7 @@ def _restart_unless(value: object) -> None:
         replace_session()
 
 
-# Programs set these flags to False to start another node after the first has shut down.
+# Programs set these flags to False in order to start another node after the first has shut down.
 _install(
     rospy.core,
     _shutdown_flag=(lambda: current_session().is_shutdown(), _restart_unless),
@@ -75,4 +77,27 @@ _install(
     rospy.rostime,
     _rostime_initialized=(is_rostime_initialized, set_rostime_initialized),
     _rostime_current=(lambda: None if is_wallclock() else get_rostime(), set_rostime),
+)
+
+
+def _identity() -> Identity:
+    return current_session().identity
+
+
+_install(
+    rospy.names,
+    _mappings=(lambda: _identity().mappings, lambda value: setattr(_identity(), "mappings", value)),
+    _resolved_mappings=(
+        lambda: _identity().remappings,
+        lambda value: setattr(_identity(), "remappings", value),
+    ),
+    # A new name keeps the namespace, as in rospy, where the two are separate variables.
+    _caller_id=(
+        lambda: _identity().name,
+        lambda value: _identity().be_called(value, _identity().namespace),
+    ),
+    _caller_namespace=(
+        lambda: _identity().namespace,
+        lambda value: _identity().be_called(_identity().name, value),
+    ),
 )

@@ -15,7 +15,7 @@ _GET, _SET = "/get_loggers", "/set_logger_level"
 
 
 class ROSConsoleException(Exception):
-    """A node does not report its loggers."""
+    """A node does not list its loggers."""
 
 
 class LoggerLevelServiceCaller:
@@ -26,7 +26,7 @@ class LoggerLevelServiceCaller:
         self._current_levels: dict[str, str] = {}
 
     def get_levels(self) -> list[str]:
-        """Return the levels, the least severe first."""
+        """Return the names of the levels, the least severe first."""
         return ["debug", "info", "warn", "error", "fatal"]
 
     def get_node_names(self) -> list[str]:

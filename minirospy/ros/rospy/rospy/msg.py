@@ -1,4 +1,4 @@
-"""Messages with a length prefix, as rospy.msg writes and reads them. Source: http://wiki.ros.org/ROS/TCPROS."""
+"""Writes and reads messages with a length prefix, as rospy.msg does. Source: http://wiki.ros.org/ROS/TCPROS."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ _LENGTH = struct.Struct("<I")
 
 
 def serialize_message(b: BytesIO, seq: int, msg: Message) -> None:
-    """Write ``msg`` with its length to ``b``. Set the header's ``seq``, and clear its frame_id if that was "0"."""
+    """Write ``msg`` to ``b``, preceded by its length.
+
+    Set the header's ``seq``, and replace the frame_id "0" by an empty string.
+    """
     number_header(msg, seq)
     start = b.tell()
     b.write(b"\0\0\0\0")

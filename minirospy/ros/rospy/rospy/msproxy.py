@@ -1,4 +1,4 @@
-"""The master that rospy.get_master() returns: the Master API with unchanged results, and parameters like a dict.
+"""The master proxy that rospy.get_master() returns: the Master API with unchanged results, and parameters like a dict.
 
 Source: http://wiki.ros.org/ROS/Master_API and the behaviour of rospy.msproxy.
 """
@@ -36,11 +36,11 @@ _NAMES_FIRST = frozenset(
         "unregisterSubscriber",
         "unsubscribeParam",
     }
-)  # methods whose first argument is the name of a graph resource
+)  # methods whose first argument is a name in the graph
 
 
 class ServerProxy:
-    """An XML-RPC server: each attribute is one of its methods.
+    """A proxy for an XML-RPC server; each attribute is one of the server's methods.
 
     As in xmlrpc.client, calls raise OSError (ConnectionRefusedError, TimeoutError) if the server is unreachable, and
     xmlrpc.client.Fault if the server returns a fault. Thread-safe.
@@ -72,7 +72,7 @@ class ServerProxy:
 
 
 class MasterProxy:
-    """The master at ``uri``: passes this node's name as the first argument, resolves names, and returns unchanged results.
+    """A proxy for the master at ``uri``, which passes this node's name as the first argument, and resolves names.
 
     Results are ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``.
     ``proxy[key]``, ``proxy[key] = value``, ``del proxy[key]`` (KeyError), ``key in proxy`` and iteration
@@ -116,7 +116,7 @@ class MasterProxy:
         return iter(value if code == 1 else [])
 
     def search_param(self, key: str) -> str | None:
-        """Return the closest parameter with this name, searched upwards from this node's namespace, or None if there is none."""
+        """Return the name of the closest parameter, searched upwards from this node's namespace, or None if there is none."""
         check_sendable(key)
         code, _, value = self.target.searchParam(current_session().name, key)
         return value if code == 1 else None
@@ -133,13 +133,13 @@ def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
 
 
 def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:
-    """Return the XML-RPC server at ``uri``, always the same object for a URI, or None if ``uri`` is invalid."""
+    """Return a proxy for the XML-RPC server at ``uri``, the same one on each call, or None if ``uri`` is invalid."""
     if not uri or not uri.startswith(("http://", "rosrpc://")):
         return None
     return _server(uri, os.getpid()) if cache else ServerProxy(uri)
 
 
-# Cache it per process: a forked child must not use its parent's connections.
+# Cache it per process, because a forked child must not use its parent's connections.
 @functools.cache
 def _master(uri: str, pid: int) -> MasterProxy:
     return MasterProxy(uri)

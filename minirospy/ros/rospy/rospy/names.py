@@ -1,4 +1,4 @@
-"""rospy.names: remappings, and the validation of a call's arguments.
+"""rospy.names: remappings, and checks for the arguments of calls.
 
 Source: http://wiki.ros.org/Names and the behaviour of rospy.names.
 """
@@ -65,8 +65,10 @@ __all__ = [
 ]
 
 
-def _set_caller_id(name: str) -> None:
-    current_session().identity.be_called(name)
+def _set_caller_id(caller_id: str) -> None:
+    """Use another node name, without telling the master. Raise ValueError if ``caller_id`` is None."""
+    namespace(caller_id)
+    current_session().identity.be_called(caller_id)
 
 
 ANYTYPE = TOPIC_ANYTYPE = SERVICE_ANYTYPE = "*"
@@ -87,31 +89,32 @@ class ParameterInvalid(Exception):
 
 
 def get_mappings() -> dict[str, str]:
-    """Return the remappings on this node's command line as written, including ``__name`` and other special keys."""
-    arguments = current_session().identity.arguments
-    return {**arguments.remappings, **arguments.special}
+    """Return the remappings on this node's command line as written, including ``__name`` and other special keys.
+
+    :func:`initialize_mappings` applies changes to the dict.
+    """
+    return current_session().identity.mappings
 
 
 def get_resolved_mappings() -> dict[str, str]:
-    """Return the remappings with global names; empty before init_node."""
-    session = current_session()
-    identity = session.identity
-    return {**identity.remappings, **identity.arguments.special} if session.initialized else {}
+    """Return the remappings with global names; empty before init_node. Changes to the dict apply at once."""
+    return current_session().identity.remappings
 
 
 def reload_mappings(argv: Sequence[str]) -> None:
-    """Use ``argv`` as this node's command line."""
+    """Replace this node's command line by ``argv``."""
     current_session().identity.reload_arguments(argv)
 
 
 def initialize_mappings(node_name: str) -> None:
-    """Resolve the remappings again, with the node name ``node_name``."""
+    """Resolve the remappings again, with the node name ``node_name``. Raise ValueError if it is None."""
+    namespace(node_name)
     identity = current_session().identity
-    identity.remappings = identity.arguments.resolved_remappings(node_name)
+    identity.remappings = identity.resolved_mappings(node_name)
 
 
 def resolve_name_without_node_name(name: str) -> str:
-    """Return a topic's global name before init_node. Raise ValueError if the name is private."""
+    """Return a topic's global name, before init_node has been called. Raise ValueError if the name is private."""
     if is_private(name):
         raise ValueError("~name topics cannot be created before init_node() has been called")
     return current_session().identity.resolve_topic(name or "")
@@ -137,7 +140,7 @@ def global_name(param_name: str) -> Validator:
 
 
 def valid_name(param_name: str, resolve: bool = True) -> Validator:
-    """Return a check that the argument ``param_name`` is a valid name, and resolves it.
+    """Return a check that the argument ``param_name`` is a valid name; the check also resolves the name.
 
     The check raises ParameterInvalid if the name is invalid.
     """
@@ -146,7 +149,7 @@ def valid_name(param_name: str, resolve: bool = True) -> Validator:
 
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return an argument's global name, not remapped. Raise ParameterInvalid if it is not a valid name."""
+    """Return an argument's global name without remapping it. Raise ParameterInvalid if it is not a valid name."""
     return resolve_name_for(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 

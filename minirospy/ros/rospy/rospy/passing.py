@@ -1,6 +1,6 @@
 """Names that rospy's modules re-export by accident, because ROS's modules import each other with a star.
 
-A program that uses `rospy.core.resolve_name` finds that name; an editor lists only the names that a module defines.
+Programs can therefore use `rospy.core.resolve_name`, although editors list only the names that the module defines.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""rospy.rostime: the node's clock, which a program may set."""
+"""rospy.rostime: the node's clock, which programs can set."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def get_rostime_cond() -> threading.Condition:
 
 
 def is_rostime_initialized() -> bool:
-    """Return whether the time is available."""
+    """Return whether the node's time is available."""
     return current_session().has_time
 
 

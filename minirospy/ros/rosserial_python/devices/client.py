@@ -1,4 +1,4 @@
-"""SerialClient: represents a device on a serial port or connection as part of this node.
+"""SerialClient: represents a device on a serial port or TCP connection as part of this node.
 
 The device describes its topics and services; afterwards messages pass in both directions. The device can request the time
 and parameters, and its log messages appear as the node's log messages. Source:
@@ -60,7 +60,7 @@ _VERSIONS = {
 }
 _OPEN_SECONDS = 3.0
 _READY_SECONDS = 0.1
-_BOOT_SECONDS = 2.0  # seconds for a device to boot: an Arduino restarts when its port is opened
+_BOOT_SECONDS = 2.0  # time for a device to boot: an Arduino restarts when its port is opened
 
 
 class SerialClient:
@@ -78,7 +78,7 @@ class SerialClient:
         timeout: float = 5.0,
         fix_pyserial_for_test: bool = False,
     ) -> None:
-        """Open the port, retrying after a failure, and request the device's topics. ``timeout``: seconds per packet."""
+        """Open the port, retrying after a failure, and request the device's topics. ``timeout`` is in seconds per packet."""
         self.timeout = timeout
         self.synced = False
         self.publishers: dict[int, Publisher] = {}
@@ -90,7 +90,7 @@ class SerialClient:
         self.callbacks: dict[int, Callable[[bytes], object]] = {
             TopicInfo.ID_PUBLISHER: self.setupPublisher,
             TopicInfo.ID_SUBSCRIBER: self.setupSubscriber,
-            # A service has two entries, one for each direction of its calls.
+            # A service has two entries, one for the requests and one for the responses.
             TopicInfo.ID_SERVICE_SERVER + TopicInfo.ID_PUBLISHER: self.setupServiceServerPublisher,
             TopicInfo.ID_SERVICE_SERVER + TopicInfo.ID_SUBSCRIBER: self.setupServiceServerSubscriber,
             TopicInfo.ID_SERVICE_CLIENT + TopicInfo.ID_PUBLISHER: self.setupServiceClientPublisher,
@@ -304,7 +304,7 @@ class SerialClient:
                     info.message_type,
                 )
             else:
-                # A restarted device may number its topics differently.
+                # A device that has restarted may number its topics differently.
                 known.id = info.topic_id
 
     def setupServiceServerPublisher(self, data: bytes) -> None:
@@ -348,7 +348,7 @@ class SerialClient:
         return known
 
     def handleTimeRequest(self, data: bytes) -> None:
-        """Send the time to the device; the device's request also serves as a heartbeat."""
+        """Send the time to the device. The device's request also serves as a heartbeat."""
         self.send(TopicInfo.ID_TIME, to_bytes(Time(rospy.Time.now())))
         self.lastsync = rospy.Time.now()
         self._synced_at = time.monotonic()

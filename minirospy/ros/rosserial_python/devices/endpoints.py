@@ -1,4 +1,4 @@
-"""The topics and services that a device describes: each becomes a publisher, subscriber, service or proxy in the node."""
+"""The topics and services that a device describes. Each becomes a publisher, subscriber, service or proxy in the node."""
 
 from __future__ import annotations
 
@@ -49,7 +49,10 @@ def _compare(ours: str, theirs: str) -> None:
 
 
 class Publisher:
-    """Forwards messages from the device to ROS. Raise EndpointError if the type is not installed or differs."""
+    """Forwards messages from the device to ROS.
+
+    Raise EndpointError if the type is not installed, or its md5sum differs from the device's.
+    """
 
     def __init__(self, info: TopicInfo) -> None:
         self.topic = info.topic_name
@@ -68,7 +71,10 @@ class Publisher:
 
 
 class Subscriber:
-    """Forwards messages from ROS to the device. Raise EndpointError if the type is not installed or differs."""
+    """Forwards messages from ROS to the device.
+
+    Raise EndpointError if the type is not installed, or its md5sum differs from the device's.
+    """
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         self.topic = info.topic_name
@@ -89,7 +95,7 @@ class Subscriber:
 
 
 class _Service:
-    """A service's classes, and the id of the topic on which the device receives its part of a call.
+    """The base class of services: the message classes, and the id of the topic on which the device receives its part of a call.
 
     Raise EndpointError if the service type is not installed.
     """
@@ -108,11 +114,11 @@ class _Service:
         self.response: type[Message] = self.service_class._response_class
 
     def check_request(self, info: TopicInfo) -> None:
-        """Raise EndpointError if the device's request type differs."""
+        """Raise EndpointError if the device has a different request type."""
         _compare(self.request._md5sum, info.md5sum)
 
     def check_response(self, info: TopicInfo) -> None:
-        """Raise EndpointError if the device's response type differs."""
+        """Raise EndpointError if the device has a different response type."""
         _compare(self.response._md5sum, info.md5sum)
 
 
@@ -131,7 +137,7 @@ class ServiceServer(_Service):
             if self.id < 0:
                 raise rospy.ServiceException("the device has not finished to describe this service")
             while not self._responses.empty():
-                # Discard the response to a call that has timed out.
+                # Discard a late response to a call that has timed out.
                 self._responses.get_nowait()
             self._send(self.id, to_bytes(request))
             while not self._is_closed and not rospy.is_shutdown():
@@ -155,7 +161,7 @@ class ServiceServer(_Service):
 
 
 class ServiceClient(_Service):
-    """Service calls from the device, made in a thread, so that the device's other topics are not blocked."""
+    """Calls a service for the device, in a thread, so that the device's other topics are not blocked."""
 
     def __init__(self, info: TopicInfo, send: Send) -> None:
         super().__init__(info, send)
@@ -178,7 +184,7 @@ class ServiceClient(_Service):
             except rospy.ROSInterruptException:
                 return
             except rospy.ROSException as error:
-                # Send nothing: the device waits until its own timeout.
+                # Send no response: the device waits until its own timeout.
                 rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)
             except rospy.ServiceException as error:
                 rospy.logerr("Call of service %s by the device failed: %s", self.topic, error)

@@ -1,7 +1,7 @@
-"""Encode and decode the packets on a serial line. Pure. Source: http://wiki.ros.org/rosserial/Overview/Protocol.
+"""Encodes and decodes the packets on a serial line. Pure. Source: http://wiki.ros.org/rosserial/Overview/Protocol.
 
-A packet: ff fe, length (2 bytes, little endian), checksum of the length, topic id (2 bytes), data, checksum of id and data.
-Each checksum is chosen so that its sum with the bytes that it covers is 255 modulo 256.
+A packet consists of ff fe, length (2 bytes, little endian), checksum of the length, topic id (2 bytes), data, checksum of
+id and data. The sum of a checksum and the bytes that it covers is 255 modulo 256.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ __all__ = ["MAX_MESSAGE_LENGTH", "Decoder", "Fault", "Packet", "WrongVersion", "
 
 _SYNC, _VERSION = 0xFF, 0xFE
 _HEAD = struct.Struct("<HBH")
-MAX_MESSAGE_LENGTH = 0xFFFF  # bytes in the longest message that a packet can contain
+MAX_MESSAGE_LENGTH = 0xFFFF  # bytes; the packet's length field has 16 bits
 
 
 class Packet(NamedTuple):
@@ -25,7 +25,7 @@ class Packet(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """A rejected packet: the error, in the wording of the real rosserial_python."""
+    """A rejected packet. The error is worded as in the real rosserial_python."""
 
     text: str
 
@@ -65,17 +65,17 @@ class Decoder:
 
     @property
     def missing(self) -> int:
-        """The number of bytes that are missing from the current packet; 0 between packets."""
+        """The number of bytes still missing from the current packet, or 0 between packets."""
         return self._needed() - len(self._bytes) if self._bytes else 0
 
     @property
     def received(self) -> int:
-        """The number of received bytes in the current packet."""
+        """The number of bytes received so far for the current packet."""
         return len(self._bytes)
 
     @property
     def step(self) -> str:
-        """The part of a packet that is read next, in the wording of the real rosserial_python."""
+        """The part of a packet that is read next, with the name that the real rosserial_python uses."""
         count = len(self._bytes)
         for end, name in ((1, "syncflag"), (2, "protocol"), (5, "message length"), (7, "topic id")):
             if count < end:

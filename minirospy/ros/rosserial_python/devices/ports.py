@@ -25,7 +25,7 @@ class Port(Protocol):
     """A connection to a device."""
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the connection is lost."""
+        """Return the bytes that have arrived, or b"" after a short wait. Raise PortError if the connection is lost."""
 
     def write(self, data: bytes) -> None:
         """Write all bytes. Raise PortError if the connection is lost."""
@@ -39,7 +39,7 @@ class Port(Protocol):
 
 @runtime_checkable
 class File(Protocol):
-    """The program's file-like object: ``read`` blocks until it has ``count`` bytes. ``flushInput`` is optional."""
+    """A file-like object from the user's program. ``read`` blocks until it has ``count`` bytes. ``flushInput`` is optional."""
 
     def read(self, count: int, /) -> bytes:
         """Return bytes from the device."""
@@ -76,7 +76,7 @@ class SerialPort:
             raise PortError(str(error)) from error
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the connection is lost."""
+        """Return the bytes that have arrived, or b"" after a short wait. Raise PortError if the connection is lost."""
         try:
             first = bytes(self._serial.read(1))
             waiting = self._serial.in_waiting if first else 0
@@ -111,7 +111,7 @@ class SocketPort:
         connection.settimeout(_WRITE_SECONDS)
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the connection is closed."""
+        """Return the bytes that have arrived, or b"" after a short wait. Raise PortError if the connection is closed."""
         try:
             ready, _, _ = select.select([self._socket], [], [], _LOOK_SECONDS)
             if not ready:
@@ -131,7 +131,7 @@ class SocketPort:
             raise PortError(str(error)) from error
 
     def flush_input(self) -> None:
-        """Do nothing: a TCP connection delivers no stray bytes."""
+        """Do nothing, because a new TCP connection has no stray bytes from earlier."""
 
     def close(self) -> None:
         """Close the connection."""
@@ -139,13 +139,13 @@ class SocketPort:
 
 
 class FilePort:
-    """The program's object with ``read(count)``, ``write`` and ``inWaiting``, as SerialClient accepts it."""
+    """A port for an object from the user's program that has ``read(count)``, ``write`` and ``inWaiting``."""
 
     def __init__(self, file: File) -> None:
         self._file = file
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived; empty after a short wait. Raise PortError if the object raises an exception."""
+        """Return the bytes that have arrived, or b"" after a short wait. Raise PortError if the object raises an exception."""
         try:
             waiting = int(self._file.inWaiting())
             if waiting < 1:

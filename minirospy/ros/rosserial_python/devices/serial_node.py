@@ -1,4 +1,4 @@
-"""serial_node.py: a device on a serial port, or devices that connect over TCP (`serial_node.py tcp [PORT]`).
+"""serial_node.py: connects a device on a serial port, or devices that connect over TCP (`serial_node.py tcp [PORT]`).
 
 Parameters: ~port (/dev/ttyUSB0), ~baud (57600), ~tcp_port and ~fork_server (default: those of /rosserial_embeddedlinux),
 ~fix_pyserial_for_test. Source: http://wiki.ros.org/rosserial_python.
@@ -22,7 +22,7 @@ _OTHER = "/rosserial_embeddedlinux"
 
 
 def main() -> int:
-    """Run the node until it is shut down; return the exit status: 1 if it cannot start."""
+    """Run the node until it is shut down; return the exit status, 1 if it cannot start."""
     try:
         rospy.init_node("serial_node")
         rospy.loginfo("ROS Serial Python Node")
@@ -50,7 +50,7 @@ def _run(words: list[str]) -> int:
 
 
 def _param(name: str, default: object) -> object:
-    """Return a private parameter, else rosserial_embeddedlinux's parameter, which older launch files set."""
+    """Return a private parameter, else rosserial_embeddedlinux's parameter of that name, which older launch files set."""
     return rospy.get_param(f"~{name}", rospy.get_param(f"{_OTHER}/{name}", default))
 
 

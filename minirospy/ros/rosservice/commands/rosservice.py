@@ -60,7 +60,7 @@ def _info(service: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
         name = graph.resolve(service)
         offer = services.service_offer(graph, name)
-        # Print the master's information before calling the node, which may have exited.
+        # Print the master's information before calling the node, because the node may have exited.
         print(f"Node: {offer.node}\nURI: {offer.uri}", flush=True)
         type_ = services.service_type(graph, name)
     print(f"Type: {type_}\nArgs: {' '.join(services.service_arguments(type_))}")
@@ -82,6 +82,15 @@ def _uri_parser() -> Parser:
 def _uri(service: str, arguments: Arguments | None = None) -> None:
     with Graph.open("rosservice", arguments=arguments) as graph:
         print(services.service_uri(graph, graph.resolve(service)))
+
+
+def _node_parser() -> Parser:
+    return _service_parser("node", "Print the node that provides a service.")
+
+
+def _node(service: str, arguments: Arguments | None = None) -> None:
+    with Graph.open("rosservice", arguments=arguments) as graph:
+        print(services.service_offer(graph, graph.resolve(service)).node)
 
 
 def _find_parser() -> Parser:
@@ -164,7 +173,7 @@ def _call(
 
 
 def _as_ros_shows(error: ServiceException, service: str) -> str:
-    """Return ROS's message for an error; an error from the service's handler is shown as bytes."""
+    """Return ROS's message for an error. An error from the service's handler is printed as bytes."""
     cause = error.__cause__
     if isinstance(cause, CallFailed):
         return f"service [{service}] responded with an error: {cause.text!r}"
@@ -172,7 +181,7 @@ def _as_ros_shows(error: ServiceException, service: str) -> str:
 
 
 def _incorrect_type(type_: str, error: MessageException) -> WordedError:
-    """Return the error for a request whose values do not match the type, in ROS's wording, which ends with the definition."""
+    """Return ROS's error message for a request whose values do not match the type. The message ends with the definition."""
     from minirospy.introspect.interfaces import Interfaces, Kind
     from minirospy.workspace.packages import Packages
 
@@ -188,7 +197,7 @@ def _warn_waiting(graph: Graph, service: str) -> None:
 
 
 def _requests(type_: str, texts: Sequence[str]) -> Iterator[Message]:
-    """Yield the requests: one from the command line's values, or one for each document on stdin.
+    """Yield the requests: one built from the command line, or one for each document on stdin.
 
     On a terminal, prompt for fields without a value.
     """
@@ -265,6 +274,8 @@ FAMILY = Family(
             {"service": RosText("ERROR: unknown service")},
         ),
         Verb("list", "list active services", _list_parser, _list),
+        # ROS has this verb, but its help does not list it.
+        Verb("node", "", _node_parser, _node, {"service": RosText("Unknown service: {name}")}),
         Verb(
             "type",
             "print service type",

@@ -1,4 +1,4 @@
-"""rosservice: information about services, and calls. Source: http://wiki.ros.org/rosservice."""
+"""rosservice: calls services, and provides information about them. Source: http://wiki.ros.org/rosservice."""
 
 from __future__ import annotations
 
@@ -64,7 +64,10 @@ class ROSServiceIOException(ROSServiceException):
 def get_service_list(
     node: str | None = None, namespace: str | None = None, include_nodes: bool = False
 ) -> list[Any]:
-    """Return the services' names (of a node, below a namespace); with ``include_nodes``, [name, [nodes]] for each."""
+    """Return the services' names, optionally only those of one node or in one namespace.
+
+    With ``include_nodes``, return [name, [nodes]] for each service.
+    """
     with _graph() as graph:
         found = services.list_services(graph, graph.resolve(namespace) if namespace else "/")
         owner = _resolved(graph, node) if node else None
@@ -73,7 +76,10 @@ def get_service_list(
 
 
 def get_service_type(service_name: str) -> str | None:
-    """Return a service's type, or None if the service does not exist. Raise ROSServiceIOException if it does not respond."""
+    """Return a service's type, or None if the service does not exist.
+
+    Raise ROSServiceIOException if the service does not respond.
+    """
     with _graph() as graph:
         try:
             return services.service_type(graph, _sent(graph, service_name))
@@ -119,7 +125,7 @@ def rosservice_find(service_type: str) -> list[str]:
     with _graph() as graph:
         if service_type:
             return services.find_services_of_type(graph, service_type)
-        # No service can match, but as in ROS, an unreachable master raises an error.
+        # Query the master although no service can match, because as in ROS, an unreachable master is an error.
         services.list_services(graph)
         return []
 
@@ -154,14 +160,14 @@ def has_service_args(service_name: str, service_class: ServiceClass | None = Non
 
 
 def rosservicemain(argv: Sequence[str] | None = None) -> None:
-    """Run the command; ``argv`` starts with its name. Exit the program on failure, as in ROS."""
+    """Run the command, and exit the program if it fails, as ROS does. ``argv`` starts with the command's name."""
     from minirospy.ros.rosservice.commands.rosservice import main
 
     if status := main(list(sys.argv if argv is None else argv)[1:]):
         sys.exit(status)
 
 
-# Private functions of ROS that programs call.
+# The following private functions of ROS's rosservice are called by programs.
 
 _rosservice_cmd_args = _rosservice_cmd_call = _rosservice_cmd_find = _rosservice_cmd_info = rosservicemain
 _rosservice_cmd_list = _rosservice_cmd_node = _rosservice_cmd_type = _rosservice_cmd_uri = rosservicemain
@@ -173,18 +179,18 @@ def _fullusage() -> None:
 
 
 def _resolved(graph: Graph, name: str) -> str:
-    """Return the global name. A value that is not a string is converted to one, which matches no service, as in ROS."""
+    """Return a name's global name. A value that is not a string is converted to one, which matches no service, as in ROS."""
     return graph.resolve(name) if isinstance(name, str) else str(name)
 
 
 def _sent(graph: Graph, name: str) -> str:
-    """Return the global name for a call to the master. Raise TypeError if XML-RPC does not support the value's type."""
+    """Return the global name to send to the master. Raise TypeError if XML-RPC does not support the value's type."""
     check_sendable(name)
     return _resolved(graph, name)
 
 
 def _get_master() -> masterapi.Master:
-    """Return the master proxy with rosservice's caller id."""
+    """Return a master proxy with rosservice's caller id."""
     return masterapi.Master("/rosservice")
 
 
@@ -193,8 +199,11 @@ def _graph() -> Iterator[Graph]:
     try:
         with Graph.open("rosservice") as graph:
             yield graph
-    except (MasterUnreachableError, NodeUnreachableError) as error:
-        raise ROSServiceIOException(str(error)) from error
+    except MasterUnreachableError as error:
+        raise ROSServiceIOException(error.ros_text) from error
+    except NodeUnreachableError as error:
+        text = f"Unable to communicate with service [{error.name}], address [{error.uri}]"
+        raise ROSServiceIOException(text) from error
     except NotFoundError as error:
         text = f"Service [{error.name}] is not available." if error.kind == "service" else str(error)
         raise ROSServiceException(text) from error

@@ -24,12 +24,12 @@ __all__ = ["ROSTEST", "ROSUNIT", "rostest", "rosunit"]
 
 
 def rostest(argv: Sequence[str] | None = None) -> int:
-    """Run rostest; return 0 if all tests passed, 1 if one could not run or reported no results, 2 if one failed."""
+    """Run rostest; return 0 if all tests passed, 1 if a test could not run or reported no results, 2 if a test failed."""
     return ROSTEST.main(argv)
 
 
 def rosunit(argv: Sequence[str] | None = None) -> int:
-    """Run rosunit; return 0 if all tests passed, 1 if the file could not run or reported no results, 2 if one failed."""
+    """Run rosunit; return 0 if all tests passed, 1 if the file could not run or reported no results, 2 if a test failed."""
     return ROSUNIT.main(argv)
 
 
@@ -96,7 +96,7 @@ def _rostest(
     from minirospy.ros.rostest.runner.runner import RosTest
 
     base = _base(results_base_dir)
-    # Delete the test nodes' boards, such as MINIROSPY_BOARD=$(anon test), when the nodes exit.
+    # Delete the boards that test nodes create, such as MINIROSPY_BOARD=$(anon test), when the nodes exit.
     os.environ["MINIROSPY_BOARD_TEMPORARY"] = "1"
     test = RosTest(
         package=package,

@@ -1,4 +1,4 @@
-"""rostest: tests that are nodes. Source: http://wiki.ros.org/rostest."""
+"""rostest: runs tests that are nodes. Source: http://wiki.ros.org/rostest."""
 
 from typing import TYPE_CHECKING
 

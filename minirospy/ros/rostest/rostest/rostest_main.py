@@ -1,4 +1,4 @@
-"""rostest.rostest_main: the command."""
+"""rostest.rostest_main: the command rostest."""
 
 from minirospy.ros.rostest.rostest import rostestmain
 

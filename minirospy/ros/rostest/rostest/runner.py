@@ -1,4 +1,4 @@
-"""rostest.runner: a launch file's tests as a class for unittest. Source: http://wiki.ros.org/rostest."""
+"""rostest.runner: makes a launch file's tests available to unittest, as a class. Source: http://wiki.ros.org/rostest."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _DEFAULT_TEST_PORT = 22422
 
 
 class _Run:
-    """The state of the tests in this process."""
+    """The state of this process's test run."""
 
     def __init__(self) -> None:
         self.results = Result("rostest")
@@ -86,7 +86,7 @@ def setTextMode(val: bool) -> None:
 
 
 def failRunner(testName: str, message: str) -> TestMethod:
-    """Return a test method that fails with a message."""
+    """Return a test method that fails with a given message."""
 
     def fn(self: RosTestCase) -> None:
         print(message, file=sys.stderr)
@@ -159,7 +159,7 @@ def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None
 
 
 def setUp(self: RosTestCase) -> None:
-    """Prepare to launch a test; becomes the setUp method of the class that createUnitTest() returns."""
+    """Prepare to launch a test; createUnitTest() uses this function as its class's setUp method."""
     self.test_parent = ROSTestLaunchParent(
         self.config, [self.test_file], reuse_master=self.reuse_master, clear=self.clear
     )
@@ -171,7 +171,7 @@ def setUp(self: RosTestCase) -> None:
 
 
 def tearDown(self: RosTestCase) -> None:
-    """Terminate a test's launch; becomes the tearDown method of the class that createUnitTest() returns."""
+    """Terminate a test's launch; createUnitTest() uses this function as its class's tearDown method."""
     printlog("tearDown[%s]", self.test_file)
     if self.test_parent:
         self.test_parent.tearDown()

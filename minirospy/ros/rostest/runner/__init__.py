@@ -1,1 +1,1 @@
-"""Launch files whose ``<test>`` tags are run. Source: http://wiki.ros.org/rostest."""
+"""Runs the ``<test>`` tags in launch files. Source: http://wiki.ros.org/rostest."""

@@ -1,4 +1,4 @@
-"""The functions with which a test queries the graph and runs itself; ``import rostest`` re-exports them.
+"""Functions with which a test queries the graph and runs itself; ``import rostest`` re-exports them.
 
 Source: http://wiki.ros.org/rostest/Writing, http://wiki.ros.org/rospy/Overview.
 """
@@ -24,9 +24,9 @@ def rosrun(
     test: type[unittest.TestCase] | str,
     sysargs: Sequence[str] | None = None,
 ) -> None:
-    """Run a TestCase that is a node; called as the main function of the file that a ``<test>`` names.
+    """Run a TestCase that is a node. The program that a ``<test>`` names calls this as its main function.
 
-    Works like rosunit.unitrun, but then shuts the node down. Raise SystemExit(1) if a test fails.
+    This works like rosunit.unitrun, but shuts the node down afterwards. Raise SystemExit(1) if a test fails.
     """
     try:
         unit.unitrun(package, test_name, test, sysargs)
@@ -42,7 +42,7 @@ def run(
     test: type[unittest.TestCase] | str,
     sysargs: Sequence[str] | None = None,
 ) -> None:
-    """Call rosrun; ``run`` is its old name."""
+    """Call rosrun, under its old name."""
     rosrun(package, test_name, test, sysargs)
 
 
@@ -53,13 +53,13 @@ def unitrun(
     sysargs: Sequence[str] | None = None,
     coverage_packages: Sequence[str] | None = None,
 ) -> None:
-    """Call rosunit.unitrun; this is an alias."""
+    """Call rosunit.unitrun."""
     warnings.warn("rostest.unitrun is called rosunit.unitrun now", DeprecationWarning, stacklevel=2)
     unit.unitrun(package, test_name, test, sysargs, coverage_packages)
 
 
 def get_master() -> MasterProxy:
-    """Return the master that the environment specifies."""
+    """Return a proxy for the master that the environment specifies."""
     return MasterProxy(Environment.read(host="localhost").master_uri, _CALLER_ID)
 
 

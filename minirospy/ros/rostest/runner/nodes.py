@@ -25,13 +25,13 @@ _WAIT_SECONDS = 20.0
 _POLL_SECONDS = 0.1
 _UNSET = object()
 
-_Item: TypeAlias = dict[str, Any]  # an item in a list parameter: a name, and the conditions for it
+_Item: TypeAlias = dict[str, Any]  # an item in a list parameter: a name, and the conditions for that name
 
 
 def main(name: str) -> None:
     """Run one of the test nodes, as the main function of its program."""
     test = _TESTS[name]
-    # In ROS the program defines the class itself, so the results contain this module name.
+    # In ROS, the program defines the class itself, so the results contain this module name.
     test.__module__ = "__main__"
     rosrun("rostest", name, test)
 
@@ -45,7 +45,7 @@ class _NodeTest(unittest.TestCase):
         rospy.init_node(self.node)
 
     def require(self, holds: bool, text: str) -> None:
-        """Fail the test with this text if ``holds`` is False."""
+        """Fail the test with the message ``text`` if ``holds`` is False."""
         if not holds:
             self.fail(text)
 

@@ -1,4 +1,4 @@
-"""Runs the ``<test>`` tags of a launch file: each with the file's nodes and a new master.
+"""Runs the ``<test>`` tags of a launch file, each with the file's nodes and a new master.
 
 Source: http://wiki.ros.org/rostest, http://wiki.ros.org/roslaunch/XML/test.
 """
@@ -36,7 +36,7 @@ _CLASS = "rostest.runner.RosTest"
 
 @dataclass
 class RosTest:
-    """A launch file's tests. ``own``: whether each test could run; ``results``: the cases that the tests reported.
+    """Runs a launch file's tests. ``own`` records whether each test could run, ``results`` the cases that the tests reported.
 
     ``text``: print everything and write no XML files. ``reuse_master``: use the running master instead of starting one;
     ``clear`` deletes all of its parameters. ``results_dir``: folder for the XML files.
@@ -112,7 +112,7 @@ class RosTest:
         return ""
 
     def _try(self, test: TestSpec, case: TestCaseResult) -> None:
-        """Run a test once, and record in ``case`` the errors that are not in the test's own results."""
+        """Run a test once, and record in ``case`` any errors that are not in the test's own results."""
         file = self._results_file(test)
         file.unlink(missing_ok=True)
         said = io.StringIO()
@@ -156,7 +156,7 @@ class RosTest:
         node = replace(
             test.node,
             args=" ".join(filter(None, words)),
-            # When the test exits, the whole launch stops.
+            # When the test exits, stop the whole launch.
             required=True,
             output="screen" if self.text else "log",
         )
@@ -207,7 +207,7 @@ class RosTest:
 def master_of_tests(
     environment: Environment, run_id: str, *, reuse: bool = False, clear: bool = False
 ) -> Iterator[Environment]:
-    """Yield the environment with a new master on a free port, which has this run_id and is stopped after the block.
+    """Yield an environment with a new master on a free port, which has this run_id and is stopped after the block.
 
     ``reuse``: use the master that the environment specifies; ``clear`` deletes its parameters first.
     Raise MasterUnreachableError if that master does not respond.

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from minirospy.base.names import Arguments
-    from minirospy.introspect.streams import Received, ToolNode
+    from minirospy.introspect.messages import Received
+    from minirospy.introspect.streams import ToolNode
 
 __all__ = ["BW", "DELAY", "HZ"]
 
@@ -116,7 +117,7 @@ def _delay_parser() -> Parser:
         "rostopic delay [options] /topic",
         ros_argparse="rostopic",
     )
-    # The spelling is ROS's.
+    # This is ROS's spelling.
     parser.add_argument("topic", help="topic name to be calcurated the delay", completer="topics")
     parser.add_argument(
         "-w",
@@ -163,7 +164,7 @@ def _measure(
 
 
 def _published_topics(names: Sequence[str], arguments: Arguments | None) -> list[str]:
-    """Return the global names of topics, even if one of their fields is given; warn about topics without a publisher."""
+    """Return the global names of topics, given with or without a field; warn about topics without a publisher."""
     found = []
     with Graph.open("rostopic", arguments=arguments) as graph:
         for name in map(graph.resolve, names):

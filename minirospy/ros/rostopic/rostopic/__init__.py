@@ -1,4 +1,4 @@
-"""rostopic: queries about topics, and publishing. Source: http://wiki.ros.org/rostopic."""
+"""rostopic: queries about topics, and functions for publishing. Source: http://wiki.ros.org/rostopic."""
 
 from __future__ import annotations
 
@@ -71,7 +71,8 @@ NAME = "rostopic"
 _LATCH_SECONDS = 3.0
 _Topic = tuple[str, str, list[str]]
 
-_TopicRow = tuple[str, str, list[str]]  # topic, type, nodes that publish (or subscribe to) it
+# topic, type, and the nodes that publish (or subscribe to) the topic
+_TopicRow = tuple[str, str, list[str]]
 
 
 class ROSTopicException(Exception):
@@ -83,15 +84,15 @@ class ROSTopicIOException(ROSTopicException):
 
 
 class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
-    """Also a socket error, because programs expect one from ROS's get_topic_list."""
+    """A ROSTopicIOException that is also a socket error, because programs expect one from ROS's get_topic_list."""
 
 
 def get_topic_type(
     topic: str, blocking: bool = False
 ) -> tuple[str | None, str | None, Callable[[Message], object] | None]:
-    """Return (type, topic, function that extracts the field from a message), or three times None if there is no such topic.
+    """Return (type, topic, function that extracts the field from a message), or (None, None, None) if there is no such topic.
 
-    ``topic`` may include a field of the messages. With ``blocking``, wait until the topic exists or the node shuts down.
+    ``topic`` may include a field name. With ``blocking``, wait until the topic exists or the node shuts down.
     """
     with _graph() as graph:
         name = graph.resolve(topic)
@@ -111,7 +112,7 @@ def get_topic_type(
 def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
-    """Return get_topic_type()'s result, but with the message class as type. Raise ROSTopicException if it is not installed."""
+    """Return the same as get_topic_type(), but with the message class as type. Raise ROSTopicException if it is not installed."""
     from minirospy.core.idl.load import get_message_class
 
     type_, real_topic, function = get_topic_type(topic, blocking)
@@ -140,7 +141,7 @@ def find_by_type(topic_type: str) -> list[str]:
 def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
     """Return a function that extracts the field at a path (``/pose/x``) from a message, or None for the whole message.
 
-    Also return None if a bracket in the path is invalid. Print this error, and the error for a missing field, to stderr.
+    Also return None if a bracket in the path is invalid. An invalid bracket or a missing field is reported on stderr.
     """
     fields = [each for each in pattern.split("/") if each]
     try:
@@ -149,7 +150,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
         if faults := list(filter(None, map(_slice_fault, fields))):
             print(faults[0], file=sys.stderr)
             return None
-        # Treat the step as a field name, which no message has.
+        # Treat the step as the name of a field that no message has.
         steps = tuple(Step(each, None) for each in fields)
 
     def value(message: Message) -> object:
@@ -165,7 +166,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
 
 
 def _slice_fault(field: str) -> str:
-    """Return the error in a field's brackets, in ROS's wording, or an empty string if there is none."""
+    """Return the error in a field's brackets, worded as in ROS, or an empty string if there is none."""
     name, bracket, rest = field.partition("[")
     if not bracket:
         return ""
@@ -201,13 +202,16 @@ def get_info_text(topic: str) -> str:
 
 
 def get_api(master: masterapi.Master, caller_id: str) -> str:
-    """Return a node's URI, or `unknown address` with its name. Raise ROSTopicIOException if the master does not respond."""
+    """Return a node's URI, or `unknown address` with the node's name.
+
+    Raise ROSTopicIOException if the master does not respond.
+    """
     try:
         return master.lookupNode(caller_id)
     except masterapi.MasterException:
         return f"unknown address {caller_id}"
     except OSError as error:
-        raise ROSTopicIOException(str(error)) from error
+        raise ROSTopicIOException(MasterUnreachableError.ros_text) from error
 
 
 def create_publisher(
@@ -242,9 +246,11 @@ def publish_message(
     verbose: bool = False,
     substitute_keywords: bool = False,
 ) -> None:
-    """Publish a message built from YAML values: ``rate`` times a second, else ``once`` for 3 seconds, else until shutdown.
+    """Publish a message built from YAML values.
 
-    ``substitute_keywords``: replace `now` and `auto` in each message. Raise ROSTopicException if the values do not
+    Publish it ``rate`` times a second; without ``rate``, keep it latched for 3 seconds with ``once``, else until shutdown.
+
+    With ``substitute_keywords``, replace `now` and `auto` in each message. Raise ROSTopicException if the values do not
     match the message's fields.
     """
     import rospy
@@ -283,11 +289,11 @@ def publish_message(
 
 
 def rostopicmain(argv: Sequence[str] | None = None) -> None:
-    """Run the command; ``argv`` starts with its name. Exit the program on failure, as in ROS."""
+    """Run the command, and exit the program if it fails, as ROS does. ``argv`` starts with the command's name."""
     _command(list(sys.argv if argv is None else argv)[1:])
 
 
-# Private functions of ROS that programs call.
+# The following private functions of ROS's rostopic are called by programs.
 
 _rostopic_cmd_bw = _rostopic_cmd_delay = _rostopic_cmd_echo = _rostopic_cmd_find = _rostopic_cmd_hz = (
     rostopicmain
@@ -304,7 +310,7 @@ def _fullusage() -> NoReturn:
 def _rostopic_list_group_by_host(
     master: masterapi.Master, pubs: Sequence[_Topic], subs: Sequence[_Topic]
 ) -> tuple[dict[str, list[_Topic]], dict[str, list[_Topic]]]:
-    """Return host -> rows for the publishers, and the same for the subscribers; each row is (topic, type, nodes)."""
+    """Return the publishers by host, and the subscribers by host; each is a dict of rows (topic, type, nodes)."""
     hosts: dict[str, str] = {}
 
     def grouped(rows: Sequence[_Topic]) -> dict[str, list[_Topic]]:
@@ -386,7 +392,7 @@ def _rostopic_echo(
 
 
 def _is_shutdown() -> bool:
-    """Return whether the program is a node that is shutting down; False if it never imported rospy."""
+    """Return whether this process is a node that is shutting down; False if the program never imported rospy."""
     rospy: Any = sys.modules.get("rospy")
     return rospy is not None and bool(rospy.is_shutdown())
 
@@ -404,6 +410,6 @@ def _graph(unreachable: type[Exception] = ROSTopicIOException) -> Iterator[Graph
         with Graph.open(NAME) as graph:
             yield graph
     except MasterUnreachableError as error:
-        raise unreachable(str(error)) from error
+        raise unreachable(error.ros_text) from error
     except MinirospyError as error:
         raise ROSTopicException(str(error)) from error

@@ -1,4 +1,4 @@
-"""Measures rates, bandwidths and delays in user code, as a subscriber's callback."""
+"""Measures rates, bandwidths and delays in user code, with classes that are used as a subscriber's callback."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ Statistics = tuple[float, float, float, float, int]
 class ROSTopicHz:
     """Measures topic rates: ``rospy.Subscriber(topic, rospy.AnyMsg, hz.callback_hz, callback_args=topic)``.
 
-    ``window_size``: number of latest messages to use (-1: all). Uses rospy's clock, or with ``use_wtime`` the machine's clock.
+    ``window_size`` is the number of latest messages to use (-1: all). With ``use_wtime``, the machine's clock is used
+    instead of rospy's.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class ROSTopicHz:
         return report and (report.rate, report.min, report.max, report.std_dev, report.window)
 
     def print_hz(self, topics: Sequence[str | None] = (None,)) -> None:
-        """Print the rates: two lines for one topic, a table for several."""
+        """Print the rates, two lines for one topic or a table for several."""
         print(rate_text({str(topic): self._report(topic) for topic in topics}))
 
     def _report(self, topic: str | None) -> Spread | None:
@@ -138,7 +139,7 @@ class ROSTopicDelay:
 
 
 def _now() -> float:
-    # A subscriber has already imported rospy when its first message arrives.
+    # A subscriber has already imported rospy by the time its first message arrives.
     from minirospy.client import get_time
 
     return get_time()

@@ -1,4 +1,4 @@
-"""rosunit.junitxml: test result files."""
+"""rosunit.junitxml: reads and writes test result files."""
 
 from minirospy.ros.rosunit.runner.junit import (
     Result,

@@ -1,4 +1,4 @@
-"""rosunit.pmon: watched processes, with the same names as in roslaunch.pmon."""
+"""rosunit.pmon: watches processes, with the same names as roslaunch.pmon."""
 
 from minirospy.ros.roslaunch.roslaunch.pmon import (
     Process,

@@ -1,4 +1,4 @@
-"""rosunit.rosunit_main: the command."""
+"""rosunit.rosunit_main: the command rosunit."""
 
 from minirospy.ros.rosunit.rosunit import rosunitmain
 

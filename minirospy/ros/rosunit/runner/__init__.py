@@ -1,1 +1,1 @@
-"""Unit tests that write JUnit XML. Source: http://wiki.ros.org/rosunit."""
+"""Runs unit tests, and writes JUnit XML. Source: http://wiki.ros.org/rosunit."""

@@ -1,4 +1,4 @@
-"""Runs a unit test file as a separate program; returns its results, and errors of the run itself.
+"""Runs a unit test file as a separate program; returns its results, and the errors of the run itself.
 
 Source: http://wiki.ros.org/rosunit.
 """
@@ -29,7 +29,7 @@ _TERMINATE_SECONDS = 2.0
 
 @contextlib.contextmanager
 def interrupt_noted() -> Iterator[SignalSafeEvent]:
-    """Make Ctrl-C set the event instead of raising: an exception could leave a newly started process running."""
+    """Make Ctrl-C set the event, because an exception could leave a newly started process running."""
     noted = SignalSafeEvent()
     before = {number: signal.signal(number, lambda *_: noted.set()) for number in interrupt_signals()}
     try:
@@ -49,9 +49,9 @@ def run_bare(
     seconds: float,
     text: bool,
 ) -> tuple[Result, TestCaseResult]:
-    """Run a file, Python or executable, for at most ``seconds``; return (its results, the result of the run itself).
+    """Run a Python file or executable for at most ``seconds``; return (its results, the result of the run itself).
 
-    ``text``: the test prints and writes no results; the exit status then determines the result.
+    With ``text``, the test prints its results and writes no file, so the exit status determines the result.
     """
     case = TestCaseResult("runTest")
     case.classname = "rosunit.baretest.BareTestCase"

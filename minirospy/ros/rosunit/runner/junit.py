@@ -1,4 +1,4 @@
-"""JUnit XML in rosunit's format: read, write and print results. ``rosunit.junitxml`` re-exports this.
+"""Reads, writes and prints test results as JUnit XML in rosunit's format. ``rosunit.junitxml`` re-exports this module.
 
 Source: http://wiki.ros.org/rosunit (the files), https://llg.cubic.org/docs/junit/ (the format).
 """
@@ -94,7 +94,7 @@ class TestCaseResult:
 
     @property
     def description(self) -> str:
-        """The lines about this case in the summary."""
+        """The lines about this case in the printed summary."""
         if self.passed:
             return f"[{self.name}][passed]\n"
         return "".join(
@@ -104,7 +104,7 @@ class TestCaseResult:
 
     @property
     def line(self) -> str:
-        """The text that is printed after the case has run."""
+        """The text to print after the case has run."""
         lines = [f"[Testcase: {self.name}] ... ok"]
         for info in (*self.failures, *self.errors):
             lines[0] = f"[Testcase: {self.name}] ... {info.word}!"
@@ -134,7 +134,7 @@ class TestCaseResult:
 
 
 class Result:
-    """A test suite's results: counts, captured output, and cases."""
+    """A test suite's results: the counts, the captured output, and the cases."""
 
     def __init__(self, name: str, num_errors: int = 0, num_failures: int = 0, num_tests: int = 0) -> None:
         self.name = name
@@ -283,7 +283,7 @@ def names_of(infos: Iterable[tuple[object, str]]) -> list[str]:
 def report(results: Result, runner_name: str, errors: int = 0, failed: Sequence[str] = ()) -> str:
     """Return a line for each case, then the counts.
 
-    ``errors`` and ``failed`` are the runner's own counts: tests that could not report their results.
+    ``errors`` and ``failed`` are the runner's own errors: the number and the names of tests that could not report results.
     """
     errors, failures = errors + results.num_errors, len(failed) + results.num_failures
     is_good = not errors and not failures
@@ -323,7 +323,7 @@ def failure_junit_xml(
     class_name: str = "Results",
     testcase_name: str = "test_ran",
 ) -> bytes:
-    """Return a results file with one failed test, for a test that could not write its own."""
+    """Return the content of a results file with one failed test, for a test that could not write its own file."""
     suite, case = _single(test_name, 1, class_name, testcase_name)
     ElementTree.SubElement(case, "failure", {"message": message, "type": ""})
     if stdout is not None:
@@ -333,7 +333,7 @@ def failure_junit_xml(
 
 
 def success_junit_xml(test_name: str, class_name: str = "Results", testcase_name: str = "test_ran") -> bytes:
-    """Return a results file with one passed test."""
+    """Return the content of a results file with one passed test."""
     return ElementTree.tostring(_single(test_name, 0, class_name, testcase_name)[0])
 
 

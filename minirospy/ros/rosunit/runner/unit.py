@@ -1,4 +1,4 @@
-"""Runs a TestCase's unit tests in this process; writes JUnit XML and prints a summary. ``rosunit`` re-exports this.
+"""Runs a TestCase's unit tests in this process; writes JUnit XML and prints a summary. ``rosunit`` re-exports this module.
 
 Source: http://wiki.ros.org/rosunit, http://wiki.ros.org/unittest.
 """
@@ -44,7 +44,7 @@ __all__ = [
 XML_OUTPUT_FLAG = "--gtest_output=xml:"
 _LINE = "-" * 61
 
-# Folders of modules whose lines are omitted from tracebacks.
+# folders of modules whose lines are omitted from tracebacks
 _MACHINERY = {Path(unittest.__file__).parent, Path(__file__).parent}
 
 ExcInfo = tuple[type[BaseException], BaseException, TracebackType] | tuple[None, None, None]
@@ -57,7 +57,7 @@ def unitrun(
     sysargs: Sequence[str] | None = None,
     coverage_packages: Sequence[str] | None = None,
 ) -> None:
-    """Run a TestCase, given as its class or its name; called as a test file's main function.
+    """Run a TestCase, given as a class or a name. A test file calls this as its main function.
 
     With ``--text`` in ``sysargs`` (default: ``sys.argv``), print as unittest does; else write the results to
     ``~/.ros/test_results/PACKAGE/rosunit-NAME.xml``, or to the file given by ``--gtest_output=xml:FILE``. Raise
@@ -92,7 +92,7 @@ def create_xml_runner(
 
 
 def begin_results(file: Path) -> None:
-    """Create the file's folder, delete an earlier run's file, and print the file's path."""
+    """Create the results file's folder, delete the file from an earlier run, and print the file's path."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.unlink(missing_ok=True)
     print(f"[ROSUNIT] Outputting test results to {file.absolute()}", flush=True)
@@ -128,7 +128,7 @@ def print_unittest_summary(result: unittest.TestResult) -> None:
 def print_runner_summary(
     runner_results: unittest.TestResult, junit_results: Result, runner_name: str = "ROSUNIT"
 ) -> None:
-    """Print each case in the results that tests wrote, then the counts with the runner's own errors."""
+    """Print each case in the results that tests have written, then the counts, which include the runner's own errors."""
     print(report(junit_results, runner_name, len(runner_results.errors), names_of(runner_results.failures)))
 
 
@@ -217,7 +217,7 @@ class _Recorder(unittest.TestResult):
             self._case.skipped = reason
 
     def _note(self, test: unittest.TestCase, info: TestInfo) -> None:
-        # If setUpClass or setUpModule fails, startTest is not called.
+        # startTest has not been called if setUpClass or setUpModule fails.
         case = self._case or _case_of(test)
         (case.add_error if isinstance(info, TestError) else case.add_failure)(info)
         if self._case is None:
@@ -238,7 +238,7 @@ def _case_of(test: unittest.TestCase) -> TestCaseResult:
 
 
 def _told(err: ExcInfo) -> tuple[str, str]:
-    """Return an exception's name, and its message with the traceback, without unittest's own lines."""
+    """Return an exception's name, and its message with the traceback, omitting unittest's own lines."""
     kind, error, trace = err
     if kind is None or error is None:
         return "", ""

@@ -1,7 +1,7 @@
 """rosversion: print the version of a package or of the ROS distribution.
 
-Source: http://wiki.ros.org/rosversion. minirospy is not a distribution: -d prints ROS_DISTRO if a workspace or a real
-ROS has set it, else noetic, the last distribution of ROS 1, with which minirospy is compatible.
+Source: http://wiki.ros.org/rosversion. minirospy is not a distribution, so -d prints ROS_DISTRO if a workspace or a real
+ROS has set it, otherwise noetic, the last distribution of ROS 1, with which minirospy is compatible.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def _parser() -> Parser:
         "rosversion",
         "Print the version of a package, or the name of the ROS distribution.",
         "rosversion [-h] [-s] [-d] [-a] [package]",
-        # ROS's own text, which confuses the two versions.
+        # This is ROS's own text, although it confuses the two versions.
         about="rosversion -d: Output the version of the given package\n"
         "rosversion package: Output the ROS distribution name",
         ros_argparse="rosversion",

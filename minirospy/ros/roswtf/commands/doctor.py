@@ -1,4 +1,4 @@
-"""`minirospy doctor` and `roswtf`: find problems; print a line for each check, with a remedy.
+"""`minirospy doctor` and `roswtf`: find problems, and print a line with a remedy for each.
 
 Source: http://wiki.ros.org/roswtf.
 """
@@ -104,11 +104,11 @@ def _is_file(word: str) -> bool:
 
 
 def _wait_for_signal() -> None:
-    """Wait for Ctrl-C or SIGTERM, so that a listener unregisters before it exits."""
+    """Wait for Ctrl-C or SIGTERM, so that the listener unregisters before the process exits."""
     stop = threading.Event()
     for number in (*interrupt_signals(), signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    # Wait in slices: on Windows signals do not interrupt a wait without a timeout.
+    # Wait in slices, because on Windows signals do not interrupt a wait without a timeout.
     while not stop.wait(0.5):
         pass
 
@@ -120,7 +120,7 @@ def _all(examination: Examination, files: Sequence[str], args: dict[str, str]) -
 
 
 def _launch_findings(file: str, args: dict[str, str]) -> Iterator[Finding]:
-    """Yield whether a launch file loads, and whether the programs that it starts exist."""
+    """Yield findings on whether a launch file loads, and whether the programs that it starts exist."""
     from minirospy.base.errors import MinirospyError
     from minirospy.ros.roslaunch.launcher.command import node_command
     from minirospy.ros.roslaunch.launcher.load import load_files

@@ -1,6 +1,6 @@
-"""roswtf.rules: convert the checks' return values to errors and warnings in a context.
+"""roswtf.rules: converts the checks' return values to errors and warnings in a context.
 
-A rule is a pair (check, message); a check returns the problem, or a false value. A list is shown item by item.
+A rule is a pair (check, message). A check returns the problem, or a false value; a returned list is shown item by item.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ Rule = tuple[Callable[..., object], str]
 
 
 def error_rule(rule: Rule, ret: object, ctx: Context) -> None:
-    """Add an error to the context if the rule's check returned something."""
+    """Add an error to the context if the rule's check returned a problem."""
     _add(rule, ret, ctx, ctx.errors, WtfError)
 
 
 def warning_rule(rule: Rule, ret: object, ctx: Context) -> None:
-    """Add a warning to the context if the rule's check returned something."""
+    """Add a warning to the context if the rule's check returned a problem."""
     _add(rule, ret, ctx, ctx.warnings, WtfWarning)
 
 

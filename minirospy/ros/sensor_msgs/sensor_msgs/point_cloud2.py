@@ -1,7 +1,7 @@
 """sensor_msgs.point_cloud2: converts a PointCloud2's points to tuples or numpy arrays, and back.
 
-Source: http://docs.ros.org/api/sensor_msgs/html/point__cloud2_8py.html. ``read_points_numpy`` and arrays as ``points`` of
-``create_cloud`` are from sensor_msgs_py.
+Source: http://docs.ros.org/api/sensor_msgs/html/point__cloud2_8py.html. ``read_points_numpy``, and arrays as the argument
+``points``, are from ROS 2's sensor_msgs_py.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from std_msgs.msg import Header
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Values: TypeAlias = NDArray[Any]  # the values of points, of any type that fields may have
+    Values: TypeAlias = NDArray[Any]  # the values of points, of any type that fields can have
 
 __all__ = [
     "_DATATYPES",
@@ -48,11 +48,11 @@ _DATATYPES: dict[int, tuple[str, int]] = {
     PointField.FLOAT32: ("f", 4),
     PointField.FLOAT64: ("d", 8),
 }
-"""A field's datatype -> its format character and size in bytes."""
+"""The format character and size in bytes for each datatype of a field."""
 
-_BLOCK = 4_096  # points read at a time, chosen so that they fit into the processor's cache
+_BLOCK = 4_096  # number of points read at a time, so that they fit into the processor's cache
 
-_FEW = 1_000  # with fewer points than this, numpy is slower than plain Python
+_FEW = 1_000  # number of points below which numpy is slower than plain Python
 
 
 class Column(NamedTuple):
@@ -72,7 +72,7 @@ def read_points(
 ) -> Iterator[Point]:
     """Yield a tuple of values for each point: the values of ``field_names``, in the order of their offsets.
 
-    ``skip_nans`` omits points with a NaN in one of them; ``uvs`` selects the points to yield, as (column, row).
+    ``skip_nans`` omits points with a NaN in one of these fields; ``uvs`` selects the points to yield, as (column, row).
     Raise AssertionError if ``cloud`` is not a PointCloud2, struct.error if the data ends before the last point.
     """
     _check_type(cloud)
@@ -85,8 +85,8 @@ def read_points(
         return
 
     for offset, shape in _blocks(cloud):
-        # Creating the tuples takes most of the time; zip is the fastest way, and reuses a tuple that the caller has
-        # dropped.
+        # Creating the tuples takes most of the time. zip is the fastest way, because it reuses a tuple that the
+        # caller has dropped.
         yield from zip(*_values(cloud, columns, offset, shape, skip_nans=skip_nans), strict=True)
 
 
@@ -106,8 +106,8 @@ def read_points_list(
     named = namedtuple("Point", field_names)  # type: ignore[misc]
 
     points = read_points(cloud, field_names, skip_nans, uvs)
-    # Raise TypeError if a field has more than one value. One point is enough, because all points have the same number
-    # of values.
+    # Convert the first point here, to raise TypeError immediately if a field has more than one value. One point is
+    # enough, because all points have the same number of values.
     first: list[Point] = [named._make(point) for point in islice(points, 1)]
     return first + list(map(functools.partial(tuple.__new__, named), points))
 
@@ -150,7 +150,7 @@ def read_points_numpy(
 def create_cloud(
     header: Header, fields: Sequence[PointField], points: Sequence[Iterable[float]] | Values
 ) -> PointCloud2:
-    """Return a cloud of these points; each point has one value for each field, and an array has one row per point.
+    """Return a cloud of these points. Each point has one value per field; an array has one row per point.
 
     Raise struct.error if a point has a different number of values, or a value does not fit the field's type.
     """
@@ -190,7 +190,7 @@ def _check_type(cloud: PointCloud2) -> None:
 def _get_struct_fmt(
     is_bigendian: bool, fields: Iterable[PointField], field_names: Collection[str] | None = None
 ) -> str:
-    """Return a point's ``struct`` format. Programs use this function, although it is private in ROS, too."""
+    """Return a point's ``struct`` format. Programs use this function, although it is also private in ROS."""
     return _format(is_bigendian, _columns(fields, field_names))
 
 
@@ -226,7 +226,7 @@ def _offsets(cloud: PointCloud2) -> Iterator[int]:
 
 
 def _is_whole(cloud: PointCloud2, size: int) -> bool:
-    """Return whether the data is bytes, and contains ``point_step`` bytes for each point."""
+    """Return whether the data is bytes, with ``point_step`` bytes for each point."""
     if not isinstance(cloud.data, bytes | bytearray | memoryview) or not 0 < size <= cloud.point_step:
         return False
     return len(cloud.data) >= (cloud.height - 1) * cloud.row_step + cloud.width * cloud.point_step
@@ -248,7 +248,7 @@ def _blocks(cloud: PointCloud2) -> Iterator[tuple[int, tuple[int, int]]]:
 def _values(
     cloud: PointCloud2, columns: Iterable[Column], offset: int, shape: tuple[int, int], *, skip_nans: bool
 ) -> list[memoryview]:
-    """Return the values in a block of a cloud: one sequence for each of a point's values."""
+    """Return the values in a block of a cloud, as one sequence for each value of a point."""
     import numpy as np
 
     order = ">" if cloud.is_bigendian else "<"
@@ -308,7 +308,7 @@ def _as_array(cloud: PointCloud2, columns: Sequence[Column]) -> Values:
 
 
 def _packed_array(points: object, columns: Sequence[Column], step: int) -> bytes | None:
-    """Return the packed data if points and fields are all floats, or None if ``struct`` has to pack them."""
+    """Return the packed data if all points and fields are floats, or None if ``struct`` has to pack them."""
     numpy = sys.modules.get("numpy")
     if numpy is None or not isinstance(points, numpy.ndarray) or points.ndim != 2 or points.dtype.kind != "f":
         return None

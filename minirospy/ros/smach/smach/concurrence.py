@@ -25,8 +25,8 @@ _SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
 class Concurrence(Container):
     """Executes all of its states in parallel, and finishes when all of them have finished.
 
-    Its outcome is the return value of ``outcome_cb``, else the outcome of ``outcome_map`` that most states match, else
-    ``default_outcome``; "preempted" if the states finished because the container was preempted.
+    Its outcome is the return value of ``outcome_cb``, else the outcome in ``outcome_map`` that most states match, else
+    ``default_outcome``. It is "preempted" if the states finished because the container was preempted.
     """
 
     def __init__(
@@ -39,11 +39,10 @@ class Concurrence(Container):
         outcome_cb: Callable[[dict[str, str | None]], str | None] | None = None,
         child_termination_cb: Callable[[dict[str, str | None]], object] | None = None,
     ) -> None:
-        """Create the container. ``outcome_map``: outcome -> (label -> that state's outcome).
+        """Create the container. ``outcome_map`` maps an outcome to a dict from label to that state's outcome.
 
-        ``child_termination_cb`` is called each time a state finishes, with the outcomes so far (None for running states);
-        if it
-        returns a true value, the other states are preempted.
+        ``child_termination_cb`` is called each time a state finishes, with the outcomes so far (None for running states).
+        If it returns a true value, the other states are preempted.
         """
         known = list(outcomes)
         super().__init__(known, input_keys, output_keys)
@@ -58,7 +57,7 @@ class Concurrence(Container):
         self._is_running = False
         self._threads: dict[str, threading.Thread] = {}
         self._child_outcomes: dict[str, str | None] = {}
-        # Guards the attributes below; notified when the states that are still executing have to finish.
+        # Guards the attributes below, and is notified when the states that are still executing have to finish.
         self._done_cond = threading.Condition()
         self._is_ending = False
         self._user_code_exception = False
@@ -86,7 +85,7 @@ class Concurrence(Container):
 
     @staticmethod
     def add(label: str, state: State, remapping: Mapping[str, str] | None = None) -> State:
-        """Add a state to the open container and return the state; ``remapping``: the state's key -> the container's key."""
+        """Add a state to the open container and return the state. ``remapping`` maps the state's keys to the container's keys."""
         concurrence = Concurrence._currently_opened_container()
         concurrence._states[label] = state
         concurrence._remappings[label] = remapping or {}
@@ -188,7 +187,7 @@ class Concurrence(Container):
         return outcome
 
     def _is_last_needed(self) -> bool:
-        """Return whether the other states can finish, after one has finished."""
+        """Return whether the container can finish, after one of its states has finished."""
         others_end = False
         if self._child_termination_cb:
             try:

@@ -1,4 +1,4 @@
-"""The base class for all containers: construction in a ``with`` block, copying userdata in and out, callbacks."""
+"""The base class of all containers: construction in a ``with`` block, copying of userdata in and out, and callbacks."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Container(State):
     """
 
     _construction_stack: ClassVar[list[Container]] = []
-    _construction_lock = threading.RLock()  # held by the thread in which a container is open
+    _construction_lock = threading.RLock()  # held by the thread that has opened a container
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class Container(State):
         output_keys: Iterable[str] = (),
     ) -> None:
         super().__init__(outcomes, input_keys, output_keys)
-        self.userdata = UserData()  # shared by its states
+        self.userdata = UserData()  # shared by the container's states
         self._executing_thread: int | None = None
         self._start_cbs: list[tuple[Callback, Sequence[object]]] = []
         self._transition_cbs: list[tuple[Callback, Sequence[object]]] = []
@@ -102,15 +102,15 @@ class Container(State):
         self._termination_cbs.append((termination_cb, cb_args))
 
     def call_start_cbs(self) -> None:
-        """Call the functions of ``register_start_cb``; log their exceptions."""
+        """Call the functions that ``register_start_cb`` has registered; log their exceptions."""
         self._call("start", self._start_cbs, lambda: (self.get_initial_states(),))
 
     def call_transition_cbs(self) -> None:
-        """Call the functions of ``register_transition_cb``; log their exceptions."""
+        """Call the functions that ``register_transition_cb`` has registered; log their exceptions."""
         self._call("transition", self._transition_cbs, lambda: (self.get_active_states(),))
 
     def call_termination_cbs(self, terminal_states: Sequence[str], outcome: str | None) -> None:
-        """Call the functions of ``register_termination_cb``; log their exceptions."""
+        """Call the functions that ``register_termination_cb`` has registered; log their exceptions."""
         self._call("termination", self._termination_cbs, lambda: (terminal_states, outcome))
 
     def _call(

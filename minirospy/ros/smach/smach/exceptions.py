@@ -34,4 +34,4 @@ class InvalidUserCodeError(SmachError):
 
 
 class InvalidConstructionError(SmachError):
-    """A container is used before it is opened."""
+    """A container was used before it was opened."""

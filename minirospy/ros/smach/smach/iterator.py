@@ -31,7 +31,10 @@ class Iterator(Container):
         it_label: str = "it_data",
         exhausted_outcome: str = "exhausted",
     ) -> None:
-        """Create the container. ``it``: the items, or a function that returns them; ``it_label``: their userdata key."""
+        """Create the container.
+
+        ``it``: the items, or a function that returns them; ``it_label``: the userdata key for the current item.
+        """
         super().__init__([*outcomes, exhausted_outcome], input_keys, output_keys)
         self._items = it
         self._items_label = it_label
@@ -48,7 +51,7 @@ class Iterator(Container):
 
     @staticmethod
     def set_iteritems(it: Items, it_label: str = "it_data") -> None:
-        """Set the open iterator's items, or a function that returns them, and their userdata key."""
+        """Set the open iterator's items, or a function that returns them, and the userdata key for the current item."""
         iterator = Iterator._currently_opened_container()
         iterator._items = it
         iterator._items_label = it_label
@@ -61,10 +64,10 @@ class Iterator(Container):
         break_outcomes: Sequence[str] = (),
         final_outcome_map: Mapping[str, str] | None = None,
     ) -> None:
-        """Set the open iterator's state.
+        """Set the state for the open iterator.
 
-        An outcome in ``break_outcomes`` ends the loop; if that is empty, any outcome that is not in ``loop_outcomes`` does.
-        ``final_outcome_map``: the state's last outcome -> the iterator's outcome.
+        An outcome in ``break_outcomes`` ends the loop; if that is empty, any outcome that is not in ``loop_outcomes``
+        does. ``final_outcome_map`` maps the state's last outcome to the iterator's outcome.
         """
         iterator = Iterator._currently_opened_container()
         if loop_outcomes and break_outcomes:
@@ -82,12 +85,12 @@ class Iterator(Container):
         iterator._final_outcome_map = final_outcome_map or {}
 
     def check_consistency(self) -> None:
-        """Do nothing, as in ROS: ``execute`` raises if there is no state."""
+        """Do nothing, as in ROS, because ``execute`` raises an error if there is no state."""
 
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute the state for each item; return its last outcome, mapped, or the outcome for exhausted items."""
+        """Execute the state for each item; return its last outcome, mapped, or the outcome for when no items are left."""
         if self._state is None:
             raise InvalidStateError("No contained state was set in iterator")
         self._is_running = True

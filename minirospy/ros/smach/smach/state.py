@@ -61,11 +61,11 @@ class State:
         return tuple(self._output_keys)
 
     def request_preempt(self) -> None:
-        """Preempt the state: its ``execute`` should check ``preempt_requested`` and return soon."""
+        """Preempt the state. Its ``execute`` should check ``preempt_requested`` and return soon."""
         self._preempt_requested = True
 
     def service_preempt(self) -> None:
-        """Acknowledge the preemption: clear the request."""
+        """Acknowledge the preemption by clearing the request."""
         self._preempt_requested = False
 
     def recall_preempt(self) -> None:

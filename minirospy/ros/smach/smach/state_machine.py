@@ -38,16 +38,16 @@ class StateMachine(Container):
         self._constants: dict[str, Mapping[str, object]] = {}
         self._initial_state_label: str | None = None
 
-        # For `add_auto`: the last added state, and those of its outcomes that lead to the next state.
+        # For `add_auto`: the last added state, and its outcomes that lead to the next state.
         self._last_added_label: str | None = None
         self._connector_outcomes: Sequence[str] = ()
 
         self._is_running = False
         self._current_label: str | None = None
-        # The state that was preempted but may not have noticed.
+        # The state that was preempted, but may not have noticed.
         self._preempted_label: str | None = None
         self._preempted_state: State | None = None
-        # Released only while a state executes, so that a preemption never occurs between two states.
+        # The lock is released only while a state executes, so that a preemption never occurs between two states.
         self._state_transitioning_lock = threading.RLock()
 
     def __getstate__(self) -> dict[str, object]:
@@ -69,9 +69,10 @@ class StateMachine(Container):
     ) -> object:
         """Add a state to the open machine, and return the state.
 
-        ``transitions``: outcome -> label, or an outcome of the machine; ``remapping``: the state's key -> the machine's key;
-        ``constants``: values that are set in the userdata before the state executes. Raise InvalidStateError if the
-        label is already used, InvalidTransitionError for an outcome that the state does not have.
+        ``transitions`` maps each outcome to a label or to an outcome of the machine; ``remapping`` maps the state's keys
+        to the machine's keys; ``constants`` are values that are set in the userdata before the state executes. Raise
+        InvalidStateError if the label is already used, InvalidTransitionError for an outcome that the state does not
+        have.
         """
         return StateMachine._currently_opened_container()._add(
             label, state, transitions, remapping, constants
@@ -86,7 +87,7 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Add a state whose ``connector_outcomes`` lead to the next added state; otherwise the same as ``add``."""
+        """Add a state whose ``connector_outcomes`` lead to the next added state; otherwise, do the same as ``add``."""
         machine = StateMachine._currently_opened_container()
         machine._add(label, state, transitions, remapping, constants)
         registered = state.get_registered_outcomes()
@@ -170,7 +171,7 @@ class StateMachine(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute states until one leads to an outcome of the machine, and return that outcome; None at a shutdown."""
+        """Execute states until one leads to an outcome of the machine, and return that outcome; return None at a shutdown."""
         with self._state_transitioning_lock:
             try:
                 self.check_consistency()
@@ -230,7 +231,7 @@ class StateMachine(Container):
         return self._terminate(label, state, outcome, target)
 
     def _pass_on_preempt(self, label: str, state: State) -> None:
-        """Preempt a state before it executes, if the machine is preempted and the previous state did not notice."""
+        """Preempt a state before it executes if the machine is preempted and the previous state has not noticed."""
         if not self.preempt_requested():
             return
         loginfo("Preempt requested on state machine before executing the next state.")
@@ -344,11 +345,11 @@ class StateMachine(Container):
         return [str(self._initial_state_label)]
 
     def get_active_states(self) -> list[str]:
-        """Return the label of the executing state; "None" if there is none."""
+        """Return the label of the executing state, or "None" if there is none."""
         return [str(self._current_label)]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:
-        """Return the transitions: outcome, label, target."""
+        """Return the transitions: (outcome, label, target)."""
         return [
             (outcome, label, target)
             for label, targets in self._transitions.items()

@@ -23,7 +23,7 @@ class UserData:
         self._data.update(other_userdata._data)
 
     def extract(self, keys: Iterable[str], remapping: Mapping[str, str]) -> UserData:
-        """Return copies of some values under new names; ``remapping``: new name -> key in this object."""
+        """Return copies of some values under new names. ``remapping`` maps the new names to keys in this object."""
         names = {outer: inner for inner, outer in remapping.items()}
         if len(names) != len(remapping):
             logerr(f"SMACH userdata remapping is not one-to-one: {remapping}")
@@ -33,7 +33,7 @@ class UserData:
         return extracted
 
     def merge(self, ud: UserData, keys: Iterable[str], remapping: Mapping[str, str]) -> None:
-        """Copy some values from another UserData; ``remapping``: key in the other object -> key in this object."""
+        """Copy some values from another UserData. ``remapping`` maps keys in that object to keys in this object."""
         for key in keys:
             self[remapping.get(key, key)] = copy.copy(ud[key])
 
@@ -74,7 +74,7 @@ def get_const(obj: object) -> object:
 
 
 class Const:
-    """A read-only view of an object's attributes; setting an attribute changes only the view, and logs an error."""
+    """A read-only view of an object's attributes. Setting an attribute changes only the view, and logs an error."""
 
     def __init__(self, obj: object) -> None:
         object.__setattr__(self, "_obj", obj)
@@ -98,11 +98,10 @@ class Const:
 
 
 class Remapper:
-    """A state's view of a container's userdata: the declared keys, under the state's names for them.
+    """A state's view of a container's userdata: the declared keys, under the names that the state uses for them.
 
     A value whose key is an input key but not an output key is read-only (``get_const``). Writing a key that is not an
-    output key
-    is logged and has no effect; reading a key that is not an input key raises InvalidUserCodeError.
+    output key is logged and has no effect; reading a key that is not an input key raises InvalidUserCodeError.
     """
 
     def __init__(
@@ -163,4 +162,4 @@ class Remapper:
 
 
 Values = UserData | Remapper
-"""Userdata as a state receives it: the container's own object, or a view of the declared keys."""
+"""The userdata that a state receives: the container's own object, or a view of the declared keys."""

@@ -1,4 +1,4 @@
-"""The interface that a state's callbacks may declare, and the shutdown check."""
+"""The interface that a state's callbacks may declare, and the check for a shutdown."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def has_smach_interface(obj: object) -> TypeGuard[CBInterface]:
 
 
 class CBInterface:
-    """A callback with outcomes and keys, which are added to the state that uses it."""
+    """A callback with outcomes and userdata keys, which are added to the state that uses the callback."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class CBInterface:
 
 
 class cb_interface:  # noqa: N801 - ROS's name
-    """Decorate a callback with outcomes and keys."""
+    """A decorator that adds outcomes and userdata keys to a callback."""
 
     def __init__(
         self,

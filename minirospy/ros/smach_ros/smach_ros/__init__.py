@@ -1,4 +1,4 @@
-"""smach_ros: states that use topics, services and actions, and introspection of running containers.
+"""smach_ros: states that use topics, services and actions, and servers that show running containers.
 
 Importing this package makes smach log through rospy and stop at rospy's shutdown, as in ROS. Source:
 http://wiki.ros.org/smach.

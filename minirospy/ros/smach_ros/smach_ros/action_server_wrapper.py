@@ -38,8 +38,8 @@ class ActionServerWrapper:
     ) -> None:
         """Set the userdata keys for the goal, which the container reads, and for feedback and result, which the container writes.
 
-        ``goal_slots_map``: goal field -> key, ``result_slots_map``: result field -> key. ``expand_goal_slots``
-        and ``pack_result_slots``: use every field under its own name.
+        ``goal_slots_map`` and ``result_slots_map`` map fields of the goal and of the result to keys. With
+        ``expand_goal_slots`` and ``pack_result_slots``, every field is used under its own name.
         """
         self.wrapped_container = wrapped_container
         self.wrapped_container.register_transition_cb(self.transition_cb)

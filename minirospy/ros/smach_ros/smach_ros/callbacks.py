@@ -17,7 +17,7 @@ __all__ = ["StateCallback"]
 class StateCallback:
     """A state's callback, which may be None.
 
-    Its userdata contains the keys that the callback declares with ``cb_interface``, else those in the state's arguments.
+    Its userdata contains the keys that the callback declares with ``cb_interface``, or else those in the state's arguments.
     """
 
     def __init__(
@@ -30,7 +30,10 @@ class StateCallback:
         args: Sequence[object] = (),
         kwargs: Mapping[str, object] | None = None,
     ) -> None:
-        """Raise InvalidStateError if the callback is not callable. ``what`` describes it in messages, for example "Goal"."""
+        """Store the callback; raise InvalidStateError if it is not callable.
+
+        ``what`` describes it in messages, for example "Goal".
+        """
         if callback is not None and not callable(callback):
             raise InvalidStateError(
                 f"{what} callback object given to {type(state).__name__} that IS NOT a function object"

@@ -14,7 +14,10 @@ __all__ = ["ConditionState"]
 
 
 class ConditionState(State):
-    """Outcomes: "true" when the condition is met, "false" after the last check or the timeout, "preempted"."""
+    """Waits until a condition is met.
+
+    Outcomes: "true" when it is met, "false" after the last check or the timeout, "preempted".
+    """
 
     def __init__(
         self,
@@ -26,7 +29,7 @@ class ConditionState(State):
     ) -> None:
         """Create the state. ``cond_cb`` is called with the userdata every ``poll_rate``.
 
-        ``max_checks``: -1 means no limit; as in ROS, n allows n + 1 checks.
+        ``max_checks`` -1 means no limit. As in ROS, the value n allows n + 1 checks.
         """
         super().__init__(outcomes=["true", "false", "preempted"], input_keys=input_keys)
         if hasattr(cond_cb, "get_registered_input_keys") and hasattr(cond_cb, "get_registered_output_keys"):

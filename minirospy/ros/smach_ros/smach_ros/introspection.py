@@ -34,7 +34,7 @@ STRUCTURE_TOPIC = "/smach/container_structure"
 
 _QUEUE_SIZE = 20
 _CONNECT_SECONDS = 2.0
-"""Seconds for which a command waits for the connection to the server."""
+"""Seconds that a command waits for the connection to the server."""
 _RESEND_SECONDS = 0.3
 
 
@@ -114,7 +114,7 @@ class ContainerProxy:
         path: str,
         update_rate: rospy.Duration = rospy.Duration(2.0),  # noqa: B008 - a Duration does not change
     ) -> None:
-        """Create the proxy; ``update_rate`` is the interval between messages while nothing changes."""
+        """Create the proxy. ``update_rate`` is the interval between messages while nothing changes."""
         self._path = path
         self._container = container
         self._update_rate = update_rate
@@ -141,7 +141,7 @@ class ContainerProxy:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop the periodic messages; transitions are still published."""
+        """Stop the periodic messages. Transitions are still published."""
         self._has_stopped.set()
 
     def _publish_regularly(self) -> None:
@@ -226,7 +226,7 @@ class IntrospectionServer:
         self.construct(self._server_name, self._state, self._path)
 
     def stop(self) -> None:
-        """Stop the periodic messages; transitions are still published."""
+        """Stop the periodic messages. Transitions are still published."""
         for proxy in self._proxies:
             proxy.stop()
 

@@ -16,7 +16,10 @@ _SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
 
 
 class MonitorState(State):
-    """Outcomes: "valid" after ``max_checks`` messages that meet the condition, "invalid" at the first one that does not."""
+    """Checks the messages on a topic against a condition.
+
+    Outcomes: "valid" after ``max_checks`` messages that meet it, "invalid" at the first one that does not, "preempted".
+    """
 
     def __init__(
         self,
@@ -29,7 +32,7 @@ class MonitorState(State):
     ) -> None:
         """Create the state. ``cond_cb`` is called with the userdata and a message.
 
-        ``max_checks``: -1 means no limit, so that the state runs until a message does not meet the condition.
+        ``max_checks`` -1 means no limit: the state runs until a message does not meet the condition.
         """
         super().__init__(
             outcomes=["valid", "invalid", "preempted"], input_keys=input_keys, output_keys=output_keys
@@ -42,7 +45,7 @@ class MonitorState(State):
         self._trigger_event = threading.Event()
 
     def execute(self, ud: Values) -> str:
-        """Check the topic's messages until the outcome is known; "preempted" also at a shutdown."""
+        """Check the topic's messages until the outcome is known. At a shutdown, the outcome is "preempted"."""
         if self.preempt_requested():
             self.service_preempt()
             return "preempted"

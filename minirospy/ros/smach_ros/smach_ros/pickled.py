@@ -1,4 +1,4 @@
-"""Userdata as a string on a topic: pickled and base64-encoded, as in ROS's smach.
+"""Converts userdata to a string for a topic, pickled and base64-encoded as in ROS's smach, and back.
 
 Another node sends the data, so only plain values, arrays and messages are created from it; no other code is executed.
 """
@@ -21,10 +21,10 @@ from minirospy.core.idl.load import get_message_class, get_service_class
 __all__ = ["pickle_userdata", "unpickle_userdata"]
 
 _RENAMED = {"__builtin__": "builtins", "copy_reg": "copyreg", "numpy.core": "numpy._core"}
-"""Module names in Python 2 and in older numpy versions."""
+"""Module names in Python 2 and in older numpy versions, with their current names."""
 _MESSAGE = re.compile(r"(\w+)\.(msg|srv)\._(\w+)")
 _TEXTS = "SU"
-_SIMPLE = "biufc" + _TEXTS  # numpy dtype kinds: numbers and strings; other kinds may contain pointers
+_SIMPLE = "biufc" + _TEXTS  # numpy dtype kinds for numbers and strings; other kinds may contain pointers
 
 
 def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
@@ -63,7 +63,7 @@ _set_state = pickle._Unpickler.dispatch[pickle.BUILD[0]]
 
 
 class _Unpickler(pickle._Unpickler):
-    """The unpickler implemented in Python, so that its operations can be checked before they run."""
+    """Python's unpickler in the version written in Python, so that its operations can be checked before they run."""
 
     stack: list[Any]
     read: Callable[[int], bytes]
@@ -76,7 +76,8 @@ class _Unpickler(pickle._Unpickler):
         if made := _MAKERS.get(f"{module}.{name}"):
             return made
         if match := _MESSAGE.fullmatch(module):
-            # Find the class by its message type: importing a module named in the data would execute that module.
+            # Find the class by its message type, because importing a module named in the data would execute that
+            # module.
             for found in _classes(f"{match[1]}/{match[3]}", match[2]):
                 if found.__name__ == name:
                     return found
@@ -113,7 +114,8 @@ def _classes(name: str, kind: str) -> tuple[Any, ...]:
 
 def _check_dtype(target: Any, state: Any) -> None:
     """Raise UnpicklingError unless the state leaves a numpy dtype unchanged except for its byte order."""
-    # Allow only the values that numpy writes: numpy would accept any string size, even a negative one, and any flags.
+    # Allow only the values that numpy writes, because numpy would accept any string size, even a negative one, and
+    # any flags.
     size, alignment = (target.itemsize, target.alignment) if target.kind in _TEXTS else (-1, -1)
     allowed = [(3, order, None, None, None, size, alignment, target.flags) for order in "<>=|"]
     if target.kind not in _SIMPLE or tuple(state) not in allowed:
@@ -121,7 +123,7 @@ def _check_dtype(target: Any, state: Any) -> None:
 
 
 def _plain(make: Callable[..., object], *kinds: type) -> Callable[..., object]:
-    """Wrap a constructor so that it accepts only these types: not a number, which would be a size, and not a range."""
+    """Wrap a constructor so that it accepts only these types, not a number, which would be a size, or a range."""
 
     def made(content: object = (), *more: object) -> object:
         if type(content) not in (*kinds, tuple):
@@ -170,7 +172,7 @@ def _scalar(dtype: Any, data: Any) -> object:
 def _from_buffer(data: Any, dtype: Any, count: int = -1) -> Any:
     import numpy as np
 
-    # Refuse another array: a state set afterwards could free its memory.
+    # Refuse another array, because a state set afterwards could free its memory.
     if type(data) not in (bytes, bytearray):
         raise pickle.UnpicklingError(f"an array in {type(data).__name__}")
     return np.frombuffer(data, dtype, count)
@@ -201,4 +203,4 @@ _MAKERS: Mapping[str, Callable[..., object]] = {
     "numpy._core.multiarray.scalar": _scalar,
     "numpy._core.numeric._frombuffer": _array,
 }
-"""The constructor for each class that the data may name."""
+"""The constructors for the classes that the data may name."""

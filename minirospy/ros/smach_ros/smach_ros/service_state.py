@@ -15,9 +15,10 @@ __all__ = ["ServiceState"]
 
 
 class ServiceState(State):
-    """Outcomes: "succeeded", "aborted", "preempted", and the callback's outcomes.
+    """Calls a service.
 
-    The outcome is "aborted" if there is no request or no response, or if a callback raises an exception.
+    Outcomes: "succeeded", "aborted", "preempted", and the callback's outcomes. The outcome is "aborted" if there is no
+    request or no response, or if a callback raises an exception.
     """
 
     def __init__(
@@ -39,10 +40,11 @@ class ServiceState(State):
         output_keys: Iterable[str] = (),
         outcomes: Iterable[str] = (),
     ) -> None:
-        """Create the state. The request is built from ``request``, the userdata (a whole request or fields), and ``request_cb``.
+        """Create the state.
 
-        ``request_cb(userdata, request)`` may change the request or return another one. ``response_cb(userdata, response)``
-        may return an outcome. ``response_key`` and ``response_slots`` select what is stored in the userdata.
+        The request is built from ``request``, from userdata (a whole request or single fields), and by ``request_cb``.
+        ``request_cb(userdata, request)`` may change the request or return another one. ``response_cb(userdata,
+        response)`` may return an outcome. ``response_key`` and ``response_slots`` select what is stored in the userdata.
         """
         super().__init__(outcomes=["succeeded", "aborted", "preempted"])
         self._service_name = service_name

@@ -25,7 +25,10 @@ _MINUTE = rospy.Duration(60.0)
 
 
 class SimpleActionState(State):
-    """Outcomes: "succeeded", "preempted", "aborted" (in all other cases), and the callback's outcomes."""
+    """Sends a goal and waits for its result.
+
+    Outcomes: "succeeded", "preempted", "aborted" (in all other cases), and the callback's outcomes.
+    """
 
     WAITING_FOR_SERVER = 0
     INACTIVE = 1
@@ -55,11 +58,12 @@ class SimpleActionState(State):
         preempt_timeout: rospy.Duration = _MINUTE,
         server_wait_timeout: rospy.Duration = _MINUTE,
     ) -> None:
-        """Create the state. The goal is built from ``goal``, the userdata (a whole goal or fields), and ``goal_cb``.
+        """Create the state.
 
+        The goal is built from ``goal``, from userdata (a whole goal or single fields), and by ``goal_cb``.
         ``goal_cb(userdata, goal)`` may change the goal or return another one. ``result_cb(userdata, status, result)`` may
-        return an outcome. ``result_key`` and ``result_slots`` select what is stored in the userdata. A goal is cancelled after
-        ``exec_timeout``, and abandoned ``preempt_timeout`` after the cancellation.
+        return an outcome. ``result_key`` and ``result_slots`` select what is stored in the userdata. A goal is cancelled
+        after ``exec_timeout``, and abandoned ``preempt_timeout`` after the cancellation.
         """
         super().__init__(outcomes=["succeeded", "aborted", "preempted"])
         self._action_name = action_name
@@ -188,7 +192,7 @@ class SimpleActionState(State):
                     )
                     return False
             elif self.preempt_requested():
-                # The preemption may have been requested just before the goal was sent.
+                # Cancel the goal, because the preemption may have been requested just before the goal was sent.
                 self._action_client.cancel_goal()
                 cancelled = now
             elif self._exec_timeout and now - self._activate_time > self._exec_timeout:

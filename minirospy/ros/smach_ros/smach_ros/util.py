@@ -16,7 +16,7 @@ __all__ = ["set_preempt_handler"]
 def set_preempt_handler(sc: StateMachine | Concurrence | Iterator) -> None:
     """Preempt a container when the node shuts down, and wait until the container has finished.
 
-    If the container executes in the thread that handles the shutdown, do not wait, because it cannot finish in the meantime.
+    If the container executes in the thread that handles the shutdown, do not wait, because the container could never finish.
     """
 
     def handler() -> None:

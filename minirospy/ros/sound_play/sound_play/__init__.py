@@ -1,1 +1,1 @@
-"""sound_play: sounds and speech on request. Source: http://wiki.ros.org/sound_play."""
+"""sound_play: plays sounds and speech on request. Source: http://wiki.ros.org/sound_play."""

@@ -1,4 +1,4 @@
-"""The client for sound_play: plays files and sounds, and speaks texts, through a topic or an action.
+"""The client for sound_play: plays files and sounds, and speaks text, through a topic or an action.
 
 Source: http://wiki.ros.org/sound_play.
 """
@@ -23,7 +23,7 @@ __all__ = ["Sound", "SoundClient"]
 
 
 class Options(TypedDict, total=False):
-    """Additional arguments of every method that plays a sound."""
+    """The additional arguments of every method that plays a sound."""
 
     blocking: bool
     replace: bool
@@ -57,8 +57,8 @@ class SoundClient:
     """Sends requests to soundplay_node.
 
     Each method that plays a sound accepts ``blocking`` (True: wait until the sound has ended), ``replace`` (False: wait
-    until no other sound is playing), ``server_timeout`` and ``result_timeout``. Files are on soundplay_node's machine; a
-    relative path is in the package's sound folder.
+    until no other sound is playing), ``server_timeout`` and ``result_timeout``. Files are on soundplay_node's machine;
+    relative paths refer to the package's sound folder.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class SoundClient:
         blocking: bool | None = None,
         **kwargs: object,
     ) -> None:
-        """Send a request. A timeout of None waits indefinitely for the server, or for the end of the sound."""
+        """Send a request. With a timeout of None, wait indefinitely for the server, or for the end of the sound."""
         request = SoundRequest(sound=snd, command=cmd, volume=max(0, min(1, vol)), arg=s, arg2=arg2)
         if not (self._blocking if blocking is None else blocking):
             self.pub.publish(request)
@@ -181,7 +181,7 @@ def _waits(timeout: times.Duration | None) -> bool:
 
 
 def _place(sound: str) -> str:
-    """Return a file's absolute path; a relative path is in the package's sound folder."""
+    """Return a file's absolute path; a relative path refers to the package's sound folder."""
     if sound.startswith("/") or Path(sound).is_absolute():
         return sound
     return f"{RosPack().get_path('sound_play')}/sounds/{sound}"

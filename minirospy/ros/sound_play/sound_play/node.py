@@ -1,4 +1,4 @@
-"""soundplay_node.py: plays requests from robotsound and from the action sound_play, with a player program on this machine.
+"""soundplay_node.py: plays sounds for requests on the topic robotsound and the action sound_play, with a program on this machine.
 
 Parameters: ~default_voice, ~loop_rate (100 Hz, for the action's feedback). Source: http://wiki.ros.org/sound_play.
 """
@@ -99,10 +99,10 @@ class PlayingSound:
 
 
 class SoundNode:
-    """The sounds that are playing, by request."""
+    """The node, with the sounds that are playing, by request."""
 
     def __init__(self, folder: Path) -> None:
-        """Create the node; ``folder`` is the folder for the package's sound files."""
+        """Create the node. ``folder`` is the folder for the package's sound files."""
         self._folder = folder
         self._default_voice = str(rospy.get_param("~default_voice", "") or "")
         self._feedback_pause = 1.0 / max(1.0, float(rospy.get_param("~loop_rate", 100)))
@@ -118,7 +118,7 @@ class SoundNode:
         self._server.start()
 
     def handle(self, request: SoundRequest) -> PlayingSound | None:
-        """Play or stop a request's sound; return the playing sound. Raise SoundError if the sound cannot be played."""
+        """Play or stop the sound in a request; return the playing sound. Raise SoundError if the sound cannot be played."""
         with self._lock:
             key = (request.sound, request.arg, request.arg2)
             if request.command == SoundRequest.PLAY_STOP:

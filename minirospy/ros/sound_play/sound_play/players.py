@@ -1,4 +1,4 @@
-"""Choose this machine's program that plays a file or speaks a text, and the program's arguments. Pure."""
+"""Selects a program on this machine that plays a file or speaks a text, and the program's arguments. Pure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Which = Callable[[str], "str | None"]
 
 @dataclass(frozen=True)
 class Command:
-    """A program with its arguments and its standard input."""
+    """A program with its arguments and its input on stdin."""
 
     words: Sequence[str]
     text: str | None = None
@@ -22,7 +22,7 @@ def _powershell(script: str) -> list[str]:
     return ["-NoProfile", "-NonInteractive", "-Command", script]
 
 
-# The file is the last argument, or $args[0].
+# The file is the last argument, except for PowerShell, whose script contains it.
 PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
     "paplay": lambda file, volume: [f"--volume={round(volume * 65536)}", file],
     "pw-play": lambda file, volume: [f"--volume={volume:.3f}", file],
@@ -37,7 +37,7 @@ PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
         f"(New-Object Media.SoundPlayer '{file.replace(chr(39), chr(39) * 2)}').PlaySync()"
     ),
 }
-"""Player, in order of preference -> its arguments for a file and a volume from 0 to 1."""
+"""Functions from a file and a volume (0 to 1) to a player's arguments, by player, in order of preference."""
 
 SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
     "espeak-ng": lambda text, voice, volume: Command(_espeak(voice, volume), text),
@@ -53,13 +53,13 @@ SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
         text,
     ),
 }
-"""Programs that speak a text, in order of preference."""
+"""Functions that return the command for a program that speaks a text, by program, in order of preference."""
 
 _ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
 
 
 def _espeak(voice: str, volume: float) -> list[str]:
-    # Names such as voice_kal_diphone are festival voices.
+    # Names such as voice_kal_diphone are voices of festival.
     names = [] if not voice or voice.startswith("voice_") else ["-v", voice]
     return ["--stdin", "-a", str(round(volume * 100)), *names]
 
@@ -83,7 +83,7 @@ def play_command(file: str, volume: float, which: Which) -> Command | None:
 
 
 def say_command(text: str, voice: str, volume: float, which: Which) -> Command | None:
-    """Return the command that speaks a text, or None if there is no program that can."""
+    """Return the command that speaks a text, or None if there is no such program."""
     for name, make in SPEAKERS.items():
         program = which(name)
         if program:

@@ -1,4 +1,7 @@
-"""say.py, play.py and similar programs: each sends one request to soundplay_node. Source: http://wiki.ros.org/sound_play."""
+"""The programs say.py, play.py and so on, each of which sends a request to soundplay_node.
+
+Source: http://wiki.ros.org/sound_play.
+"""
 
 from __future__ import annotations
 
@@ -99,7 +102,7 @@ def shutup() -> int:
 
 
 def is_speaking() -> int:
-    """Publish on ~output/is_speaking whether the action of ~robotsound is active; return the exit status."""
+    """Publish on ~output/is_speaking whether the action named by ~robotsound is active; return the exit status."""
     rospy.init_node("is_speaking")
     active = {GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING}
     state = {"is_speaking": False}
@@ -138,7 +141,7 @@ def _request(name: str, request: Callable[[SoundClient], object]) -> int:
     with suppress(rospy.ROSInterruptException):
         _connect(client)
         request(client)
-        # Wait until the message has probably been sent, before the node exits.
+        # Wait before the node exits, until the message has probably been sent.
         rospy.sleep(0.2)
     return 0
 

@@ -26,12 +26,12 @@ BUILTIN: dict[int, tuple[float, ...]] = {
 
 
 def wav_of(notes: tuple[float, ...]) -> bytes:
-    """Return a WAV file that contains notes of equal length: mono, 16 bit."""
+    """Return a WAV file with notes of equal length, in mono and 16 bits."""
     count = int(_RATE * _NOTE_SECONDS)
     samples = array.array("h")
     for note in notes:
         for at in range(count):
-            # Fade in and out, to avoid clicks.
+            # Fade in and out to avoid clicks.
             loudness = min(1.0, at / 200, (count - at) / 200)
             samples.append(int(12000 * loudness * math.sin(2 * math.pi * note * at / _RATE)))
     if sys.byteorder == "big":

@@ -1,4 +1,4 @@
-"""Composite transformation matrices: decompose, compose, fit to points; and a virtual trackball.
+"""Composite transformation matrices (decompose, compose, fit to points), and a virtual trackball.
 
 Each function imports numpy when it is called.
 """
@@ -43,7 +43,7 @@ _Axis = TypeVar("_Axis", bound="ArrayLike")
 
 
 def concatenate_matrices(*matrices: ArrayLike) -> Floats:
-    """Return the product of matrices; the last one is applied first."""
+    """Return the product of the matrices; the last one is applied first."""
     import numpy
 
     return functools.reduce(numpy.dot, matrices, numpy.identity(4))
@@ -87,7 +87,7 @@ def decompose_matrix(matrix: ArrayLike) -> tuple[Floats, list[float], list[float
         perspective = numpy.dot(m[:, 3], numpy.linalg.inv(affine.T))
     translate = m[3, :3].copy()
 
-    # Gram-Schmidt process: a row's components along earlier rows are the shear.
+    # Use the Gram-Schmidt process: a row's components along earlier rows are the shear.
     rows = m[:3, :3].copy()
     scale, shear = numpy.zeros(3), [0.0, 0.0, 0.0]
     scale[0] = vector_norm(rows[0])
@@ -150,7 +150,7 @@ def compose_matrix(
 
 
 def orthogonalization_matrix(lengths: ArrayLike, angles: ArrayLike) -> Floats:
-    """Return the matrix that converts a crystal cell's coordinates to orthogonal ones; angles in degrees."""
+    """Return the matrix that converts a crystal cell's coordinates to orthogonal ones. The angles are in degrees."""
     import numpy
 
     a, b, c = numpy.asarray(lengths)[:3]
@@ -268,7 +268,7 @@ class Arcball:
         return self._constrain
 
     def down(self, point: ArrayLike) -> None:
-        """Start a drag at a point of the window."""
+        """Start a drag at a point in the window."""
         self._vdown = arcball_map_to_sphere(point, self._center, self._radius)
         self._qdown = self._qpre = self._qnow
         if self._constrain and self._axes is not None:
@@ -305,7 +305,7 @@ class Arcball:
 
 
 def arcball_map_to_sphere(point: ArrayLike, center: ArrayLike, radius: float) -> Floats:
-    """Return the point of the unit sphere under a point of the window; outside the ball, the nearest point on its rim."""
+    """Return the point on the unit sphere under a point in the window; outside the ball, return the closest point on its rim."""
     import numpy
 
     at, centre = numpy.asarray(point), numpy.asarray(center)
@@ -318,7 +318,7 @@ def arcball_map_to_sphere(point: ArrayLike, center: ArrayLike, radius: float) ->
 
 
 def arcball_constrain_to_axis(point: ArrayLike, axis: ArrayLike) -> Floats:
-    """Return the point of the sphere, perpendicular to an axis, that is nearest to a point."""
+    """Return the point on the sphere that is closest to a point and perpendicular to an axis."""
     import numpy
 
     along = numpy.array(axis, dtype=numpy.float64)

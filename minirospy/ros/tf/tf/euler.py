@@ -1,4 +1,4 @@
-"""Conversions between Euler angles and rotations, with the 24 axis sequences; euler_from_quaternion needs no numpy.
+"""Converts between Euler angles and rotations, with the 24 axis sequences. euler_from_quaternion needs no numpy.
 
 An axes string consists of a frame (s: static, r: rotating) and three axes in the order of the rotations. The algorithm,
 based on (first axis, parity, repetition, frame), is Shoemake's, "Euler angle conversion", Graphics Gems IV (1994).
@@ -56,7 +56,7 @@ TUPLE_TO_AXES = {value: key for key, value in AXES_TO_TUPLE.items()}
 
 
 def euler_matrix(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> NDArray[numpy.float64]:
-    """Return the 4x4 matrix for three rotations, in radians; ``axes`` as a string or a tuple.
+    """Return the 4x4 matrix for three rotations in radians; ``axes`` is a string or a tuple.
 
     Raise KeyError if ``axes`` is unknown.
     """
@@ -84,7 +84,7 @@ def euler_matrix(ai: float, aj: float, ak: float, axes: Axes = "sxyz") -> NDArra
 
 
 def euler_from_matrix(matrix: ArrayLike, axes: Axes = "sxyz") -> tuple[float, float, float]:
-    """Return the angles of a rotation matrix, 3x3 or larger; one of several possible triples.
+    """Return the angles of a rotation matrix, 3x3 or larger. Several triples are possible; return one of them.
 
     Raise KeyError if ``axes`` is unknown.
     """

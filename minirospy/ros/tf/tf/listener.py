@@ -1,4 +1,4 @@
-"""tf.Transformer, TransformerROS and TransformListener: lookups as tuples, and transformed messages.
+"""tf.Transformer, TransformerROS and TransformListener: transforms returned as tuples, and transformed messages.
 
 Methods that need matrices import numpy when they are called. Source: http://wiki.ros.org/tf.
 """
@@ -50,7 +50,7 @@ def xyzw_to_mat44(ori: geometry_msgs.msg.Quaternion) -> NDArray[numpy.float64]:
 
 
 def strip_leading_slash(s: str) -> str:
-    """Return a frame name without its leading slash, as tf2 expects it."""
+    """Return a frame name without a leading slash, because tf2 rejects one."""
     return s[1:] if s.startswith("/") else s
 
 
@@ -62,7 +62,7 @@ class Transformer:
         self._using_dedicated_thread = False
 
     def allFramesAsDot(self, current_time: Moment | None = None) -> str:
-        """Return the tree as a graphviz graph."""
+        """Return the tree of frames as a graphviz graph."""
         return self._buffer._allFramesAsDot(current_time) if current_time else self._buffer._allFramesAsDot()
 
     def allFramesAsString(self) -> str:
@@ -130,7 +130,7 @@ class Transformer:
     def chain(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> list[str]:
-        """Return the frames on the path from the source to the fixed frame, and from there to the target."""
+        """Return the frames on the path from the source to the fixed frame, and from the fixed frame to the target."""
         return self._buffer._chain(target_frame, target_time, source_frame, source_time, fixed_frame)
 
     def clear(self) -> None:
@@ -199,8 +199,8 @@ class Transformer:
     ) -> tuple[Vector, Vector]:
         """Return the velocities of ``tracking_frame`` relative to ``observation_frame``, expressed in ``reference_frame``.
 
-        They apply to the origin of ``reference_point_frame``, over ``averaging_interval`` around ``time`` (0: until the
-        newest data). ``ref_point`` has no effect, as in real ROS.
+        They are those of the origin of ``reference_point_frame``, averaged over ``averaging_interval`` around ``time``
+        (0: until the newest data). ``ref_point`` has no effect, as in real ROS.
         """
         import numpy
 
@@ -220,7 +220,7 @@ class Transformer:
         speed = (numpy.array(end_place) - start_place) / seconds
         spin = axis * angle / seconds
 
-        # From the tracked frame to the reference frame, and to the reference point.
+        # Look up the transforms from the tracked frame to the reference frame and to the reference point.
         place, turn = self.lookupTransform(reference_frame, tracking_frame, middle)
         rotation = transformations.quaternion_matrix(turn)[:3, :3]
         angular = numpy.dot(rotation, spin)
@@ -230,13 +230,12 @@ class Transformer:
             transformations.translation_matrix(point_place), transformations.quaternion_matrix(point_turn)
         )
         moved = numpy.dot(to_point, (*place, 1.0))[:3] - place
-        # Real ROS uses a dot product here, although a cross product would be correct; the results must match real
-        # ROS.
+        # As in real ROS, use a dot product, although a cross product would be correct.
         linear = linear + numpy.dot(angular, moved)
         return tuple(linear.tolist()), tuple(angular.tolist())
 
     def setUsingDedicatedThread(self, value: bool) -> None:
-        """Set whether another thread inserts transforms, so that a lookup may wait."""
+        """Set whether another thread inserts transforms; only then can a lookup wait for one."""
         self._using_dedicated_thread = value
 
     def getTFPrefix(self) -> str:
@@ -321,7 +320,7 @@ class TransformerROS(Transformer):
     ) -> sensor_msgs.msg.PointCloud:
         """Return a PointCloud (not PointCloud2) transformed into another frame."""
         matrix = self.asMatrix(target_frame, point_cloud.header)
-        # 64-bit Points, as in real ROS; they have the fields of a Point32.
+        # Use 64-bit Points, as real ROS does; they have the same fields as Point32.
         points: list[Any] = [geometry_msgs.msg.Point(*_moved(matrix, point)) for point in point_cloud.points]
         return sensor_msgs.msg.PointCloud(
             _header(target_frame, point_cloud.header), points, point_cloud.channels
@@ -329,7 +328,7 @@ class TransformerROS(Transformer):
 
 
 class TransformListener(TransformerROS):
-    """A transformer that receives the transforms on /tf and /tf_static.
+    """A transformer that inserts the transforms on /tf and /tf_static.
 
     The arguments are those of :class:`Transformer`, and the subscribers' ``queue_size``, ``buff_size`` and ``tcp_nodelay``.
     """

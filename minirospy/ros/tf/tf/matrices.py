@@ -1,4 +1,4 @@
-"""Homogeneous 4x4 matrices for single transformations, and the parameters of such matrices.
+"""Homogeneous 4x4 matrices for single transformations, and the reverse: a matrix's parameters.
 
 A plane is given by a point and a normal. Each function imports numpy when it is called.
 """
@@ -121,7 +121,7 @@ def rotation_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats]:
 def scale_matrix(
     factor: float, origin: ArrayLike | None = None, direction: ArrayLike | None = None
 ) -> Floats:
-    """Return the matrix that scales about ``origin``, in all directions or along one; the factor -1 is a point reflection."""
+    """Return the matrix that scales about ``origin``, in all directions or in one. The factor -1 is a point reflection."""
     import numpy
 
     matrix = numpy.identity(4)
@@ -165,7 +165,7 @@ def projection_matrix(
 ) -> Floats:
     """Return the matrix that projects onto a plane: from a perspective point, along a direction, or orthogonally.
 
-    ``pseudo``: a perspective projection preserves the relative depths.
+    With ``pseudo``, a perspective projection preserves relative depths.
     """
     import numpy
 
@@ -230,7 +230,7 @@ def clip_matrix(
 ) -> Floats:
     """Return the matrix that maps a view volume to the cube from -1 to 1. Raise ValueError if the volume is invalid.
 
-    ``perspective``: the volume is a frustum.
+    With ``perspective``, the volume is a frustum.
     """
     import numpy
 

@@ -1,4 +1,4 @@
-"""Functions on vectors and quaternions [x, y, z, w] as numpy arrays; each function imports numpy when it is called."""
+"""Functions for vectors and quaternions [x, y, z, w] as numpy arrays. Each function imports numpy when it is called."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = [
 
 
 def vector_norm(data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None) -> Any:
-    """Return a vector's length, or the lengths along ``axis``; with ``out``, store them there and return None."""
+    """Return a vector's length, or the lengths along ``axis``. With ``out``, store them in it and return None."""
     import numpy
 
     squared = numpy.square(numpy.asarray(data, dtype=numpy.float64))
@@ -54,7 +54,7 @@ def unit_vector(data: ArrayLike, axis: int | None, out: NDArray[numpy.float64]) 
 def unit_vector(
     data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None
 ) -> NDArray[numpy.float64] | None:
-    """Return vectors divided by their lengths; with ``out``, store them there and return None."""
+    """Return vectors divided by their lengths. With ``out``, store them in it and return None."""
     import numpy
 
     vectors = numpy.array(data, dtype=numpy.float64)
@@ -160,7 +160,7 @@ def quaternion_inverse(quaternion: ArrayLike) -> NDArray[numpy.float64]:
 def quaternion_slerp(
     quat0: ArrayLike, quat1: ArrayLike, fraction: float, spin: float = 0, shortestpath: bool = True
 ) -> NDArray[numpy.float64]:
-    """Return the interpolation at ``fraction`` between ``quat0`` and ``quat1``, with ``spin`` additional half turns."""
+    """Return the interpolated rotation at ``fraction`` between ``quat0`` and ``quat1``, with ``spin`` additional half turns."""
     import numpy
 
     q0: NDArray[numpy.float64] = unit_vector(numpy.asarray(quat0)[:4])
@@ -182,7 +182,7 @@ def quaternion_slerp(
 
 
 def random_quaternion(rand: ArrayLike | None = None) -> NDArray[numpy.float64]:
-    """Return a uniformly distributed random rotation, computed from ``rand``, three numbers between 0 and 1, if given."""
+    """Return a uniformly distributed random rotation, computed from ``rand`` (three numbers between 0 and 1) if given."""
     import numpy
 
     numbers = numpy.random.rand(3) if rand is None else numpy.asarray(rand)

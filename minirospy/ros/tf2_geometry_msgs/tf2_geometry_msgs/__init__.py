@@ -1,4 +1,4 @@
-"""tf2_geometry_msgs: points, vectors and poses for tf2_ros; importing it registers them."""
+"""tf2_geometry_msgs: transforms points, vectors and poses for tf2_ros. Importing it registers these types."""
 
 from typing import TYPE_CHECKING
 

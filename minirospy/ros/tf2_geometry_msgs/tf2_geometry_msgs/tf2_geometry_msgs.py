@@ -1,6 +1,6 @@
 """tf2_geometry_msgs: transforms points, vectors, poses and wrenches for tf2_ros.
 
-Importing it registers the types with tf2_ros. Source: http://wiki.ros.org/tf2_geometry_msgs.
+Importing this module registers the types with tf2_ros. Source: http://wiki.ros.org/tf2_geometry_msgs.
 """
 
 from __future__ import annotations

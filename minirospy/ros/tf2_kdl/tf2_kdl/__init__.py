@@ -1,4 +1,4 @@
-"""tf2_kdl: PyKDL's types for tf2_ros; importing it registers them."""
+"""tf2_kdl: transforms PyKDL's types for tf2_ros. Importing it registers these types."""
 
 from typing import TYPE_CHECKING
 

@@ -1,6 +1,6 @@
 """tf2_kdl: transforms PyKDL's vectors, frames, twists and wrenches for tf2_ros. Source: http://wiki.ros.org/tf2_kdl.
 
-Importing it registers the types with tf2_ros. Objects to transform need a ``header``, which tf2_ros.Stamped adds.
+Importing this module registers the types with tf2_ros. Objects to transform need a ``header``, which tf2_ros.Stamped adds.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""The API of tf2_ros for nodes: buffers, listeners, broadcasters, buffer servers and clients, on the public node API.
+"""The API of tf2_ros for nodes: buffers, listeners, broadcasters, buffer servers and clients, based on the public node API.
 
 The path of a transform: broadcaster `sendTransform` -> topic /tf ==> listener `callback` -> core `insert_message` ->
-`minirospy.core.tf2`, which computes the result of `lookup_transform`. `import tf2_ros` and `import tf2_py` re-export these names.
+`minirospy.core.tf2`, which computes the result of `lookup_transform`. `import tf2_ros` and `import tf2_py` re-export
+these names.
 """
 
 from typing import TYPE_CHECKING
@@ -85,6 +86,5 @@ __all__ = [
     "transform_listener",
 ]
 
-# Its modules import ROS 1 messages, and if ROS 2 is sourced, its packages of the same names would be imported
-# instead.
+# Its modules import ROS 1 messages. If ROS 2 is sourced, its packages of the same names would be found first.
 prefer_ros1()

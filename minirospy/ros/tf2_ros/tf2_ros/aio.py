@@ -7,7 +7,7 @@
         async for pose in buffer.changes("map", "base"):
             print(pose.transform.translation.x)
 
-Everything belongs to the event loop of the node. Source: http://wiki.ros.org/tf2_ros. Examples: docs/tf.md.
+All objects belong to the node's event loop. Source: http://wiki.ros.org/tf2_ros. Examples: docs/tf.md.
 """
 
 from __future__ import annotations
@@ -40,19 +40,21 @@ __all__ = ["Broadcaster", "Buffer"]
 
 _T = TypeVar("_T")
 _LATEST = times.Time()
-_MAX_WAITING = 1000  # messages queued while the program is busy; older messages are dropped
+# maximum number of messages queued while the program is busy; older messages are dropped
+_MAX_WAITING = 1000
 
 
 class Buffer:
     """The frames published on /tf and /tf_static over the last ``cache_time`` seconds.
 
-    It listens inside ``async with Buffer(node) as buffer:``. If time jumps back, all non-static transforms are cleared.
+    It receives transforms inside ``async with Buffer(node) as buffer:``. If time jumps back, all non-static transforms
+    are removed.
     """
 
     def __init__(self, node: Node, cache_time: float = 10.0) -> None:
         self._node = node
         refusals = RefusalLog(self._log, clocks.monotonic)
-        self._tree = TransformBuffer(int(cache_time * 1e9), refusals)
+        self.tree = TransformBuffer(int(cache_time * 1e9), refusals)
         self._changed = asyncio.Event()
         self._last = 0
         self._listening: list[asyncio.Task[None]] = []
@@ -67,13 +69,13 @@ class Buffer:
         await self.close()
 
     async def start(self) -> None:
-        """Start listening; ``async with`` calls this first."""
+        """Start receiving transforms; ``async with`` calls this method first."""
         for topic, is_static in (("/tf", False), ("/tf_static", True)):
             subscription = await self._node.subscribe(topic, LazyTFMessage, queue_size=_MAX_WAITING)
             self._listening.append(asyncio.create_task(self._take(subscription, is_static)))
 
     async def close(self) -> None:
-        """Stop listening; received transforms can still be looked up. Idempotent."""
+        """Stop receiving transforms. Those received so far can still be looked up. Idempotent."""
         listening, self._listening = self._listening, []
         for task in listening:
             task.cancel()
@@ -86,14 +88,13 @@ class Buffer:
     ) -> TransformStamped:
         """Return the pose of the frame ``source`` in the frame ``target`` at ``time`` (default: the latest pose).
 
-        Wait for the transform for ``timeout`` seconds of the node's time (None: until the node shuts down). Raise
-        LookupException if a frame is unknown, ConnectivityException if the frames are not connected, ExtrapolationException if
-        there is no data for ``time``, InvalidArgumentException if a frame name is invalid, and ROSInterruptException if
-        the node
-        shuts down in the meantime.
+        Wait up to ``timeout`` seconds of the node's time for the transform (None: until the node shuts down). Raise
+        LookupException if a frame is unknown, ConnectivityException if the frames are not connected,
+        ExtrapolationException if there is no data for ``time``, InvalidArgumentException if a frame name is invalid, and
+        ROSInterruptException if the node shuts down in the meantime.
         """
         stamp = nanoseconds(time)
-        found = await self._wait_for(lambda: self._tree.lookup(target, source, stamp), timeout)
+        found = await self._wait_for(lambda: self.tree.lookup(target, source, stamp), timeout)
         return transform_stamped(target, source, found)
 
     async def lookup_full(
@@ -112,31 +113,31 @@ class Buffer:
         """
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         found = await self._wait_for(
-            lambda: self._tree.lookup_full(target, stamps[0], source, stamps[1], fixed), timeout
+            lambda: self.tree.lookup_full(target, stamps[0], source, stamps[1], fixed), timeout
         )
         return transform_stamped(target, source, found)
 
     def why_not(self, target: str, source: str, time: Moment = _LATEST) -> str | None:
-        """Return None if :meth:`lookup` would succeed now, else the reason for its failure."""
+        """Return None if :meth:`lookup` would succeed now, or else the reason why it would fail."""
         try:
-            return self._tree.why_not(target, source, nanoseconds(time))
+            return self.tree.why_not(target, source, nanoseconds(time))
         except InvalidArgumentException as error:
             return str(error)
 
     async def changes(self, target: str, source: str) -> AsyncIterator[TransformStamped]:
-        """Yield the latest pose of ``source`` in ``target``, then each change; skip to the newest if the program is busy.
+        """Yield the latest pose of ``source`` in ``target``, then the pose after each change; skip poses if the program is busy.
 
         Stop when the node shuts down. Raise InvalidArgumentException if a frame name is invalid.
         """
-        # Raises InvalidArgumentException for invalid frame names.
-        self._tree.why_not(target, source, 0)
+        # This call raises InvalidArgumentException for invalid frame names.
+        self.tree.why_not(target, source, 0)
         end = asyncio.ensure_future(self._node.spin())
         last: StampedTransform | None = None
         try:
             while not self._node.is_shutdown:
                 changed = self._changed
                 with contextlib.suppress(TransformException):
-                    found = self._tree.lookup(target, source, 0)
+                    found = self.tree.lookup(target, source, 0)
                     if found != last:
                         last = found
                         yield transform_stamped(target, source, found)
@@ -147,7 +148,7 @@ class Buffer:
 
     def frames_as_yaml(self) -> str:
         """Return each frame's parent, broadcaster, rate and times, in the format that view_frames reads."""
-        return frames_as_yaml(self._tree)
+        return frames_as_yaml(self.tree)
 
     # --- within
 
@@ -179,22 +180,22 @@ class Buffer:
     async def _take(self, subscription: Subscription[LazyTFMessage], is_static: bool) -> None:
         async with subscription:
             async for message in subscription:
-                self._check_for_jump()
+                self.check_for_jump()
                 who = message._connection_header.get("callerid", "default_authority")
                 try:
-                    self._tree.insert_message(message.raw or b"", who, is_static=is_static)
+                    self.tree.insert_message(message.raw or b"", who, is_static=is_static)
                 except DeserializationError as error:
                     self._node.log.error("a message of %s is not a tf2_msgs/TFMessage: %s", who, error)
                     continue
                 self._changed.set()
                 self._changed = asyncio.Event()
 
-    def _check_for_jump(self) -> None:
+    def check_for_jump(self) -> None:
         now = self._node.now().to_nsec()
         if now < self._last:
             jump = (self._last - now) / 1e9
             self._node.log.warning("Detected jump back in time of %fs. Clearing TF buffer.", jump)
-            self._tree.clear()
+            self.tree.clear()
         self._last = now
 
     def _log(self, text: str, is_error: bool) -> None:
@@ -206,18 +207,21 @@ class Broadcaster:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._moving: Publisher[TFMessage] | None = None
+        self.moving: Publisher[TFMessage] | None = None
         self._static: Publisher[TFMessage] | None = None
         self._kept: dict[str, TransformStamped] = {}
 
     async def send(self, *transforms: TransformStamped) -> None:
         """Publish transforms in one message on /tf."""
-        if self._moving is None:
-            self._moving = self._node.advertise("/tf", TFMessage, queue_size=100)
-        await self._moving.publish(TFMessage(list(transforms)))
+        if self.moving is None:
+            self.moving = self._node.advertise("/tf", TFMessage, queue_size=100)
+        await self.moving.publish(TFMessage(list(transforms)))
 
     async def send_static(self, *transforms: TransformStamped) -> None:
-        """Publish transforms on /tf_static, latched, together with all earlier ones; the last one for a child frame wins."""
+        """Publish transforms on /tf_static, latched, together with all earlier ones.
+
+        A transform replaces earlier ones for its child frame.
+        """
         if self._static is None:
             self._static = self._node.advertise("/tf_static", TFMessage, queue_size=100, latch=True)
         self._kept |= {each.child_frame_id: each for each in transforms}
@@ -225,7 +229,7 @@ class Broadcaster:
 
     async def close(self) -> None:
         """Stop publishing. Idempotent."""
-        publishers, self._moving, self._static = (self._moving, self._static), None, None
+        publishers, self.moving, self._static = (self.moving, self._static), None, None
         for publisher in publishers:
             if publisher is not None:
                 await publisher.close()
@@ -242,6 +246,6 @@ async def _first_of(changed: asyncio.Event, end: asyncio.Future[None]) -> None:
 
 
 async def _quietly(pause: Coroutine[object, object, None]) -> None:
-    """Wait; return early if the node shuts down or its time jumps."""
+    """Wait until ``pause`` ends, the node shuts down, or its time jumps."""
     with contextlib.suppress(ROSInterruptException):
         await pause

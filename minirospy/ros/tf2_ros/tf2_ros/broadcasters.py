@@ -1,4 +1,4 @@
-"""tf2_ros.TransformBroadcaster and StaticTransformBroadcaster: transforms -> /tf and /tf_static.
+"""tf2_ros.TransformBroadcaster and StaticTransformBroadcaster: publish transforms on /tf and /tf_static.
 
 Source: http://wiki.ros.org/tf2_ros.
 """
@@ -30,29 +30,30 @@ class TransformBroadcaster:
 
 
 class StaticTransformBroadcaster:
-    """Publishes static transforms on /tf_static, latched: later listeners receive all of them.
+    """Publishes static transforms on /tf_static, latched, so that later listeners receive all of them.
 
     A transform replaces an earlier one for the same child frame. The broadcasters of a process share their transforms,
-    because a node has one latched message per topic: in real ROS it contains only the last broadcaster's transforms.
+    because a node has only one latched message per topic; in real ROS, that message contains only the last broadcaster's
+    transforms.
     """
 
     _lock = threading.Lock()
     _sent: WeakKeyDictionary[object, dict[str, TransformStamped]] = WeakKeyDictionary()
-    """The transforms by child frame, for each topic that a node's broadcasters share."""
+    """The transforms by child frame, per topic handle; all broadcasters of a node share them."""
 
     def __init__(self) -> None:
         self.pub_tf = rospy.Publisher("/tf_static", TFMessage, queue_size=100, latch=True)
 
     @property
     def net_message(self) -> TFMessage:
-        """The message that contains all sent transforms."""
+        """A message that contains all transforms sent so far."""
         return TFMessage(list(self._sent.get(self.pub_tf.impl, {}).values()))
 
     def sendTransform(self, transform: TransformStamped | Sequence[TransformStamped]) -> None:
         """Publish a transform, or several, together with all earlier ones."""
         with self._lock:
             sent = self._sent.setdefault(self.pub_tf.impl, {})
-            # Copy, because a program may reuse its message object.
+            # Copy them, because a program may reuse its message object.
             sent |= {each.child_frame_id: copy.deepcopy(each) for each in _listed(transform)}
             self.pub_tf.publish(self.net_message)
 

@@ -23,9 +23,9 @@ DEFAULT_CAN_TRANSFORM_POLLING_SCALE = 0.01
 class Buffer(BufferCore, BufferInterface):
     """The frames over the last ``cache_time`` (a Duration; 10 s), with lookups that can wait for their data.
 
-    ``debug``: offer the service ``~tf2_frames``, which lists the frames, unless this node already offers it. A wait returns
-    after the insertion that makes the lookup possible. A wait raises an exception if simulated time jumps back by more than
-    the fraction CAN_TRANSFORM_POLLING_SCALE of its timeout. Thread-safe.
+    With ``debug``, offer the service ``~tf2_frames``, which lists the frames, unless this node already offers it. A wait
+    returns after the insertion that makes the lookup possible. It raises an exception if simulated time jumps back by
+    more than the fraction CAN_TRANSFORM_POLLING_SCALE of its timeout. Thread-safe.
     """
 
     def __init__(self, cache_time: Moment | None = None, debug: bool = True) -> None:
@@ -38,9 +38,9 @@ class Buffer(BufferCore, BufferInterface):
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> TransformStamped:
-        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0: the latest common time.
+        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0 means the latest common time.
 
-        Wait for the transform for ``timeout`` (a Duration of ROS time). Raise LookupException if a frame is unknown,
+        Wait up to ``timeout`` (a Duration of ROS time) for the transform. Raise LookupException if a frame is unknown,
         ConnectivityException if the frames are not connected, ExtrapolationException if there is no data for ``time``,
         InvalidArgumentException if a frame name is invalid, ROSInterruptException at a shutdown, and
         ROSTimeMovedBackwardsException if simulated time jumps back during the wait.
@@ -83,7 +83,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Moment = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> int | tuple[int, str]:
-        """Return whether there is a transform (1 or 0), waiting up to ``timeout``; include the reason if a tuple is requested.
+        """Return whether there is a transform (1 or 0), waiting up to ``timeout``; with ``return_debug_tuple``, also the reason.
 
         Raise ROSInterruptException and ROSTimeMovedBackwardsException as :meth:`lookup_transform` does.
         """

@@ -1,4 +1,4 @@
-"""tf2_ros.buffer_client: lookups at a buffer server. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.buffer_client: the client of a buffer server. Source: http://wiki.ros.org/tf2_ros."""
 
 from actionlib_msgs.msg import GoalStatus
 from tf2_msgs.msg import LookupTransformAction, LookupTransformGoal

@@ -1,4 +1,4 @@
-"""tf2_ros.buffer_interface: the common base of buffers and buffer clients. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.buffer_interface: the common base class of buffers and buffer clients. Source: http://wiki.ros.org/tf2_ros."""
 
 from std_msgs.msg import Header
 

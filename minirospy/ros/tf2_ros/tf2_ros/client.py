@@ -1,4 +1,4 @@
-"""tf2_ros.BufferClient: lookups in the buffer of a buffer_server node. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.BufferClient: looks up transforms in the buffer of a buffer_server node. Source: http://wiki.ros.org/tf2_ros."""
 
 from __future__ import annotations
 

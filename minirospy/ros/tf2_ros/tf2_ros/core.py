@@ -54,9 +54,9 @@ class BufferCore:
         self._insert(transform, authority, True)
 
     def insert_message(self, data: bytes, authority: str, is_static: bool = False) -> None:
-        """Insert a serialised TFMessage. If its layout is the same as that of earlier messages, decode it only when needed.
+        """Insert a serialized TFMessage. If it has the same layout as earlier messages, decode it only when needed.
 
-        Not in the real tf2_py. Raise DeserializationError if the bytes are invalid.
+        The real tf2_py has no such method. Raise DeserializationError if the bytes are invalid.
         """
         with self._lock:
             self._tree.insert_message(data, authority, is_static=is_static)
@@ -70,7 +70,7 @@ class BufferCore:
     # --- lookups out
 
     def lookup_transform_core(self, target_frame: str, source_frame: str, time: Moment) -> TransformStamped:
-        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0: the latest common time.
+        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0 means the latest common time.
 
         Raise LookupException if a frame is unknown, ConnectivityException if the frames are not connected,
         ExtrapolationException if there is no data for ``time``, InvalidArgumentException if a frame name is invalid.
@@ -137,7 +137,7 @@ class BufferCore:
             return self._tree.frames_as_string()
 
     def _allFramesAsDot(self, time: Moment = _NO_TIME) -> str:
-        """Return the tree as a graphviz graph, with the age of each frame if a time is given."""
+        """Return the tree of frames as a graphviz graph, with the age of each frame if a time is given."""
         stamp = nanoseconds(time)
         with self._lock:
             return frames_as_dot(self._tree, stamp)
@@ -182,7 +182,7 @@ class BufferCore:
                 parent,
                 child,
                 nanoseconds(header.stamp),
-                # A lookup returns floats, even if integers or numpy numbers were inserted.
+                # Convert to floats, which a lookup returns even if integers or numpy numbers were inserted.
                 (float(where.x), float(where.y), float(where.z)),
                 (float(turn.x), float(turn.y), float(turn.z), float(turn.w)),
                 authority,
@@ -208,7 +208,7 @@ class BufferCore:
         return int(why is None), why or ""
 
     def _report(self) -> None:
-        """Log rejected transforms, without holding the lock, because a log handler may call lookups."""
+        """Log rejected transforms without holding the lock, because a log handler may look up transforms."""
         with self._lock:
             refused = self._refused[:]
             del self._refused[: len(refused)]

@@ -1,4 +1,4 @@
-"""The base class for the buffer and the buffer client: transforms whole messages, and converts between types.
+"""The base class of the buffer and the buffer client, which transforms whole messages, and converts between types.
 
 Source: http://wiki.ros.org/tf2_ros, http://wiki.ros.org/tf2/Tutorials/Transforming%20your%20own%20datatypes.
 """
@@ -34,7 +34,7 @@ _Function: TypeAlias = Callable[..., Any]
 
 
 class TypeException(Exception):
-    """No conversion is registered for this type; the program must import the package that registers it."""
+    """No conversion is registered for the type. The program must import the package that registers it."""
 
     def __init__(self, errstr: str) -> None:
         super().__init__(errstr)
@@ -50,7 +50,7 @@ class NotImplementedException(Exception):
 
 
 class _Registry:
-    """Functions by type, or by a pair of types; shared by the whole process."""
+    """Functions by type, or by a pair of types. The whole process shares them."""
 
     def __init__(self) -> None:
         self.functions: dict[object, _Function] = {}
@@ -63,7 +63,7 @@ class _Registry:
 
 
 class TransformRegistration:
-    """Functions ``(object, TransformStamped) -> object`` that transform objects of a type; shared by all instances."""
+    """Functions ``(object, TransformStamped) -> object`` that transform objects of a type. All instances share them."""
 
     _registry = _Registry()
 
@@ -81,7 +81,7 @@ class TransformRegistration:
 
 
 class ConvertRegistration:
-    """Functions that convert between types, directly or through a message; shared by all instances."""
+    """Functions that convert between types, directly or through a message. All instances share them."""
 
     _to_msg = _Registry()
     _from_msg = _Registry()
@@ -108,7 +108,7 @@ class ConvertRegistration:
         return self._to_msg.get(key)
 
     def get_convert(self, key: tuple[type[_A], type[_T]]) -> Callable[[_A], _T]:
-        """Return the direct conversion. Raise TypeException if none is registered."""
+        """Return the direct conversion for a pair (from, to). Raise TypeException if none is registered."""
         return self._convert.get(key)
 
 
@@ -135,7 +135,7 @@ def Stamped(obj: _T, stamp: times.Time, frame_id: str) -> _T:
 
 
 class BufferInterface:
-    """The lookups, which a subclass implements, and the methods that use them."""
+    """The lookup methods, which subclasses implement, and the methods that use them."""
 
     def __init__(self) -> None:
         self.registration = TransformRegistration()
@@ -161,7 +161,7 @@ class BufferInterface:
     ) -> object:
         """Return a stamped object in ``target_frame``, at its own stamp, converted to ``new_type`` if given.
 
-        Raise TypeException for a type that is not registered; otherwise raise exceptions as :meth:`lookup_transform` does.
+        Raise TypeException if a type is not registered, and the exceptions that :meth:`lookup_transform` raises.
         """
         do_transform = self.registration.get(type(object_stamped))
         header = object_stamped.header
@@ -193,7 +193,7 @@ class BufferInterface:
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> TransformStamped:
-        """Return a transform; a subclass implements it."""
+        """Return a transform; subclasses implement this method."""
         raise NotImplementedException
 
     def lookup_transform_full(
@@ -205,13 +205,13 @@ class BufferInterface:
         fixed_frame: str,
         timeout: Moment = NO_WAIT,
     ) -> TransformStamped:
-        """Return a transform between two times; a subclass implements it."""
+        """Return a transform between two times; subclasses implement this method."""
         raise NotImplementedException
 
     def can_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> object:
-        """Return whether there is a transform; a subclass implements it."""
+        """Return whether there is a transform; subclasses implement this method."""
         raise NotImplementedException
 
     def can_transform_full(
@@ -223,5 +223,5 @@ class BufferInterface:
         fixed_frame: str,
         timeout: Moment = NO_WAIT,
     ) -> object:
-        """Return whether there is a transform between two times; a subclass implements it."""
+        """Return whether there is a transform between two times; subclasses implement this method."""
         raise NotImplementedException

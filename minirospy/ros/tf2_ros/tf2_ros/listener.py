@@ -1,4 +1,4 @@
-"""tf2_ros.TransformListener: inserts /tf and /tf_static into a buffer. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.TransformListener: inserts transforms from /tf and /tf_static into a buffer. Source: http://wiki.ros.org/tf2_ros."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["TransformListener"]
 
 
 class TransformSink(Protocol):
-    """The object that receives a listener's transforms: a Buffer or the program's own object."""
+    """The object that receives a listener's transforms: a Buffer, or the program's own object."""
 
     def set_transform(self, transform: TransformStamped, authority: str, /) -> object:
         """Insert a transform."""
@@ -31,7 +31,7 @@ class TransformSink(Protocol):
 
 
 class TransformListener:
-    """Inserts every transform of /tf and /tf_static into ``buffer``; clears the buffer if time jumps back.
+    """Inserts every transform on /tf and /tf_static into ``buffer``, and clears the buffer if time jumps back.
 
     ``queue_size``, ``buff_size`` and ``tcp_nodelay`` are passed to the Subscribers.
     """
@@ -55,7 +55,7 @@ class TransformListener:
         )
 
     def __del__(self) -> None:
-        # Suppress all errors: the constructor may have failed, or the interpreter may be exiting.
+        # Suppress all errors, because the constructor may have failed, or the interpreter may be exiting.
         with contextlib.suppress(Exception):
             self.unregister()
 
@@ -66,7 +66,8 @@ class TransformListener:
 
     def check_for_reset(self) -> None:
         """Clear the buffer if time has jumped back since the last message."""
-        # Read the time inside the lock: otherwise a thread overtaken by another would report a jump.
+        # Read the time while holding the lock; otherwise, a thread that is overtaken by another one would report a
+        # jump.
         with self.last_update_lock:
             now = rospy.get_time()
             jump, self._last = self._last - now, now
@@ -80,11 +81,11 @@ class TransformListener:
         return rospy.Time.from_sec(self._last)
 
     def callback(self, data: LazyTFMessage) -> None:
-        """Insert the transforms of a message on /tf."""
+        """Insert the transforms in a message on /tf."""
         self._take(data, is_static=False)
 
     def static_callback(self, data: LazyTFMessage) -> None:
-        """Insert the transforms of a message on /tf_static."""
+        """Insert the transforms in a message on /tf_static."""
         self._take(data, is_static=True)
 
     def _take(self, data: LazyTFMessage, *, is_static: bool) -> None:
@@ -107,7 +108,7 @@ class TransformListener:
 
 
 def _takes_bytes(buffer: TransformSink) -> bool:
-    """Return whether a buffer accepts undecoded messages: a BufferCore whose subclass does not override set_transform."""
+    """Return whether a buffer accepts undecoded messages. It does if it is a BufferCore and does not override set_transform."""
     kind = type(buffer)
     return (
         issubclass(kind, BufferCore)

@@ -1,4 +1,4 @@
-"""Conversions between messages and the buffer's numbers: TransformStamped, times, and /tf messages that remain undecoded."""
+"""Converts between messages and the buffer's numbers: TransformStamped, times, and /tf messages that stay undecoded."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _new: Any = object.__new__
 
 
 class Moment(Protocol):
-    """A time or duration of rospy, genpy or a similar module."""
+    """A time or duration from rospy, genpy or a similar module."""
 
     def to_sec(self) -> float:
         """Return the time in seconds."""
 
 
 def nanoseconds(time: Moment) -> int:
-    """Return a time in nanoseconds; exact if it has ``secs`` and ``nsecs``.
+    """Return a time in nanoseconds. The result is exact if the time has ``secs`` and ``nsecs``.
 
     Raise TypeError if it is not a time, as tf2_py does.
     """
@@ -41,7 +41,7 @@ def nanoseconds(time: Moment) -> int:
 
 def transform_stamped(target: str, source: str, found: StampedTransform) -> TransformStamped:
     """Return a lookup's result as a message."""
-    # Skip the constructors, which take longer than the lookup.
+    # Create the message without constructors, which would take longer than the lookup.
     message: TransformStamped = _new(TransformStamped)
     message.header = header = _new(Header)
     header.seq = 0

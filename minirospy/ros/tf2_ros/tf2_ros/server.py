@@ -1,4 +1,4 @@
-"""tf2_ros.BufferServer: performs the lookups of BufferClients through an action. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.BufferServer: looks up transforms for BufferClients through an action. Source: http://wiki.ros.org/tf2_ros."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ _CODES: list[tuple[type[TransformException], int]] = [
 
 
 class BufferServer:
-    """Performs lookups in ``buffer`` through the action ``ns`` (tf2_msgs/LookupTransform), each as soon as it is possible.
+    """Performs lookups in ``buffer`` for goals of the action ``ns`` (tf2_msgs/LookupTransform), each as soon as it is possible.
 
-    A goal stays pending until an insertion makes its lookup possible or its timeout expires; then the result contains the
-    error.
-    ``check_period`` (a Duration) is the interval at which simulated time is checked. Real ROS has this class only in C++.
+    A goal stays pending until an insertion makes its lookup possible, or its timeout expires and the result contains the
+    error. ``check_period`` (a Duration) is the interval at which simulated time is checked. Real ROS has this class only
+    in C++.
     """
 
     def __init__(

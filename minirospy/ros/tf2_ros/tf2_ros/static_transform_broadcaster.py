@@ -1,4 +1,4 @@
-"""tf2_ros.static_transform_broadcaster: transforms to /tf_static. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.static_transform_broadcaster: publishes transforms on /tf_static. Source: http://wiki.ros.org/tf2_ros."""
 
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage

@@ -1,4 +1,4 @@
-"""tf2_ros.transform_listener: /tf and /tf_static into a buffer. Source: http://wiki.ros.org/tf2_ros."""
+"""tf2_ros.transform_listener: inserts /tf and /tf_static into a buffer. Source: http://wiki.ros.org/tf2_ros."""
 
 from tf2_msgs.msg import TFMessage
 

@@ -1,4 +1,4 @@
-"""Wait for a transform: until an insertion, a shutdown, the timeout, or a time jump."""
+"""Waits for a transform, until an insertion provides it, a shutdown, the timeout, or a time jump."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds
 
 __all__ = ["wait_until"]
 
-_JUMP = times.Duration(3)  # a wall clock that is set back by more than this aborts a wait
-_SIMULATED_SLICE = 0.01  # seconds; a change in simulated time does not wake a blocked thread
+_JUMP = times.Duration(3)  # if the wall clock is set back by more than this, a wait is aborted
+# seconds; interval between checks in simulated time, because a change of that time does not wake a blocked thread
+_SIMULATED_SLICE = 0.01
 
 
 def wait_until(core: BufferCore, is_possible: Callable[[], bool], timeout: Moment, step: float) -> None:
-    """Wait until ``is_possible()`` is true, called after each insertion, or until ``timeout`` of ROS time has passed.
+    """Wait until ``is_possible()``, which is called after each insertion, is true, or ``timeout`` of ROS time has passed.
 
     ``step`` is the fraction of the timeout that the real implementation sleeps between two checks. Raise
-    ROSTimeMovedBackwardsException if simulated time jumps back to before the start of such a sleep,
-    ROSInterruptException if the node shuts down in the meantime, ROSInitException before init_node.
+    ROSTimeMovedBackwardsException if simulated time jumps back to before the start of such a sleep, ROSInterruptException
+    if the node shuts down in the meantime, ROSInitException if init_node has not been called.
     """
     start = slept = rospy.get_rostime()
     length = times.Duration(*divmod(nanoseconds(timeout), 1_000_000_000))

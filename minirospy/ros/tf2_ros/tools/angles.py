@@ -1,4 +1,4 @@
-"""Conversion of quaternions to angles, in the same steps as ROS's two programs, so that zeros have the same signs."""
+"""Converts quaternions to angles, in the same steps as ROS's two programs, so that zeros have the same signs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _SMALL = 4 * 2.0**-52
 
 
 def rpy_of_matrix(rotation: Quaternion) -> Vector:
-    """Return roll, pitch and yaw as tf_echo prints them; the yaw is 0 if pitch is a right angle."""
+    """Return roll, pitch and yaw as tf_echo prints them. The yaw is 0 if the pitch is a right angle."""
     (xx, xy, xz), (yx, _, _), (zx, zy, zz) = _matrix(rotation)
     if zx <= -1:
         return math.atan2(xy, xz), math.pi / 2, 0.0

@@ -1,4 +1,4 @@
-"""buffer_server of tf2_ros: a buffer that nodes query through the action tf2_buffer_server instead of subscribing to /tf.
+"""tf2_ros's buffer_server: a buffer that nodes query through the action tf2_buffer_server instead of subscribing to /tf.
 
 Parameters: ~buffer_size (seconds, 120), ~publish_frame_service (false). Source: http://wiki.ros.org/tf2_ros.
 """

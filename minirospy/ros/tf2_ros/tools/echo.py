@@ -1,4 +1,4 @@
-"""tf_echo of tf, and echo.py of tf2_tools: print a transform between two frames periodically.
+"""tf's tf_echo and tf2_tools' echo.py: print the transform between two frames periodically.
 
 Source: http://wiki.ros.org/tf#tf_echo, http://wiki.ros.org/tf2_tools.
 """
@@ -93,7 +93,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
     buffer = Buffer(rospy.Duration.from_sec(options.cache_time) if options.cache_time else None)
     TransformListener(buffer)
-    # The original uses a timer, so its first lookup is after one period.
+    # The original program uses a timer, so its first lookup occurs after one period.
     rospy.sleep(1 / options.rate)
     looks = 0
 
@@ -137,7 +137,7 @@ def _repeat(rate: float, echo: Callable[[], bool]) -> None:
 
 
 def _pose(found: TransformStamped, precision: int, angles: Callable[[Quaternion], Vector]) -> str:
-    """Return the lines that describe a pose, without the last line break."""
+    """Return the lines that describe a pose, as a string without a trailing line break."""
     place, turn = found.transform.translation, found.transform.rotation
     rpy = angles((turn.x, turn.y, turn.z, turn.w))
     rows = (

@@ -24,9 +24,9 @@ from minirospy.ros.tf2_ros.tools.program import ToolError, report, run_program
 __all__ = ["Delays", "main"]
 
 _USAGE = "TF_Monitor: usage: tf_monitor framea frameb"
-_KEPT = 1000  # delays per average, and messages per rate
+_KEPT = 1000  # number of delays per average, and of messages per rate
 _STEP = 0.01
-_STEPS = 20  # measurements of the delay between two frames per report
+_STEPS = 20  # number of measurements of the delay between two frames per report
 _SMOOTHING = 0.01
 _MIN_PERIOD = 1e-8
 
@@ -46,7 +46,7 @@ class Delays:
         self._node_times: dict[str, deque[float]] = {}
 
     def add(self, sender: str, frames: Sequence[tuple[str, float]], now: float, *, is_static: bool) -> None:
-        """Record a message: each child frame with its stamp. Static transforms count as having no delay."""
+        """Record a message, given as its child frames with their stamps. Static transforms count as having no delay."""
         sender = sender + "(static)" * is_static
         late = [(child, 0.0 if is_static else now - stamp) for child, stamp in frames]
         for child, delay in late:
@@ -79,7 +79,7 @@ def _average_and_most(delays: deque[float]) -> tuple[float, float]:
 
 def _run(words: Sequence[str]) -> None:
     if len(words) not in (0, 2):
-        # As in ROS, the usage is logged at level INFO.
+        # The usage is logged at level INFO, as in ROS.
         report(_USAGE, "INFO")
         raise ToolError("")
     rospy.init_node("tf_monitor", anonymous=True)

@@ -1,4 +1,4 @@
-"""The code that the programs share: their arguments, their errors, a buffer with a listener."""
+"""The code that the programs share: arguments, errors, and a buffer with a listener."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from minirospy.base.escape import escaped
 
 __all__ = ["USAGE_STATUS", "ToolError", "report", "run_program"]
 
-USAGE_STATUS = 255  # exit status of a usage error: ROS's programs return -1
+USAGE_STATUS = 255  # exit status of a usage error, for which ROS's programs return -1
 
 
 class ToolError(MinirospyError):
-    """A program cannot continue: it prints ``text`` to stdout and ``str()`` to stderr, and exits with the status.
+    """A program cannot continue. It prints ``text`` to stdout and ``str()`` to stderr, and exits with the status.
 
     ``level`` is the line's log level; if it is empty, the line is printed without a level.
     """
@@ -44,13 +44,13 @@ def run_program(body: Callable[[Sequence[str]], int | None], words: Sequence[str
     except (rospy.ROSInterruptException, KeyboardInterrupt):
         return 0
     except BrokenPipeError:
-        # The text that is still buffered cannot be written, so discard it.
+        # Discard the text that is still buffered, because it cannot be written.
         sys.stdout = None
         return 0
 
 
 def report(line: str, level: str = "ERROR") -> None:
-    """Print a line in the format of ROS's console, even if there is no node yet; without a level, print it unchanged.
+    """Print a line in the format of ROS's console, even if there is no node yet; if ``level`` is empty, print it unchanged.
 
     The level INFO is printed to stdout, all others to stderr.
     """

@@ -1,4 +1,4 @@
-"""tf_remap: republish /tf_old on /tf with renamed frames: ~mappings is ``[{old: a, new: b}]``.
+"""tf_remap: republish /tf_old on /tf with frames renamed as in the parameter ~mappings, ``[{old: a, new: b}]``.
 
 Source: http://wiki.ros.org/tf#tf_remap. In the launch file, the publishing node needs
 ``<remap from="/tf" to="/tf_old"/>``.
@@ -28,7 +28,7 @@ def _run(words: Sequence[str]) -> None:
         raise ToolError(f"~mappings is [{mappings}]: it is a list as [{{old: a, new: b}}]", status=1)
     names = {str(each["old"]): str(each["new"]) for each in mappings if {"old", "new"} <= each.keys()}
     print("Applying the following mappings to incoming tf frame ids", names, flush=True)
-    # The queue length ensures that every message is forwarded, even if several arrive at the same time.
+    # The long queue ensures that every message is forwarded, even if several arrive at the same time.
     publisher = rospy.Publisher("/tf", TFMessage, queue_size=100)
 
     def rename(message: TFMessage) -> None:

@@ -1,4 +1,4 @@
-"""robot_pose_publisher: publish the robot's pose on the map, from /tf, on robot_pose.
+"""robot_pose_publisher: publish the robot's pose on the map, as computed from /tf, on the topic robot_pose.
 
 Parameters: ~map_frame (/map), ~base_frame (/base_link), ~publish_frequency (10 Hz), ~is_stamped (false: Pose, true:
 PoseStamped). Source: http://wiki.ros.org/robot_pose_publisher.
@@ -41,7 +41,7 @@ def _run(words: Sequence[str]) -> None:
         try:
             found = buffer.lookup_transform(map_frame.lstrip("/"), base_frame.lstrip("/"), rospy.Time(0))
         except TransformException:
-            # A robot that is not localised yet has no pose.
+            # The robot has no pose until it is localised.
             pass
         else:
             position = found.transform.translation

@@ -1,4 +1,4 @@
-"""static_transform_publisher of tf (periodically on /tf) and of tf2_ros (once, latched, on /tf_static).
+"""static_transform_publisher: tf's program publishes periodically on /tf, tf2_ros's once on /tf_static, latched.
 
 Source: http://wiki.ros.org/tf#static_transform_publisher, http://wiki.ros.org/tf2_ros#static_transform_publisher.
 """
@@ -41,9 +41,9 @@ Usage: {_NAME} /param_name
 {_ABOUT}"""  # noqa: W291
 
 _MIN_PERIOD = 0.001
-"""Minimum period in seconds: a period of 0 would keep this process and all listeners busy."""
+"""Minimum period in seconds; a period of 0 would keep this process and all listeners busy."""
 _TOLERANCE = 0.01
-"""Maximum deviation of a quaternion's squared length from 1: beyond it, every listener rejects the transform."""
+"""Maximum deviation of a quaternion's squared length from 1. If it is larger, every listener rejects the transform."""
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
@@ -52,7 +52,7 @@ def main_tf(words: Sequence[str] | None = None) -> int:
 
 
 def main_tf2(words: Sequence[str] | None = None) -> int:
-    """Run tf2_ros's program: the same arguments without a period, or a parameter name; return the exit status."""
+    """Run tf2_ros's program: the same arguments without the period, or the name of a parameter; return the exit status."""
     return run_program(_run_tf2, words)
 
 
@@ -65,7 +65,7 @@ def _run_tf(words: Sequence[str]) -> None:
 
     rospy.init_node(_NAME, anonymous=True)
     broadcaster = TransformBroadcaster()
-    # Stamp it in the future, so that the frame is known until the next message arrives.
+    # Stamp the transform in the future, so that the frame is known until the next message arrives.
     ahead = rospy.Duration.from_sec(seconds)
     broadcaster.pub_tf.wait_for_subscribers(timeout=seconds)
     while not rospy.is_shutdown():
@@ -96,7 +96,7 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _transform(numbers: Sequence[str], parent: str, child: str) -> TransformStamped:
-    """Return the transform built from x y z yaw pitch roll, or x y z qx qy qz qw.
+    """Return the transform given by x y z yaw pitch roll, or x y z qx qy qz qw.
 
     Raise ToolError if the arguments are invalid.
     """

@@ -1,7 +1,7 @@
-"""view_frames of tf and of tf2_tools: record transforms for five seconds and draw the tree of frames.
+"""tf's and tf2_tools' view_frames: record transforms for five seconds and draw the tree of frames.
 
-Writes frames.gv, and frames.pdf with `dot`, else frames.svg.
-Source: http://wiki.ros.org/tf#view_frames, http://wiki.ros.org/tf2_tools.
+The program writes frames.gv, and frames.pdf if `dot` is installed, otherwise frames.svg. Source:
+http://wiki.ros.org/tf#view_frames, http://wiki.ros.org/tf2_tools.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class FrameRecord(NamedTuple):
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
-    """Run tf's view_frames, for received transforms or, with --node, for a node's buffer; return the exit status."""
+    """Run tf's view_frames, for received transforms, or with --node for a node's buffer; return the exit status."""
     return run_program(_run_tf, words)
 
 
@@ -108,7 +108,10 @@ def _run_tf2(words: Sequence[str]) -> None:
 
 
 def _listen() -> None:
-    """Wait for transforms to arrive, in real time because a bag may be paused. Raise ROSInterruptException at a shutdown."""
+    """Wait for transforms to arrive.
+
+    Wait in real time, because a bag may be paused. Raise ROSInterruptException at a shutdown.
+    """
     end = time.monotonic() + _SECONDS
     while time.monotonic() < end:
         if rospy.is_shutdown():
@@ -117,7 +120,10 @@ def _listen() -> None:
 
 
 def _graph_of_node(name: str) -> str:
-    """Return the graph that a tf or tf2 node offers; wait for its service. Raise ToolError if the call fails."""
+    """Return the graph that a tf or tf2 node provides through a service, after waiting for it.
+
+    Raise ToolError if the call fails.
+    """
     from tf.srv import FrameGraph
 
     rospy.init_node("view_frames", anonymous=True)
@@ -142,7 +148,7 @@ def _graph_of_node(name: str) -> str:
 
 
 def read_records(listing: str) -> list[FrameRecord]:
-    """Parse a buffer's YAML listing into frames; frame names may contain any characters."""
+    """Parse a buffer's YAML listing into frames. Frame names may contain any characters."""
     pattern = re.compile(
         r"^(.*): \n  parent: '(.*)'\n  broadcaster: '(.*)'\n  rate: (.*)\n  most_recent_transform: (.*)\n"
         r"  oldest_transform: (.*)\n  buffer_length: (.*)\n",

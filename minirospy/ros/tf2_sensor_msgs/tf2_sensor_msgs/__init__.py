@@ -1,4 +1,4 @@
-"""tf2_sensor_msgs: point clouds for tf2_ros; importing it registers them."""
+"""tf2_sensor_msgs: transforms point clouds for tf2_ros. Importing it registers their type."""
 
 from typing import TYPE_CHECKING
 

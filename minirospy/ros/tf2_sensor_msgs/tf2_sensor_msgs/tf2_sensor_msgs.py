@@ -1,6 +1,6 @@
 """tf2_sensor_msgs: transforms point clouds for tf2_ros. Source: http://wiki.ros.org/tf2_sensor_msgs.
 
-Importing it registers PointCloud2 with tf2_ros. numpy is imported when the first cloud is transformed.
+Importing this module registers PointCloud2 with tf2_ros. numpy is imported when the first cloud is transformed.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ _FORMATS = {
 
 
 def do_transform_cloud(cloud: PointCloud2, transform: TransformStamped) -> PointCloud2:
-    """Return a cloud with transformed x, y and z, with the transform's header.
+    """Return a cloud with x, y and z transformed, and with the transform's header.
 
-    As in real ROS, the result has one row, little-endian numbers, nothing after a point's last field, zeros between
-    its fields, and is not marked as dense. The other fields, and points with NaN coordinates, are kept. x, y and z are
-    the fields with these names, while real ROS uses the first three fields. Raise ValueError if the cloud has no x, y and z,
-    or less data than its sizes require.
+    As in real ROS, the result has one row, little-endian numbers, zeros between a point's fields and nothing after the
+    last one, and is not marked as dense. Other fields, and points with NaN coordinates, are kept. x, y and z are the
+    fields with these names, whereas real ROS uses the first three fields. Raise ValueError if the cloud has no x, y and
+    z, or less data than its sizes require.
     """
     import numpy
 
@@ -94,7 +94,10 @@ def _points(cloud: PointCloud2) -> NDArray[numpy.void]:
 
 
 def _layout(fields: Sequence[PointField], order: str, step: int | None = None) -> numpy.dtype[numpy.void]:
-    """Return the layout of a point of ``step`` bytes (default: up to its last field). Raise ValueError if fields do not fit."""
+    """Return the layout of a point with ``step`` bytes, by default up to its last field.
+
+    Raise ValueError if the fields do not fit.
+    """
     import numpy
 
     known = [field for field in fields if field.datatype in _FORMATS]

@@ -1,4 +1,4 @@
-"""tf_conversions: PyKDL's frames as tuples, messages and matrices."""
+"""tf_conversions: converts PyKDL's frames to tuples, messages and matrices, and back."""
 
 from typing import TYPE_CHECKING
 

@@ -2,6 +2,5 @@
 
 from minirospy.base.ros1_imports import prefer_ros1
 
-# The modules below import ROS 1 messages; if ROS 2 is sourced, its packages of the same names would be imported
-# instead.
+# The modules below import ROS 1 messages. If ROS 2 is sourced, its packages of the same names would be found first.
 prefer_ros1()

@@ -1,4 +1,4 @@
-"""mux_select, mux_add, mux_delete, mux_list: call a service of a running mux; demux_select and so on call a demux.
+"""mux_select, mux_add, mux_delete and mux_list call a service of a running mux; demux_select and so on call a demux.
 
 The demux programs exist only in minirospy. The exit status is 1 if the call fails (ROS: 0).
 """
@@ -21,7 +21,7 @@ class _Verb(NamedTuple):
     service: type
     takes_topic: bool
     text: Callable[[str, str, str], str]
-    """Returns the line to print before the call, from the program (mux or demux), the node's name and the topic."""
+    """Returns the line to print before the call, given the program (mux or demux), the node's name and the topic."""
 
 
 _VERBS = {
@@ -30,7 +30,7 @@ _VERBS = {
     "delete": _Verb(MuxDelete, True, lambda kind, name, topic: f'Deleting "{topic}" from {kind} "{name}"'),
     "list": _Verb(MuxList, False, lambda kind, name, topic: f'Listing topics from {kind} "{name}"'),
 }
-"""demux's services have the same fields as mux's services, and therefore the same md5sums."""
+"""The services by verb. demux's services have the same fields as mux's, and therefore the same md5sums."""
 
 
 def main(program: str) -> int:

@@ -1,4 +1,4 @@
-"""demux: forward a topic to one of several others, which services select.
+"""demux: forward a topic to one of several others, selected through services.
 
 Topic demux/selected (latched); services demux/select, demux/add, demux/list, demux/delete; ``__none`` selects no output.
 """
@@ -6,7 +6,7 @@ Topic demux/selected (latched); services demux/select, demux/add, demux/list, de
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from std_msgs.msg import String
 from topic_tools.srv import (
@@ -26,13 +26,13 @@ from topic_tools.srv import (
 
 from minirospy import client as rospy
 from minirospy.client.topics import AnyMsg
-from minirospy.ros.topic_tools.programs.passing import NONE, Input, Output, base_name, run_node
+from minirospy.ros.topic_tools.programs.passing import NONE, Input, Output, base_name, checked_topic, run_node
 
 __all__ = ["Demux", "main"]
 
 _USAGE = "\nusage: demux IN_TOPIC OUT_TOPIC1 [OUT_TOPIC2 [...]]\n"
 _FIRST_SUBSCRIBER = 0.5
-"""Seconds for which an output's first message waits for a subscriber to connect, after the topic is advertised."""
+"""Maximum number of seconds for which an output's first message waits for a subscriber, after the topic is advertised."""
 
 
 def main() -> int:
@@ -40,13 +40,18 @@ def main() -> int:
     return run_node(
         _USAGE,
         lambda words: f"{base_name(words[0])}_demux",
-        lambda words: Demux(words[0], words[1:]),
+        _prepare,
         range(2, 10_000),
     )
 
 
+def _prepare(words: Sequence[str]) -> Callable[[], Demux]:
+    source, *targets = map(checked_topic, words)
+    return lambda: Demux(source, targets)
+
+
 class Demux:
-    """Forwards a topic's messages to the selected output, unchanged."""
+    """Forwards a topic's messages unchanged to the selected output."""
 
     def __init__(self, source: str, targets: Sequence[str]) -> None:
         self._lock = threading.RLock()

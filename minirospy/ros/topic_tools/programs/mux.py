@@ -1,4 +1,4 @@
-"""mux: forward one of several topics, which services select.
+"""mux: forward one of several topics, selected through services.
 
 Topic mux/selected (latched); services mux/select, mux/add, mux/list, mux/delete, OUT_select; ``__none`` selects no input.
 Parameters: ~lazy (subscribe only to the selected topic, while the output has subscribers), ~latch, ~initial_topic.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from std_msgs.msg import String
 from topic_tools.srv import (
@@ -28,7 +28,15 @@ from topic_tools.srv import (
 
 from minirospy import client as rospy
 from minirospy.client.topics import AnyMsg
-from minirospy.ros.topic_tools.programs.passing import NONE, Input, Output, base_name, flag, run_node
+from minirospy.ros.topic_tools.programs.passing import (
+    NONE,
+    Input,
+    Output,
+    base_name,
+    checked_topic,
+    flag,
+    run_node,
+)
 
 __all__ = ["Mux", "main"]
 
@@ -40,13 +48,18 @@ def main() -> int:
     return run_node(
         _USAGE,
         lambda words: f"{base_name(words[0])}_mux",
-        lambda words: Mux(words[0], words[1:], is_lazy=flag("lazy"), latch=flag("latch")),
+        _prepare,
         range(2, 10_000),
     )
 
 
+def _prepare(words: Sequence[str]) -> Callable[[], Mux]:
+    target, *sources = map(checked_topic, words)
+    return lambda: Mux(target, sources, is_lazy=flag("lazy"), latch=flag("latch"))
+
+
 class Mux:
-    """Forwards the selected topic's messages, unchanged."""
+    """Forwards the selected topic's messages unchanged."""
 
     def __init__(self, target: str, sources: Sequence[str], *, is_lazy: bool, latch: bool) -> None:
         self._is_lazy = is_lazy

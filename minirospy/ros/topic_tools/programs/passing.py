@@ -1,4 +1,4 @@
-"""The code that the programs share: messages of any type are received and sent as bytes."""
+"""The code that the programs share. Messages of any type are received and sent as bytes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from minirospy.base.errors import ROSInterruptException
 from minirospy.base.names import is_legal_name
 from minirospy.client.topics import AnyMsg, SubscribeListener
 
-__all__ = ["NONE", "Input", "Output", "base_name", "flag", "run_node"]
+__all__ = ["NONE", "Input", "Output", "base_name", "checked_topic", "flag", "run_node"]
 
 NONE = "__none"  # the name that selects no topic in a mux or demux
 _QUEUE_SIZE = 10
@@ -29,7 +29,7 @@ class _Connected(SubscribeListener):
 
 
 class Output:
-    """A topic with the type of the first forwarded message; latched if the input is latched, unless ``latch`` is given."""
+    """A topic with the type of the first forwarded message. It is latched if the input is latched, unless ``latch`` is given."""
 
     def __init__(
         self,
@@ -39,8 +39,11 @@ class Output:
         on_subscriber: Callable[[], object] = lambda: None,
         on_advertised: Callable[[], object] = lambda: None,
     ) -> None:
-        """Create the output. ``latch``: None means the same as the input; ``on_advertised`` is called after the first message."""
-        self.topic = _checked(topic)
+        """Create the output.
+
+        ``latch`` None means the same as the input; ``on_advertised`` is called after the first message.
+        """
+        self.topic = checked_topic(topic)
         self._latch = latch
         self._on_subscriber = on_subscriber
         self._on_advertised = on_advertised
@@ -99,7 +102,7 @@ class Input:
     """A subscription that can be closed and opened again."""
 
     def __init__(self, topic: str, callback: Callable[[AnyMsg], object]) -> None:
-        self.topic = _checked(topic)
+        self.topic = checked_topic(topic)
         self._callback = callback
         self._subscriber: rospy.Subscriber[AnyMsg] | None = None
         self._lock = threading.Lock()
@@ -110,7 +113,7 @@ class Input:
         return self._subscriber is not None
 
     def open(self) -> None:
-        """Subscribe if not subscribed."""
+        """Subscribe, unless already subscribed."""
         with self._lock:
             if self._subscriber is None:
                 self._subscriber = rospy.Subscriber(
@@ -118,7 +121,7 @@ class Input:
                 )
 
     def close(self) -> None:
-        """Unsubscribe if subscribed."""
+        """Unsubscribe, if subscribed."""
         with self._lock:
             subscriber, self._subscriber = self._subscriber, None
         if subscriber is not None:
@@ -126,14 +129,14 @@ class Input:
 
 
 def base_name(topic: str) -> str:
-    """Return the last part of a topic's name, which is used in the node's name. Raise ValueError if it is empty."""
-    name = _checked(topic).rstrip("/").rpartition("/")[2].lstrip("~")
+    """Return the last part of a topic's name, which becomes part of the node's name. Raise ValueError if it is empty."""
+    name = checked_topic(topic).rstrip("/").rpartition("/")[2].lstrip("~")
     if not name:
         raise ValueError(f"[{topic}] is not the name of a topic")
     return name
 
 
-def _checked(topic: str) -> str:
+def checked_topic(topic: str) -> str:
     """Return a topic's name. Raise ValueError if it is invalid."""
     if not is_legal_name(topic):
         raise ValueError(f"[{topic}] is not the name of a topic")
@@ -146,20 +149,25 @@ def flag(name: str) -> bool:
 
 
 def run_node(
-    usage: str, name: Callable[[Sequence[str]], str], start: Callable[[Sequence[str]], object], counts: range
+    usage: str,
+    name: Callable[[Sequence[str]], str],
+    prepare: Callable[[Sequence[str]], Callable[[], object]],
+    counts: range,
 ) -> int:
     """Run a program until its node shuts down; return its exit status.
 
-    ``name`` and ``start`` are called with the command-line arguments; if they raise ValueError, it is printed with the usage.
+    ``name`` and ``prepare`` are called with the command-line arguments; if they raise ValueError, it is printed with the usage.
+    ``prepare`` checks the arguments, which needs no master, and returns the function that is called once the node runs.
     ``counts``: the allowed numbers of arguments.
     """
     words = rospy.myargv()[1:]
     try:
         if len(words) not in counts:
             raise ValueError("")
+        start = prepare(words)
         rospy.init_node(name(words), anonymous=True)
-        # Keep a reference to the subscription or services.
-        running = start(words)
+        # Keep a reference, so that the subscription or the services are not deleted.
+        running = start()
         rospy.spin()
         del running
     except ValueError as error:

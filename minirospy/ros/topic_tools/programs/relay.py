@@ -7,13 +7,13 @@ Parameters: ~lazy (subscribe only while the output has subscribers); ~stealth wi
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from minirospy import client as rospy
 from minirospy.base.environment import Environment
 from minirospy.base.errors import MasterUnreachableError, RpcError
 from minirospy.client.topics import AnyMsg
-from minirospy.ros.topic_tools.programs.passing import Input, Output, base_name, flag, run_node
+from minirospy.ros.topic_tools.programs.passing import Input, Output, base_name, checked_topic, flag, run_node
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["Relay", "main"]
@@ -23,13 +23,19 @@ _USAGE = "\nusage: relay IN_TOPIC [OUT_TOPIC]\n"
 
 def main() -> int:
     """Run the program; return its exit status."""
-    return run_node(_USAGE, lambda words: f"{base_name(words[0])}_relay", _start, range(1, 3))
+    return run_node(_USAGE, lambda words: f"{base_name(words[0])}_relay", _prepare, range(1, 3))
 
 
-def _start(words: Sequence[str]) -> Relay:
-    relay = Relay(words[0], words[1] if len(words) > 1 else f"{words[0]}_relay", is_lazy=flag("lazy"))
+def _prepare(words: Sequence[str]) -> Callable[[], Relay]:
+    source = checked_topic(words[0])
+    target = checked_topic(words[1]) if len(words) > 1 else f"{source}_relay"
+    return lambda: _start(source, target)
+
+
+def _start(source: str, target: str) -> Relay:
+    relay = Relay(source, target, is_lazy=flag("lazy"))
     if flag("stealth"):
-        topic = str(rospy.get_param("~monitor_topic", words[0]))
+        topic = str(rospy.get_param("~monitor_topic", source))
         relay.monitor(rospy.resolve_name(topic), float(rospy.get_param("~monitor_rate", 1.0)))
     return relay
 
@@ -40,7 +46,8 @@ class Relay:
     def __init__(self, source: str, target: str, *, is_lazy: bool = False) -> None:
         self._is_lazy = is_lazy
         self._is_stealthy = False
-        # Handles a subscriber that arrives while the input is being closed: the input must be opened again.
+        # The lock covers a subscriber that arrives while the input is being closed, so that the input is opened
+        # again.
         self._lock = threading.Lock()
         self._output = Output(target, on_subscriber=self._subscribed, on_advertised=self._advertised)
         self._input = Input(source, self._received)

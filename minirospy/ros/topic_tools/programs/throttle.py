@@ -1,7 +1,8 @@
-"""throttle: forward a limited number of messages or bytes per second. drop: drop X of every Y messages.
+"""throttle forwards a limited number of messages or bytes per second. drop drops X of every Y messages.
 
-Parameters of throttle: ~lazy (subscribe only while the output has subscribers), ~wall_clock (use the machine's time, even if
-the node's is simulated), ~force_latch and ~force_latch_value (whether the output is latched, regardless of the input).
+Parameters of throttle: ~lazy (subscribe only while the output has subscribers), ~wall_clock (use the machine's time, even
+if the node's time is simulated), ~force_latch and ~force_latch_value (whether the output is latched, regardless of the
+input).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Callable, Sequence
 
 from minirospy import client as rospy
 from minirospy.client.topics import AnyMsg
-from minirospy.ros.topic_tools.programs.passing import Input, Output, base_name, flag, run_node
+from minirospy.ros.topic_tools.programs.passing import Input, Output, base_name, checked_topic, flag, run_node
 
 __all__ = ["ByteLimit", "Filter", "MessageLimit", "drop_main", "every", "main"]
 
@@ -40,15 +41,15 @@ usage: drop IN_TOPIC X Y [OUT_TOPIC]
 """
 
 Passes = Callable[[float, int], bool]
-"""Returns whether a message passes, given the time in seconds and its size in bytes; counts the message if it passes."""
+"""Given the time in seconds and a message's size in bytes, returns whether the message passes; counts it if so."""
 
 
 def main() -> int:
     """Run throttle; return its exit status."""
-    return run_node(_USAGE, lambda words: f"{base_name(words[1])}_throttle", _start, range(3, 6))
+    return run_node(_USAGE, lambda words: f"{base_name(words[1])}_throttle", _prepare, range(3, 6))
 
 
-def _start(words: Sequence[str]) -> Filter:
+def _prepare(words: Sequence[str]) -> Callable[[], Filter]:
     kind, source, *rest = words
     wanted = {"messages": 1, "bytes": 2}.get(kind)
     if wanted is None or not wanted <= len(rest) <= wanted + 1:
@@ -57,23 +58,27 @@ def _start(words: Sequence[str]) -> Filter:
     passes: Passes = (
         MessageLimit(1.0 / numbers[0]) if kind == "messages" else ByteLimit(int(numbers[0]), numbers[1])
     )
+    target = checked_topic(rest[wanted]) if len(rest) > wanted else f"{checked_topic(source)}_throttle"
+    return lambda: _start(source, target, passes)
+
+
+def _start(source: str, target: str, passes: Passes) -> Filter:
     latch = bool(rospy.get_param("~force_latch_value", True)) if flag("force_latch") else None
-    target = rest[wanted] if len(rest) > wanted else f"{source}_throttle"
     clock = time.time if flag("wall_clock") else rospy.get_time
     return Filter(source, target, passes, clock, is_lazy=flag("lazy"), latch=latch)
 
 
 def drop_main() -> int:
     """Run drop; return its exit status."""
-    return run_node(_DROP_USAGE, lambda words: f"{base_name(words[0])}_drop", _start_drop, range(3, 5))
+    return run_node(_DROP_USAGE, lambda words: f"{base_name(words[0])}_drop", _prepare_drop, range(3, 5))
 
 
-def _start_drop(words: Sequence[str]) -> Filter:
-    source, dropped, of = words[0], _count(words[1]), _count(words[2])
+def _prepare_drop(words: Sequence[str]) -> Callable[[], Filter]:
+    source, dropped, of = checked_topic(words[0]), _count(words[1]), _count(words[2])
     if not of:
         raise ValueError("messages are dropped out of each 1 or more, not out of each 0")
-    target = words[3] if len(words) > 3 else f"{source}_drop"
-    return Filter(source, target, every(dropped, of), rospy.get_time)
+    target = checked_topic(words[3]) if len(words) > 3 else f"{source}_drop"
+    return lambda: Filter(source, target, every(dropped, of), rospy.get_time)
 
 
 def _positive(word: str) -> float:
@@ -129,7 +134,7 @@ class ByteLimit:
 
 
 def every(dropped: int, of: int) -> Passes:
-    """Return a filter that drops the first ``dropped`` of every ``of`` messages."""
+    """Return a function that drops the first ``dropped`` of every ``of`` messages."""
     seen = 0
 
     def passes(now: float, size: int) -> bool:
@@ -143,7 +148,7 @@ def every(dropped: int, of: int) -> Passes:
 
 
 class Filter:
-    """Forwards the messages that a filter selects, unchanged."""
+    """Forwards those messages unchanged that a function selects."""
 
     def __init__(
         self,
@@ -158,7 +163,8 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
-        # Handles a subscriber that arrives while the input is being closed: the input must be opened again.
+        # The lock covers a subscriber that arrives while the input is being closed, so that the input is opened
+        # again.
         self._lock = threading.Lock()
 
         self._output = Output(

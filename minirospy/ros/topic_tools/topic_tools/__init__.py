@@ -18,7 +18,7 @@ _WARN_SECONDS = 5
 
 
 class MetaLazyTransport(type):
-    """Calls ``_post_init`` after the constructors of all subclasses, when their publishers exist."""
+    """Calls ``_post_init`` after the constructors of all subclasses, by when their publishers exist."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         made = super().__call__(*args, **kwargs)
@@ -27,7 +27,7 @@ class MetaLazyTransport(type):
 
 
 class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
-    """Base class for nodes that subscribe only while their own topics have subscribers.
+    """The base class of nodes that subscribe only while their own topics have subscribers.
 
     Subclass it, create publishers with ``advertise``, and implement ``subscribe`` and ``unsubscribe``. If the parameter
     ``~lazy`` is false, the node subscribes when the object is created, and stays subscribed.
@@ -37,7 +37,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         super().__init__()
         self._publishers: list[Publisher[Message]] = []
         self._connection_status: bool | None = None
-        """Whether the node is subscribed; None before the first subscription."""
+        """True while the node is subscribed; None before the first subscription."""
         self._changing = threading.RLock()
         rospy.Timer(rospy.Duration(_WARN_SECONDS), self._warn_never_subscribed_cb, oneshot=True)
 
@@ -53,11 +53,11 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
             )
 
     def subscribe(self) -> None:
-        """Subscribe to the inputs; a subclass implements it."""
+        """Subscribe to the inputs; subclasses implement this method."""
         raise NotImplementedError("Please overwrite this method")
 
     def unsubscribe(self) -> None:
-        """Unregister the input subscribers; a subclass implements it."""
+        """Unregister the input subscribers; subclasses implement this method."""
         raise NotImplementedError("Please overwrite this method")
 
     def peer_subscribe(self, *args: object, **kwargs: object) -> None:
@@ -77,7 +77,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
                 self._connection_status = False
 
     def advertise(self, *args: Any, **kwargs: Any) -> Publisher[Message]:
-        """Return a publisher; accepts the arguments of ``rospy.Publisher`` except ``subscriber_listener``."""
+        """Return a publisher. The arguments are those of ``rospy.Publisher`` except ``subscriber_listener``."""
         assert len(args) < 3 or args[2] is None, "subscriber_listener is this object"
         assert kwargs.get("subscriber_listener") is None, "subscriber_listener is this object"
         if len(args) < 3:

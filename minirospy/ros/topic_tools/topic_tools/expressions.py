@@ -1,4 +1,4 @@
-"""transform and relay_field: publish the result of a Python expression on a topic's messages or on one of their fields.
+"""transform and relay_field: evaluate a Python expression for each message on a topic, or for a field, and publish the result.
 
 The user writes the expression, on the command line or in a launch file; ``m`` is the message or the field.
 Source: http://wiki.ros.org/topic_tools/transform, http://wiki.ros.org/topic_tools/relay_field.
@@ -23,6 +23,9 @@ from minirospy.core.idl.protocols import Message
 from minirospy.ros.rostopic import rostopic
 
 __all__ = ["relay_field_main", "transform_main"]
+
+
+_Start = Callable[[], rospy.Subscriber[Message]]
 
 
 def transform_main() -> int:
@@ -72,11 +75,13 @@ def _transform_parser() -> argparse.ArgumentParser:
 def _run(
     name: str,
     parser: argparse.ArgumentParser,
-    start: Callable[[argparse.Namespace], rospy.Subscriber[Message]],
+    prepare: Callable[[argparse.Namespace], _Start],
 ) -> int:
+    """Check the arguments, which needs no master; then run the node until it shuts down. Return the exit status."""
     try:
+        start = prepare(parser.parse_args(rospy.myargv()[1:]))
         rospy.init_node(name, anonymous=True)
-        running = start(parser.parse_args(rospy.myargv()[1:]))
+        running = start()
         rospy.spin()
         del running
     except (MinirospyError, rostopic.ROSTopicException) as error:
@@ -87,28 +92,33 @@ def _run(
     return 0
 
 
-def _transform(options: argparse.Namespace) -> rospy.Subscriber[Message]:
+def _transform(options: argparse.Namespace) -> _Start:
     modules: dict[str, ModuleType] = {}
     for name in options.modules:
         try:
-            # For the module tf.transformations, the expression can use the name tf.
+            # Store the top-level module, so that an expression that uses tf.transformations finds the name tf.
             modules[name.partition(".")[0]] = importlib.import_module(name.partition(".")[0])
             importlib.import_module(name)
         except ImportError as error:
             print(f"Failed to import module: {name} ({error})", file=sys.stderr)
     code = _compiled(options.expression)
-    publisher: rospy.Publisher[Message] = rospy.Publisher(
-        options.output_topic, message_class(options.output_type), queue_size=1, latch=options.latch
-    )
+    cls = message_class(options.output_type)
 
-    def convert(value: object) -> None:
-        result = eval(code, dict(modules), {"m": value})
-        publisher.publish(*(result if isinstance(result, list | tuple) else [result]))
+    def start() -> rospy.Subscriber[Message]:
+        publisher: rospy.Publisher[Message] = rospy.Publisher(
+            options.output_topic, cls, queue_size=1, latch=options.latch
+        )
 
-    return _subscribe(options, convert)
+        def convert(value: object) -> None:
+            result = eval(code, dict(modules), {"m": value})
+            publisher.publish(*(result if isinstance(result, list | tuple) else [result]))
+
+        return _subscribe(options, convert)
+
+    return start
 
 
-def _relay(options: argparse.Namespace) -> rospy.Subscriber[Message]:
+def _relay(options: argparse.Namespace) -> _Start:
     import yaml
 
     try:
@@ -118,15 +128,19 @@ def _relay(options: argparse.Namespace) -> rospy.Subscriber[Message]:
     if not isinstance(template, dict):
         raise MinirospyError(f"the expression is not a dictionary of fields: {options.expression!r}")
     cls = message_class(options.output_type)
-    publisher: rospy.Publisher[Message] = rospy.Publisher(options.output_topic, cls, queue_size=1)
 
-    def convert(value: object) -> None:
-        now = rospy.get_rostime()
-        message = cls()
-        fill_message_args(message, [_evaluated(template, value)], {"now": now, "auto": Header(stamp=now)})
-        publisher.publish(message)
+    def start() -> rospy.Subscriber[Message]:
+        publisher: rospy.Publisher[Message] = rospy.Publisher(options.output_topic, cls, queue_size=1)
 
-    return _subscribe(options, convert)
+        def convert(value: object) -> None:
+            now = rospy.get_rostime()
+            message = cls()
+            fill_message_args(message, [_evaluated(template, value)], {"now": now, "auto": Header(stamp=now)})
+            publisher.publish(message)
+
+        return _subscribe(options, convert)
+
+    return start
 
 
 def _subscribe(options: argparse.Namespace, convert: Callable[[object], None]) -> rospy.Subscriber[Message]:

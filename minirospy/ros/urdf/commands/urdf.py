@@ -1,7 +1,8 @@
 """`check_urdf`, and `urdf_to_graphviz` with its old name `urdf_to_graphiz`: print or draw a robot description's tree.
 
-The output is that of liburdfdom-tools, but with line numbers in the description instead of line numbers in its source
-code. The exit status is 255 if the description cannot be read, as there. Source: http://wiki.ros.org/urdf#Verification.
+The output is the same as that of liburdfdom-tools, except that line numbers refer to the description, not to the tools'
+source code. The exit status is 255 if the description cannot be read, as in liburdfdom-tools. Source:
+http://wiki.ros.org/urdf#Verification.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ def _graph(file: str | None, output: str | None) -> None:
         print(_NO_OUTPUT + _USAGE, file=sys.stderr)
     robot = _read(file)
     name = robot.name if output is None else output
-    # The file may come from an untrusted source, so the robot's name must not determine where files are written.
+    # The file may be from an untrusted source, so the robot's name must not determine where files are written.
     if output is None and (not name or name != Path(name).name or name.startswith(".") or "\\" in name):
         raise UsageError(f"the robot's name [{name}] is not a file's name: name the OUTPUT")
 
@@ -112,13 +113,13 @@ def _picture(robot: Robot) -> str:
         x, y, z = joint.origin.xyz
         roll, pitch, yaw = rpy_from_quaternion(quaternion_from_rpy(*joint.origin.rpy))
         pose = (f"xyz: {x:g} {y:g} {z:g}", f"rpy: {roll:g} {pitch:g} {yaw:g}")
-        # A joint and a link may have the same name.
+        # Put spaces around the joint's name, because a joint and a link may have the same name.
         edges += [Edge(joint.parent, f" {name} ", pose), Edge(f" {name} ", joint.child)]
     return tree_svg(edges, robot.name, alone=[robot.root], round_=[f" {name} " for name in robot.joints])
 
 
 def _read(file: str) -> Robot:
-    """Return the robot from a file, and print its problems. Raise WordedError if it cannot be read or parsed."""
+    """Read the robot from a file, and print its problems. Raise WordedError if the file cannot be read or parsed."""
     from minirospy.core.urdf.read import read_robot
 
     try:

@@ -116,7 +116,7 @@ class SafetyController(Object):
 
 
 class Joint(Object):
-    """A joint between two links; the links are given by name."""
+    """A joint between two links, which are given by name."""
 
     TYPES = ["unknown", "revolute", "continuous", "prismatic", "floating", "planar", "fixed"]
     TAG = "joint"

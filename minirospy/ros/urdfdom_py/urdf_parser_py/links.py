@@ -126,7 +126,7 @@ class Mesh(Object):
 
 
 class GeometricType(Codec[Object]):
-    """The single shape in a ``<geometry>``."""
+    """A codec for the single shape in a ``<geometry>``."""
 
     _KINDS: dict[str, type[Object]] = {kind.TAG: kind for kind in (Box, Cylinder, Sphere, Mesh)}
 
@@ -184,16 +184,16 @@ class Material(Object):
         self.texture = texture
 
     def check_valid(self) -> None:
-        """Report a material that has neither a colour nor a texture."""
+        """Report an error if the material has neither a colour nor a texture."""
         if self.color is None and self.texture is None:
             report("Material has neither a color nor texture.")
 
 
 class LinkMaterial(Material):
-    """A shape's material, which may be only a name."""
+    """A shape's material, which may consist of only a name."""
 
     def check_valid(self) -> None:
-        """Accept a material that is only a name."""
+        """Accept a material that consists of only a name."""
 
 
 class Visual(Object):

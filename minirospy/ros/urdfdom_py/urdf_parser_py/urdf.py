@@ -1,4 +1,4 @@
-"""The class of urdf_parser_py for a robot, with all of its parts. Source: http://wiki.ros.org/urdf/XML."""
+"""urdf_parser_py's class for a robot, with all of its parts. Source: http://wiki.ros.org/urdf/XML."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _NAME = Attribute("name", _TEXT)
 
 
 class _Transmissions(Codec[Object]):
-    """A transmission in either of its two formats."""
+    """A codec for a transmission in either of its two formats."""
 
     def from_xml(self, node: ET.Element, path: Path) -> Object:
         for kind in (Transmission, PR2Transmission):
@@ -80,9 +80,9 @@ class _Transmissions(Codec[Object]):
 
 
 class Robot(Object):
-    """A robot: its parts as lists, and by name in ``joint_map`` and ``link_map``.
+    """A robot with its parts as lists, and by name in ``joint_map`` and ``link_map``.
 
-    ``parent_map``: link -> (joint, parent link); ``child_map``: link -> [(joint, child link), ...].
+    ``parent_map`` maps a link to (joint, parent link), ``child_map`` a link to [(joint, child link), ...].
     """
 
     SUPPORTED_VERSIONS = ["1.0"]
@@ -114,7 +114,7 @@ class Robot(Object):
 
     @classmethod
     def from_parameter_server(cls, key: str = "robot_description") -> Robot:
-        """Return the robot described by a parameter.
+        """Build the robot from the description in a parameter.
 
         Raise KeyError if the parameter is not set, and the exceptions that from_xml_string raises if it is invalid.
         """

@@ -21,7 +21,7 @@ from minirospy.command.command import run
 __all__ = ["main"]
 
 _ALWAYS = {"--xacro-ns", "--check-order"}
-"""Options that choose the only behaviour since ROS Melodic."""
+"""Options that select behaviour that is always enabled since ROS Melodic."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _xacro(words: Sequence[str]) -> int:
-    # The package uses xml.parsers in an `except` clause without importing it.
+    # The package xacro uses xml.parsers in an `except` clause without importing it.
     import xml.parsers.expat  # noqa: F401
 
     try:
@@ -42,12 +42,13 @@ def _xacro(words: Sequence[str]) -> int:
         ) from error
 
     if isinstance(sys.stdout, io.TextIOWrapper) and not sys.stdout.isatty():
-        # A robot description is UTF-8, independent of the system's code page; roslaunch reads it as UTF-8.
+        # Write UTF-8 regardless of the system's code page, because a robot description is UTF-8, and roslaunch reads
+        # it as UTF-8.
         sys.stdout.reconfigure(encoding="utf-8")
     evaluate = xacro.eval_extension
 
     def eval_extension(text: str) -> object:
-        """Evaluate `$(...)`. Shorten the error for a package that is not found: xacro prints it twice, with a class name."""
+        """Evaluate `$(...)`. If a package is not found, shorten the error, which xacro would print twice, with a class name."""
         try:
             return evaluate(text)
         except xacro.XacroException as error:
@@ -60,7 +61,7 @@ def _xacro(words: Sequence[str]) -> int:
     def checked_parse(inp: object, filename: str | None = None) -> object:
         """Parse a file or string after checking that its entities do not expand to gigabytes."""
         if inp is None and filename is not None:
-            # Leave a file that cannot be opened to xacro, which reports the error.
+            # Ignore a file that cannot be opened: xacro reports the error itself.
             with contextlib.suppress(OSError), open(Path(xacro.root_dir, filename)) as file:
                 inp = file.read()
         if isinstance(inp, str):

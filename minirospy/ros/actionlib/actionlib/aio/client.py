@@ -37,8 +37,8 @@ class ClientGoal(Generic[_R, _F]):
 
     def __init__(self, id: str, cancel: Callable[[ClientGoal[_R, _F]], None]) -> None:
         self.id = id
-        self.state = GoalState.PENDING  # the last status published by the server
-        self.text = ""  # the status text from the server
+        self.state = GoalState.PENDING  # the last status that the server published
+        self.text = ""  # the text that the server sent with the status
         self._cancel = cancel
         self._feedback: deque[_F] = deque(maxlen=WAITING)
         self._news = asyncio.Event()
@@ -52,7 +52,7 @@ class ClientGoal(Generic[_R, _F]):
         return self._ended.done()
 
     def cancel(self) -> None:
-        """Request the server to cancel the goal; the server decides its final state. Do nothing if the goal is done."""
+        """Send the server a cancel request; the server decides the goal's final state. Do nothing if the goal is done."""
         if not self.done:
             self._cancel(self)
 
@@ -105,7 +105,7 @@ class ClientGoal(Generic[_R, _F]):
     def _interrupt(self) -> None:
         if not self.done:
             self._ended.set_exception(ROSInterruptException("rospy shutdown"))
-            # Mark the exception as retrieved: otherwise asyncio logs it if nothing awaits the goal.
+            # Mark the exception as retrieved; otherwise asyncio logs it if no caller awaits the goal.
             self._ended.exception()
             self._news.set()
 
@@ -157,11 +157,14 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         return sent
 
     def cancel_all(self) -> None:
-        """Request the server to cancel all its goals, including those from other clients."""
+        """Send the server a request to cancel all its goals, including those from other clients."""
         self._start(self._cancel.publish(GoalID()))
 
     async def close(self) -> None:
-        """Unregister from the action's topics. Running goals continue on the server, but report nothing more. Idempotent."""
+        """Unregister from the action's topics.
+
+        Running goals continue on the server, but this client no longer receives their feedback or results. Idempotent.
+        """
         self._is_closed = True
         for goal in list(self._goals.values()):
             goal._interrupt()

@@ -38,7 +38,7 @@ class _WithFeedback(Protocol[_F_co]):
 
 
 class ActionClass(Protocol[_G_co, _R_co, _F_co]):
-    """The attributes of an action class such as ``runningLedAction``: its goal, result and feedback classes."""
+    """The attributes of an action class such as ``runningLedAction``, which refer to its goal, result and feedback classes."""
 
     @property
     def action_goal(self) -> _WithGoal[_G_co]: ...
@@ -51,7 +51,7 @@ class ActionClass(Protocol[_G_co, _R_co, _F_co]):
 
 
 class GoalError(MinirospyError):
-    """A goal that was not reached: the server's ``text``, its ``result``, if any, and the final ``state``.
+    """The goal was not reached. ``text`` and ``result`` (if any) come from the server; ``state`` is the final state.
 
     A server's ``execute`` raises it to abort the goal with a text and a result. The result may have any type that ``execute``
     may return.
@@ -65,7 +65,7 @@ class GoalError(MinirospyError):
 
 
 class ActionEnd(Handle):
-    """The common base of client and server: manages their topics, and the tasks that read the topics."""
+    """The common base class of client and server, which manages their topics and the tasks that read the topics."""
 
     def __init__(self, node: Node, name: str, action: object) -> None:
         self.name = node.resolve(name)

@@ -26,7 +26,7 @@ _G = TypeVar("_G")
 _R = TypeVar("_R")
 _F = TypeVar("_F")
 
-# Pause after a list of statuses, per goal in it, so that publishing does not use all the server's time.
+# seconds to pause after publishing a status list, per goal in it, so that publishing does not use all CPU time
 _SECONDS_A_STATUS = 1e-4
 
 _EVENTS = {
@@ -41,7 +41,7 @@ class ServerGoal(Generic[_G, _F]):
 
     def __init__(self, server: ActionServer[_G, Any, _F], message: ActionGoal) -> None:
         self.request = cast("_G", message.goal)  # the goal message
-        self.is_cancel_requested = False  # set if a client has cancelled the goal, or a newer one has arrived
+        self.is_cancel_requested = False  # set when a client cancels the goal, or a newer goal preempts it
         self.text = ""  # the text sent with the goal's final status
         self._server = server
         self._status = GoalStatus(goal_id=cast("GoalID", message.goal_id))
@@ -69,10 +69,10 @@ class ServerGoal(Generic[_G, _F]):
             self._status.status, self._status.text = int(state), text
 
     def _make_way(self) -> None:
-        """Cancel the task that executes the goal. Repeated calls have no effect."""
+        """Cancel the goal's task, because the goal was cancelled or preempted. Repeated calls have no effect."""
         if self._task and not self.is_cancel_requested:
             self.is_cancel_requested = True
-            # A task that is cancelled before it starts would end without sending the client a result.
+            # If a task is cancelled before it starts, it never runs, and the client would get no result.
             if self._has_begun:
                 self._task.cancel()
 
@@ -111,7 +111,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         self._execute = execute
         self._accepts = accepts
         self._concurrent = concurrent
-        self._goals: dict[str, ServerGoal[_G, _F]] = {}
+        self.goals: dict[str, ServerGoal[_G, _F]] = {}
         self._canceled_early: dict[str, int] = {}
         self._last_cancel = 0
         self._kept_nanoseconds = 0
@@ -149,7 +149,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             await publisher
         for topic, message_class, take in (
             ("goal", self._types.action_goal, self._take_goal),
-            ("cancel", GoalID, self._take_cancel),
+            ("cancel", GoalID, self.take_cancel),
         ):
             subscription = node.subscribe(self._topic(topic), message_class, queue_size=WAITING)
             self._subscriptions.append(subscription)
@@ -172,13 +172,13 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             await asyncio.sleep(SEND_SECONDS)
         now = self._node.now()
         if not message.goal_id.id:
-            message.goal_id.id = f"{self._node.name}-{len(self._goals)}-{now.secs}.{now.nsecs}"
+            message.goal_id.id = f"{self._node.name}-{len(self.goals)}-{now.secs}.{now.nsecs}"
         if not message.goal_id.stamp:
             message.goal_id.stamp = now
         goal = ServerGoal(self, message)
-        if goal.id in self._goals:
+        if goal.id in self.goals:
             return
-        self._goals[goal.id] = goal
+        self.goals[goal.id] = goal
         stamp = message.goal_id.stamp.to_nsec()
         others = [] if self._concurrent else self._running(but=goal)
 
@@ -207,14 +207,14 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             self._node.log.exception("Exception in your accepts callback: %s", error)
         return False
 
-    async def _take_cancel(self, cancel: GoalID) -> None:
+    async def take_cancel(self, cancel: GoalID) -> None:
         await asyncio.sleep(CANCEL_SECONDS)
         stamp = cancel.stamp.to_nsec()
         for goal in self._running():
             if is_meant(cancel.id, stamp, goal.id, goal._status.goal_id.stamp.to_nsec()):
                 goal._step(GoalEvent.CANCEL_REQUEST)
                 goal._make_way()
-        if cancel.id and cancel.id not in self._goals:
+        if cancel.id and cancel.id not in self.goals:
             # The goal may still arrive after the cancel request.
             self._canceled_early[cancel.id] = self._node.now().to_nsec()
         self._last_cancel = max(self._last_cancel, stamp)
@@ -285,19 +285,19 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
             self._changed.clear()
             now = self._node.now()
             self._forget(now.to_nsec() - self._kept_nanoseconds)
-            message = StatusList([status_bytes(goal._status) for goal in self._goals.values()])
+            message = StatusList([status_bytes(goal._status) for goal in self.goals.values()])
             message.header.stamp = now
             with contextlib.suppress(ROSException):
                 await self._status.publish(message)
-            await asyncio.sleep(len(self._goals) * _SECONDS_A_STATUS)
+            await asyncio.sleep(len(self.goals) * _SECONDS_A_STATUS)
             with contextlib.suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(self._changed.wait(), period)
 
     def _forget(self, limit: int) -> None:
-        for id in [id for id, goal in self._goals.items() if 0 < goal._ended_at < limit]:
-            del self._goals[id]
+        for id in [id for id, goal in self.goals.items() if 0 < goal._ended_at < limit]:
+            del self.goals[id]
         for id in [id for id, time in self._canceled_early.items() if time < limit]:
             del self._canceled_early[id]
 
     def _running(self, but: ServerGoal[_G, _F] | None = None) -> list[ServerGoal[_G, _F]]:
-        return [goal for goal in self._goals.values() if not goal._ended_at and goal is not but]
+        return [goal for goal in self.goals.values() if not goal._ended_at and goal is not but]

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 from minirospy.ros.cv_bridge.cv_bridge import getCvType
 from minirospy.ros.cv_bridge.cv_bridge.core import CvBridgeError, _converted
+from minirospy.ros.cv_bridge.display import cvtColorForDisplay
 
 if TYPE_CHECKING:
     from minirospy.core.images.encodings import Pixels
 
-__all__ = ["CV_MAT_CNWrap", "CV_MAT_DEPTHWrap", "cvtColor2", "getCvType"]
+__all__ = ["CV_MAT_CNWrap", "CV_MAT_DEPTHWrap", "cvtColor2", "cvtColorForDisplay", "getCvType"]
 
 
 def CV_MAT_CNWrap(i: int) -> int:

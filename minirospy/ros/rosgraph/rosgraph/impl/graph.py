@@ -17,7 +17,7 @@ _CALLER_ID = "/rosgraph"
 
 
 def topic_node(topic: str) -> str:
-    """Return the name of a topic's node in the graph: a space followed by the topic."""
+    """Return the name of a topic's node in the graph, which is a space followed by the topic."""
     return " " + topic
 
 
@@ -96,7 +96,7 @@ class EdgeList:
         return True
 
     def add_edges(self, start: str, dest: str, direction: str, label: str = "") -> bool:
-        """Add the edges for a row from getBusInfo, see :func:`edge_args`; return whether one of them is new."""
+        """Add the edges for a row from getBusInfo (see :func:`edge_args`); return whether at least one is new."""
         added = [self.add(Edge(*each)) for each in edge_args(start, dest, direction, label)]
         return any(added)
 
@@ -110,13 +110,16 @@ class EdgeList:
 
 
 def edge_args(start: str, dest: str, direction: str, label: str) -> list[tuple[str, str, str]]:
-    """Return [(start, end, label)] for a row from getBusInfo: reversed for direction ``i``, both for ``b``, [] if unknown."""
+    """Return [(start, end, label)] for a row from getBusInfo.
+
+    The edge is reversed for direction ``i``. For ``b`` there are two edges; for an unknown direction there is none.
+    """
     there, back = (start, dest, label), (dest, start, label)
     return {"o": [there], "i": [back], "b": [there, back]}.get(direction, [])
 
 
 class Graph:
-    """The graph at and below ``node_ns`` and ``topic_ns``; empty until :meth:`update` is called.
+    """The nodes and topics in the namespaces ``node_ns`` and ``topic_ns``; empty until :meth:`update` is called.
 
     ``nn_nodes``: node names; ``nt_nodes``: topics, named by :func:`topic_node`; ``nn_edges``: from node to node;
     ``nt_edges``, ``nt_all_edges``: from node to topic and from topic to node; ``srvs``: service names.
@@ -183,7 +186,7 @@ class Graph:
         return before != (self.nn_nodes, self.nt_nodes, self.srvs, self.nn_edges, self.nt_all_edges)
 
     def _side(self, table: list[tuple[str, list[str]]]) -> dict[str, list[str]]:
-        """Return the topics in the namespace, each with its nodes in the namespace."""
+        """Return the topics in the topic namespace, each with its nodes in the node namespace."""
         kept = {
             topic: [node for node in nodes if in_namespace(node, self.node_ns)]
             for topic, nodes in table

@@ -1,4 +1,4 @@
-"""rospy.impl.init."""
+"""rospy.impl.init: the default port of a node."""
 
 from minirospy.client.log_handlers import RosStreamHandler
 

@@ -1,4 +1,4 @@
-"""rospy.impl.simtime."""
+"""rospy.impl.simtime: simulated time from /clock."""
 
 from minirospy.base.errors import ROSInitException
 from minirospy.client.startup import start_clock

@@ -9,7 +9,7 @@ DEFAULT_BUFF_SIZE = 65536
 
 
 def __getattr__(name: str) -> object:
-    # Programs use these names in annotations. Import them on use, because their module imports asyncio.
+    # Programs use these names in annotations. Import them only on use, because their module imports asyncio.
     if name in ("Transport", "DeadTransport"):
         from minirospy.runtime.transport.links import OutLink
 

@@ -1,4 +1,4 @@
-"""Objects that convert to and from XML, driven by a table of their attributes, elements, and lists of elements.
+"""Objects that are converted to and from XML, as described by a table of their attributes, elements, and lists of elements.
 
 Error messages and their paths (``/robot[@name='r']/link[1]``) are those of urdf_parser_py.
 """
@@ -31,7 +31,7 @@ on_error: Callable[[str], object] = on_error_stderr
 
 
 def report(message: str) -> None:
-    """Call the program's replacement for on_error, else on_error."""
+    """Call the program's replacement for on_error, or on_error itself."""
     module = sys.modules.get("urdf_parser_py.xml_reflection.core")
     replaced = getattr(module, "on_error", on_error_stderr)
     (on_error if replaced is on_error_stderr else replaced)(message)
@@ -51,7 +51,7 @@ class Path:
 
 
 class ParseError(Exception):
-    """A description cannot be read: the error (``e``) and the element's path (``path``)."""
+    """A description cannot be read; ``e`` is the error, ``path`` the element's path."""
 
     def __init__(self, e: Exception, path: Path) -> None:
         self.e = e
@@ -80,7 +80,7 @@ class Codec(Generic[_V]):
 
 
 class Text(Codec[str]):
-    """A string, unchanged."""
+    """A codec that keeps strings unchanged."""
 
     def from_string(self, text: str) -> str:
         """Return the string."""
@@ -88,7 +88,7 @@ class Text(Codec[str]):
 
 
 class Number(Codec[float]):
-    """A number."""
+    """A codec for a number."""
 
     def from_string(self, text: str) -> float:
         """Convert a string to a number. Raise ValueError if the string is not a number."""
@@ -96,7 +96,7 @@ class Number(Codec[float]):
 
 
 class VectorOf(Codec[Iterable[float]]):
-    """A fixed-length list of numbers."""
+    """A codec for a list of numbers with a fixed length."""
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -117,7 +117,7 @@ class VectorOf(Codec[Iterable[float]]):
 
 
 class NamedAttribute(Codec[_V]):
-    """An element whose value is one attribute: ``<parent link="base"/>``."""
+    """A codec for an element whose value is one attribute, such as ``<parent link="base"/>``."""
 
     def __init__(self, attribute: str, codec: Codec[_V]) -> None:
         self._attribute = attribute
@@ -136,7 +136,7 @@ class NamedAttribute(Codec[_V]):
 
 
 class Raw(Codec[ET.Element]):
-    """An element, unchanged."""
+    """A codec that keeps elements unchanged."""
 
     def from_xml(self, node: ET.Element, path: Path) -> ET.Element:
         """Return the element."""
@@ -150,7 +150,7 @@ class Raw(Codec[ET.Element]):
 
 
 class ObjectOf(Codec["Object"]):
-    """An element that is represented by an object of a class."""
+    """A codec for an element that is represented by an object of a given class."""
 
     def __init__(self, kind: type[Object]) -> None:
         self.kind = kind
@@ -190,7 +190,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Many:
-    """Child elements that occur any number of times, stored as a list in the attribute ``name`` + "s"."""
+    """Child elements that occur any number of times, stored as a list in the attribute with the name ``name`` + "s"."""
 
     name: str
     codec: Codec[Any]
@@ -228,7 +228,7 @@ class Object:
         return found
 
     def parse(self: _T, xml_string: str | bytes) -> _T:
-        """Read an XML string into this object; return the object. Raise exceptions as from_xml_string does."""
+        """Read an XML string into this object, and return the object. Raise exceptions as from_xml_string does."""
         self.read_xml(_root(xml_string), Path(self.TAG))
         return self
 

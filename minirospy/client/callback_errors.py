@@ -1,0 +1,86 @@
+"""Log the errors that the program's callbacks raise: each in full the first time, afterwards one line with their number."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from types import TracebackType
+
+__all__ = ["CallbackErrors"]
+
+_SECONDS = 10.0  # between two lines about the same error
+
+_log = logging.getLogger("rosout")
+
+
+class _Repeated:
+    """An error that has been logged in full."""
+
+    __slots__ = ("due", "line", "omitted")
+
+    def __init__(self, due: float, line: str) -> None:
+        self.due = due  # when the next line may be logged
+        self.line = line  # describes the last error
+        self.omitted = 0  # errors since the last line
+
+
+class CallbackErrors:
+    """Logs the errors of a node's callbacks.
+
+    Two errors are the same if they have the same type and the same callback, and were raised at the same line of code.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """``clock()`` returns the time in seconds."""
+        self._clock = clock
+        # By type, callback's name, file and line. A program has few such places, so the table stays small.
+        self._known: dict[tuple[type[BaseException], str, str, int], _Repeated] = {}
+        # Reentrant: :meth:`close` may run in a signal handler that interrupts :meth:`log` in the same thread.
+        self._lock = threading.RLock()
+
+    def log(self, callback: object, error: BaseException) -> None:
+        """Log ``error``, which ``callback`` raised, or count it."""
+        now = self._clock()
+        name = getattr(callback, "__qualname__", type(callback).__qualname__)
+        place = type(error), name, *_place(error.__traceback__)
+        line = f"bad callback: {callback}: {' '.join(traceback.format_exception_only(error)[-1].split())}"
+        with self._lock:
+            known = self._known.get(place)
+            if known is None:
+                self._known[place] = _Repeated(now + _SECONDS, line)
+            else:
+                known.omitted += 1
+                known.line = line
+                if now < known.due:
+                    return
+                known.due = now + _SECONDS
+                line, known.omitted = _counted(known), 0
+
+        if known is None:
+            text = "".join(traceback.format_exception(error))
+            _log.error("bad callback: %s\n%s", callback, text, stacklevel=2)
+        else:
+            _log.error("%s", line, stacklevel=2)
+
+    def close(self) -> None:
+        """Log the number of errors that were counted since the last line. Idempotent."""
+        with self._lock:
+            lines = [_counted(known) for known in self._known.values() if known.omitted]
+            for known in self._known.values():
+                known.omitted = 0
+        for line in lines:
+            _log.error("%s", line)
+
+
+def _counted(known: _Repeated) -> str:
+    return f"{known.line} ({known.omitted} more times; the first one is logged above)"
+
+
+def _place(trace: TracebackType | None) -> tuple[str, int]:
+    """Return the file and the line at which an error was raised."""
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return (trace.tb_frame.f_code.co_filename, trace.tb_lineno) if trace else ("", 0)

@@ -1,0 +1,95 @@
+"""Which errors of callbacks are logged, and when; with a manual clock."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from minirospy.client.callback_errors import CallbackErrors
+
+
+class Clock:
+    """A time that the test sets."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def errors(clock: Clock) -> CallbackErrors:
+    return CallbackErrors(clock)
+
+
+def fail(
+    errors: CallbackErrors,
+    text: str = "text",
+    kind: type[Exception] = ValueError,
+    callback: object = "CALLBACK",
+) -> None:
+    """Log an error that is raised at the same line each time."""
+    try:
+        raise kind(text)
+    except kind as error:
+        errors.log(callback, error)
+
+
+def messages(caplog: pytest.LogCaptureFixture) -> list[str]:
+    """Return the logged messages, those with a traceback by their first and last lines."""
+    assert all((record.name, record.levelno) == ("rosout", logging.ERROR) for record in caplog.records)
+    lines = [record.getMessage().strip().splitlines() for record in caplog.records]
+    caplog.clear()
+    return [text[0] if len(text) == 1 else f"{text[0]} | {text[1]} | {text[-1]}" for text in lines]
+
+
+IN_FULL = "bad callback: CALLBACK | Traceback (most recent call last): | {}"
+COUNTED = "bad callback: CALLBACK: {} ({} more times; the first one is logged above)"
+
+
+def test_the_same_error_is_logged_once_and_then_counted(
+    errors: CallbackErrors, clock: Clock, caplog: pytest.LogCaptureFixture
+) -> None:
+    for tenth in range(100):
+        clock.now = tenth / 10
+        fail(errors, f"number {tenth}")
+    assert messages(caplog) == [IN_FULL.format("ValueError: number 0")]
+
+    for tenth in range(100, 250):
+        clock.now = tenth / 10
+        fail(errors, "two\nlines")
+    assert messages(caplog) == [
+        COUNTED.format("ValueError: two lines", 100),
+        COUNTED.format("ValueError: two lines", 100),
+    ]
+    errors.close()
+    errors.close()
+    assert messages(caplog) == [COUNTED.format("ValueError: two lines", 49)]
+
+
+def test_an_error_that_is_rare_is_logged_each_time(
+    errors: CallbackErrors, clock: Clock, caplog: pytest.LogCaptureFixture
+) -> None:
+    fail(errors)
+    clock.now = 60.0
+    fail(errors)
+    errors.close()
+    assert messages(caplog) == [IN_FULL.format("ValueError: text"), COUNTED.format("ValueError: text", 1)]
+
+
+def test_other_errors_are_logged_in_full(errors: CallbackErrors, caplog: pytest.LogCaptureFixture) -> None:
+    fail(errors)
+    fail(errors, "text", TypeError)
+    fail(errors, callback=len)
+    try:
+        raise ValueError("text")
+    except ValueError as error:
+        errors.log("CALLBACK", error)
+    value, kind = IN_FULL.format("ValueError: text"), IN_FULL.format("TypeError: text")
+    assert messages(caplog) == [value, kind, value.replace("CALLBACK", str(len)), value]
