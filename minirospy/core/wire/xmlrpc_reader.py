@@ -20,7 +20,7 @@ MAX_DEPTH = 64
 MAX_ELEMENTS = 1_000_000  # per document; parsing this many takes some seconds
 
 _MIB = 1024 * 1024
-MAX_MEMORY = 64 * _MIB  # memory limit for all long strings in one document
+MAX_MEMORY = 64 * _MIB  # maximum bytes in memory of all long strings in one document
 
 MAX_WIDE = 16 * _MIB
 """Maximum size in bytes of a string with a character beyond U+00FF: each of its characters then uses 2 or 4 bytes, and the
