@@ -301,7 +301,7 @@ class Node:
     async def wait_for_message(self, topic: str, message_class: type[_M], timeout: float | None = None) -> _M:
         """Return the next message on ``topic``.
 
-        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the node shuts down meanwhile.
+        Raise TimeoutError after ``timeout`` seconds, ROSInterruptException if the node shuts down first.
         """
         async with self.subscribe(topic, message_class, queue_size=1) as subscription:
             return await subscription.next(timeout)
@@ -488,7 +488,7 @@ class Node:
     async def sleep(self, duration: float | Duration) -> None:
         """Sleep for ``duration`` seconds of the node's time.
 
-        Raise ROSInterruptException if the node shuts down meanwhile, ROSTimeMovedBackwardsException if
+        Raise ROSInterruptException if the node shuts down during the sleep, ROSTimeMovedBackwardsException if
         simulated time jumps back.
         """
         seconds = duration.to_sec() if isinstance(duration, Duration) else duration

@@ -1,7 +1,8 @@
-"""Terminate child processes with this process, even if it is killed. On Windows a job object does this: the system closes it.
+"""Terminate child processes with this process, even if it is killed.
 
-On other systems a launcher's guardian process terminates them (`ros/roslaunch/launcher/guardian.py`), and this module
-has no effect. Source: https://learn.microsoft.com/en-us/windows/win32/procthread/job-objects
+On Windows the system does this when it closes a job object. On other systems a launcher's guardian process terminates
+them (`ros/roslaunch/launcher/guardian.py`), and this module has no effect. Source:
+https://learn.microsoft.com/en-us/windows/win32/procthread/job-objects
 """
 
 from __future__ import annotations

@@ -203,6 +203,6 @@ class SimulatedClock:
 
     @staticmethod
     def _wait(sleeper: SignalSafeEvent) -> None:
-        """Wait until the clock is set, or until it is time to poll the stop event, which does not wake this wait."""
+        """Wait until the clock is set, or until it is time to poll the stop event, which does not end this wait."""
         sleeper.wait(_POLL_SECONDS)
         sleeper.clear()

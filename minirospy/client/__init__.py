@@ -206,7 +206,10 @@ def is_shutdown_requested() -> bool:
 
 
 def is_down() -> bool:
-    """Return whether the node has shut down. For libraries: does not record that the calling thread polls for the shutdown."""
+    """Return whether the node has shut down.
+
+    Unlike is_shutdown(), this does not record that the calling thread polls, so libraries may use it.
+    """
     return current_session().is_shutdown()
 
 

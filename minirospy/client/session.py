@@ -168,7 +168,7 @@ class Session:
             logging.getLogger("rosout").error("%s", self.why_fork_has_no_effect(handle))
 
     def run(self, coroutine: Coroutine[object, object, _T]) -> _T:
-        """Run ``coroutine`` on the node's loop and wait for it. Raise ROSInterruptException if the node shuts down meanwhile."""
+        """Run ``coroutine`` on the node's loop and wait for it. Raise ROSInterruptException if the node shuts down first."""
         return self.start(coroutine)()
 
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[], _T]:
@@ -176,7 +176,7 @@ class Session:
 
         Calls start their coroutines one at a time, in order.
 
-        Raise ROSInterruptException if the node shuts down meanwhile.
+        Raise ROSInterruptException if the node shuts down first.
         """
         assert self._loop is not None
         loop = self._loop

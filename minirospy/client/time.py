@@ -99,7 +99,7 @@ def is_wallclock() -> bool:
 def sleep(duration: float | times.Duration) -> None:
     """Sleep for ``duration`` seconds; return immediately if that is negative.
 
-    If the node shuts down meanwhile, raise ROSInterruptException, or return early in a thread that polls is_shutdown().
+    If the node shuts down during the sleep, raise ROSInterruptException, or return early in a thread that polls is_shutdown().
     Raise ROSTimeMovedBackwardsException if simulated time jumps back to before the sleep started.
     """
     nanoseconds = duration.to_nsec() if isinstance(duration, times.Duration) else int(duration * 1e9)

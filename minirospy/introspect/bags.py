@@ -117,7 +117,7 @@ def class_of(type_: str, md5sum: str, definition: str, warn: Callable[[str], obj
 
 
 def compress(source: str, target: str, compression: str, progress: Progress) -> None:
-    """Copy a bag with another compression of its chunks. Raise BagError if it is invalid, OSError if a file operation fails.
+    """Copy a bag, changing the compression of its chunks. Raise BagError if it is invalid, OSError if a file operation fails.
 
     All connections are kept. If the source is damaged, the target contains the messages before the damage.
     """

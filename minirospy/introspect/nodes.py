@@ -128,7 +128,7 @@ def neighbours(state: SystemState) -> dict[str, Neighbours]:
 
 
 def find_node(graph: Graph, name: str) -> NodeAddress:
-    """Return a node (global name) and its URI. Raise NotFoundError with similar names."""
+    """Return a node (global name) and its URI. Raise NotFoundError, with similar names, if it does not exist."""
     uri = graph.node_uri(name)
     if uri is None:
         raise NotFoundError("node", name, list_nodes(graph))

@@ -277,7 +277,7 @@ class TopicPublisher:
             pass
 
     def publish(self, message: Message) -> None:
-        """Send a message, with the next sequence number in its header. Raise MessageException if a value does not fit."""
+        """Send a message, with the next sequence number in its header. Raise MessageException if a value is invalid."""
         if is_stamped(message):
             self._sequence += 1
             message.header.seq = self._sequence

@@ -46,7 +46,7 @@ class Part(Protocol):
 
 _P = TypeVar("_P", bound=Part)
 
-# GIL switch interval; with Python's default of 5 ms, the loop waits that long after each call
+# GIL switch interval in seconds; with Python's default of 5 ms, the loop waits that long after each call
 _SWITCH_SECONDS = 0.0005
 
 

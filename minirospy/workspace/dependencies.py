@@ -75,7 +75,7 @@ class Dependencies:
         return {name: folder for name, folder in self._packages.folders().items() if is_metapackage(folder)}
 
     def folder(self, name: str) -> Path:
-        """Return the folder of a package. Raise NotFoundError with similar names."""
+        """Return the folder of a package. Raise NotFoundError, with similar names, if it does not exist."""
         folder = self._packages.find(name)
         if self._left_out(folder):
             raise NotFoundError("package", name, (), f"a metapackage of that name is in {folder}")

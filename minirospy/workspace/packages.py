@@ -69,7 +69,7 @@ class Packages:
         return packages
 
     def find(self, name: str) -> Path:
-        """Return the folder of a package. Raise NotFoundError with similar names."""
+        """Return the folder of a package. Raise NotFoundError, with similar names, if it does not exist."""
         for root in self.roots:
             # If a folder's name is the package's name, try that folder before searching.
             if package_name(root / name) == name:

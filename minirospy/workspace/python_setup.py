@@ -1,7 +1,7 @@
 """Read the contents of a package's setup.py: Python packages, modules and scripts.
 
-The file is executed with a ``setup()`` that only records its arguments, so that it may compute its arguments, and needs
-neither setuptools nor catkin_pkg. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
+The file is executed, so that it may compute these, with a ``setup()`` that only records its arguments. Neither setuptools
+nor catkin_pkg is needed. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
 """
 
 from __future__ import annotations

@@ -274,7 +274,7 @@ def test_node_beyond_loopback_takes_the_users_tokens(monkeypatch: pytest.MonkeyP
 def test_links_with_a_token_do_not_name_localhost(
     words: tuple[str, ...], start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another user's server may answer at ::1, which a client may try first."""
+    """Another user's server may respond at ::1, which a client may try first."""
     if not words:
         monkeypatch.setenv("MINIROSPY_BRIDGE_TOKEN", "right-token-000")
     process = start("bridge", "--port", "0", *words)

@@ -36,7 +36,7 @@ MAX_CHUNK_SIZE = 1088 * 1024 * 1024
 """Maximum bytes in a compressed chunk's data: a 1 GiB message, the limit for a connection, and the records before it."""
 
 _MAX_LZ4 = 256  # maximum ratio of decompressed to compressed size of an LZ4 block
-_MAX_STREAMS = 20_000  # bz2 streams per chunk; parallel compressors write one per 100 kB
+_MAX_STREAMS = 20_000  # maximum bz2 streams per chunk; parallel compressors write one per 100 kB
 _PIECE = 16 * 1024 * 1024  # bytes to decompress at a time; Ctrl-C takes effect only in between
 _INPUT = 256 * 1024  # bytes of compressed data to pass to a library at a time
 

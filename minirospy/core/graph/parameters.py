@@ -28,7 +28,7 @@ _STEP_ITEMS = 1000
 # Approximate bytes for a number, an empty list, and a dictionary or an entry in it
 _ITEM_BYTES, _LIST_BYTES, _ENTRY_BYTES = 40, 70, 120
 
-MAX_BYTES = 96 * 1024 * 1024  # memory limit for all parameters together
+MAX_BYTES = 96 * 1024 * 1024  # maximum total bytes of all parameters in memory
 
 # Part of MAX_BYTES that is reserved for values of at most SMALL bytes
 RESERVE, SMALL = 16 * 1024 * 1024, 256 * 1024
@@ -182,7 +182,7 @@ class ParameterTree:
         return finish(self.names_in_steps())
 
     def names_in_steps(self) -> Steps[list[str]]:
-        """Return the names of all parameters in steps, since the tree may be large."""
+        """Return the names of all parameters in steps, because the tree may be large."""
         found: list[str] = []
         left = _STEP_ITEMS
         root = self.get("/")

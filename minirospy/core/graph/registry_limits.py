@@ -23,18 +23,19 @@ __all__ = [
 
 _MIB = 1024 * 1024
 
-MAX_BYTES = 64 * _MIB  # memory limit for all registrations together: about 60,000 nodes with one topic each
+# maximum total bytes of all registrations in memory: about 60,000 nodes with one topic each
+MAX_BYTES = 64 * _MIB
 
-MAX_OF_ONE = 32 * _MIB  # memory limit for the registrations from one host and port
+MAX_OF_ONE = 32 * _MIB  # maximum bytes in memory of the registrations from one host and port
 
 RESERVE = 16 * _MIB
 """Part of MAX_BYTES that is reserved for hosts and ports that use at most FEW_OF_ONE, some 300 topics and services."""
 
 FEW_OF_ONE = _MIB // 4
 
-MAX_ENTRIES = 10_000  # topics, services and parameters per node
+MAX_ENTRIES = 10_000  # maximum number of topics, services and parameters per node
 
-# Approximate sizes of a node and of each name that it registers, without their strings
+# Approximate bytes for a node and for each name that it registers, without their strings
 _NODE_BYTES, _NAME_BYTES = 400, 150
 
 PUBLISHES, SUBSCRIBES, SERVES, PARAMETER = 1, 2, 4, 8  # kinds of registration for a name, as bits

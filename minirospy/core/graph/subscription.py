@@ -22,7 +22,7 @@ _MAX_DELAY = 8.0
 
 @dataclass(frozen=True)
 class Connect:
-    """Connect to the publisher whose Slave API is at ``uri`` after ``delay`` seconds."""
+    """After ``delay`` seconds, connect to the publisher whose Slave API is at ``uri``."""
 
     uri: str
     delay: float = 0.0

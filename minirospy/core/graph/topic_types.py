@@ -14,9 +14,9 @@ from minirospy.core.graph.registry_limits import text_cost
 __all__ = ["TopicTypes"]
 
 MAX_OLD = 10_000  # maximum unregistered topics whose types are stored
-_MAX_OLD_BYTES = 4 * 1024 * 1024  # memory limit for these types
+_MAX_OLD_BYTES = 4 * 1024 * 1024  # maximum total bytes of these types in memory
 
-_TYPE_BYTES = 100  # approximate size of a type without its string
+_TYPE_BYTES = 100  # approximate bytes for a type without its string
 
 
 class _Type(NamedTuple):
@@ -25,7 +25,7 @@ class _Type(NamedTuple):
 
 
 class TopicTypes:
-    """Topic -> type, in the order of the first registrations.
+    """A table from topic to type, in the order of the first registrations.
 
     ``count`` is called with a node and the bytes added to its share, or removed from it if negative.
     """

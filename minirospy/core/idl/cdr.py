@@ -102,7 +102,7 @@ def make_transcoder(name: str, layout: Layout) -> Transcoder:
                 f"{name}: these bytes are not plain CDR version 1: they start with {bytes(data[:4]).hex()}"
             )
         if not big:
-            # Converts messages from a machine with the other byte order; these are rare, so generate it on first use.
+            # Generate this on first use, because messages from a machine with the other byte order are rare.
             generated = _Generator(is_cdr_source=True, swaps=True).function(layout)
             big.append(_compiled(f"{name} from big-endian CDR", generated))
         return big[0](data)
@@ -185,7 +185,7 @@ class _Walk:
 
 
 class Block(NamedTuple):
-    """Elements that have the same bytes in CDR as in ROS 1, without padding: of ``size`` bytes, aligned to ``width``."""
+    """Elements whose bytes are the same in CDR and ROS 1, without padding. Each has ``size`` bytes, aligned to ``width``."""
 
     width: int
     size: int

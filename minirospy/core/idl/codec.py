@@ -218,7 +218,7 @@ class _Writer:
         self._source.line(text)
 
     def _pack(self, letters: str, values: list[str]) -> str:
-        """Return the call that packs values; an inner message that contains several of them is read once."""
+        """Return the source of the call that packs values. An inner message that contains several of them is read only once."""
         owners = [value.rpartition(".")[0] for value in values]
         uses = Counter(owners)
         names: dict[str, str] = {}
@@ -361,7 +361,7 @@ class _Reader:
         self._source.line(text)
 
     def _create(self, spec: MessageSpec, path: str, owner: str = "") -> dict[str, str]:
-        """Generate code that creates the messages and times inside the message at ``path``; return path -> local name."""
+        """Generate code that creates the messages and times in the message at ``path``; return a dict from path to local name."""
         names = {}
         for field in spec.fields:
             if field.type.is_array or (field.type.is_primitive and field.type.base not in _TIMES):

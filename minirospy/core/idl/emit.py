@@ -200,7 +200,7 @@ class ClassSource(NamedTuple):
     """The source of a class, and the classes that its globals must contain."""
 
     source: str
-    classes: dict[str, str]  # ``pkg/Name`` -> the global name of that class in the source
+    classes: dict[str, str]  # dict from ``pkg/Name`` to the global name of that class in the source
 
 
 def _checked(lookup: Lookup) -> Lookup:

@@ -26,9 +26,9 @@ _QUALITY = 95  # JPEG quality, OpenCV's default
 
 
 MAX_PIXELS = 100_000_000
-"""Maximum number of pixels in a decoded image:
+"""Maximum number of pixels in a decoded image.
 
-a file of some kilobytes may have ten times as many, and use gigabytes of memory.
+A file of some kilobytes may have ten times as many, and use gigabytes of memory.
 """
 
 

@@ -25,7 +25,7 @@ DEPTHS = {
     "32S": "int32",
     "32F": "float32",
     "64F": "float64",
-}  # OpenCV's depths -> numpy types; a depth's number is its index
+}  # numpy types by OpenCV's depth, which is the index
 
 _GENERIC = re.compile(r"(8U|8S|16U|16S|32S|32F|64F)(?:C(\d+))?\Z")
 _CHANNELS = {"mono": "Y", "bgr": "BGR", "rgb": "RGB", "bgra": "BGRA", "rgba": "RGBA"}

@@ -20,7 +20,7 @@ MAX_DEPTH = 64
 MAX_ELEMENTS = 1_000_000  # per document; parsing this many takes some seconds
 
 _MIB = 1024 * 1024
-MAX_MEMORY = 64 * _MIB  # memory limit for all long strings in one document
+MAX_MEMORY = 64 * _MIB  # maximum bytes in memory of all long strings in one document
 
 MAX_WIDE = 16 * _MIB
 """Maximum size in bytes of a string with a character beyond U+00FF: each of its characters then uses 2 or 4 bytes, and the
@@ -34,7 +34,10 @@ MAX_SCALAR = 2048  # characters in a number, a boolean or a date
 _LONG_TEXT = 16  # number of 8-KiB pieces above which a string counts as long
 
 _GROWTH_SHIFT = 17
-"""A string's length shifted right by this is a sixteenth of it, in 8-KiB pieces; the next join waits for that much more data."""
+"""A long string's new pieces are joined to it once they exceed a sixteenth of its length.
+
+A length in characters, shifted right by this number, is a sixteenth of the length in 8-KiB pieces.
+"""
 
 
 class DateTime(NamedTuple):

@@ -29,7 +29,7 @@ __all__ = [
 
 FAMILIES = (socket.AF_INET, socket.AF_INET6)  # the address families of TCP sockets
 
-HANDSHAKE_SECONDS = 10.0  # time limit for each handshake, because a peer may never respond
+HANDSHAKE_SECONDS = 10.0  # time limit in seconds for each handshake, because a peer may never respond
 
 BUSY_POLL_SECONDS = 0.0002  # seconds within which most responses from a process on the same host arrive
 

@@ -24,7 +24,7 @@ _MAX_ENTRIES = 50_000
 _MAX_DEPTH = 8
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .+-]{0,99}")
 _RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
-"""Windows device names."""
+"""Names of Windows devices, which cannot be used for files."""
 
 
 class FoundBag(NamedTuple):

@@ -1,6 +1,6 @@
 """Sessions of the page's endpoints: clients send operations and receive responses as JSON.
 
-An operation is an object with its name, ``{"op": NAME, ...}``. If the client may not do this, if the string is too long
+An operation is an object with its name, ``{"op": NAME, ...}``. If the client may not execute it, if the string is too long
 or not an operation, or if the operation fails, the response is ``{"error": text}`` with one line of text. Operations
 run one after another in a task of the session. The state that is sent to a client is read after changes, not at regular
 intervals.

@@ -31,7 +31,7 @@ __all__ = ["SUBPROTOCOL", "LaunchEndpoint", "LaunchSession"]
 SUBPROTOCOL = "minirospy.launch.v1"
 
 _LOG_SECONDS = 0.2
-"""Poll interval of a log file while a page shows it, because a file reports no changes."""
+"""Poll interval in seconds for a log file that a page shows, because a file reports no changes."""
 
 _STOPPING_SECONDS = 0.2
 _MAX_RUNS = 50

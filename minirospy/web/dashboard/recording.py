@@ -21,7 +21,7 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""Timeouts for stopping. They are long, because after SIGINT the file is completed, possibly on a slow disk."""
+"""Timeouts in seconds for stopping. They are long, because after SIGINT the file is completed, possibly on a slow disk."""
 
 TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
 """Short timeouts while no file is open: a starting interpreter may lose a SIGINT that arrives in a callback of importlib."""

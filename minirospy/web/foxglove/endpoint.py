@@ -122,7 +122,7 @@ class FoxgloveEndpoint:
         return [each for each in found if client.may_write or each not in _FOR_WRITERS]
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
-        """Replace a channel whose publisher's messages have another definition than the installed type."""
+        """Replace a channel whose publisher uses a definition that differs from the installed type's."""
         replaced = self.channels.redefine(channel, header)
         if replaced:
             _log.info(

@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 # memory of a parsed operation relative to that of its text, for objects and lists of numbers
 _VALUE_FACTOR = 4
 
-# maximum bytes: a read-only client only subscribes, which needs less; each byte may be a value
+# maximum bytes from a read-only client, which only subscribes and needs less; each byte may become a value
 _MAX_READ_ONLY_CBOR = 8 * 1024
 
 _POLICY = 1008  # WebSocket close codes, RFC 6455, section 7.4

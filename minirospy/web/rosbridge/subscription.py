@@ -22,7 +22,7 @@ MAX_FRAGMENT_BYTES = 64_000_000
 _MAX_FRAGMENTS = 100_000
 _FRAGMENT_BYTES = 200
 _MESSAGE_BYTES = 1000
-"""Memory that a fragment takes in addition to its text, and an incomplete message in addition to its fragments."""
+"""Bytes of memory that a fragment takes in addition to its text, and an incomplete message in addition to its fragments."""
 
 
 @dataclass(frozen=True)

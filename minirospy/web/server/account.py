@@ -16,9 +16,9 @@ from collections.abc import Callable, Sequence
 __all__ = ["LARGE_PIECE", "MAX_BYTES", "Account", "Share"]
 
 MAX_BYTES = 160_000_000
-"""Maximum bytes that a server holds for all clients:
+"""Maximum bytes that a server holds for all clients.
 
-the process stays below 400 MB, including copies while it handles a message.
+The process stays below 400 MB, including copies while it handles a message.
 """
 
 LARGE_PIECE = 32_768

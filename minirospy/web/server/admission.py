@@ -22,11 +22,12 @@ from minirospy.web.access import Grant
 
 __all__ = ["Occupant", "Rank", "displaced", "rank_of"]
 
-# a client sends its request right after connecting, but a browser opens some connections in advance
+# seconds within which a client should send its request; a browser opens some connections in advance
 SILENT_SECONDS = 5.0
 # maximum connections per address without a request that are younger than this; a browser opens six
 MAX_SILENT = 16
-IDLE_SECONDS = 30.0  # pages send or receive something more often than this
+# seconds without traffic after which a client is idle; pages send or receive something more often
+IDLE_SECONDS = 30.0
 FEW = 8  # an address has few connections if it has less than an eighth of all connections
 
 

@@ -60,7 +60,7 @@ _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
 
 On loopback any program may write; the dashboard's page has the owner's token.
 """
-# until the request is known, so that clients that are served do not wait for 250 handshakes
+# weight until the request is known, so that clients that are served do not wait for 250 handshakes
 _NEW_WEIGHT = 0.25
 
 

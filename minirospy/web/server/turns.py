@@ -35,9 +35,10 @@ SLICE_SECONDS = 0.0001
 # pieces of work after which a client is known; until then, its work is expected to take as long as other new clients'
 NEW_PIECES = 8
 EXPECTED_DECAY = 0.9  # decay of the expected seconds with each piece of work that takes less
-IMMEDIATE_SHARE = 0.5  # of the time, for work that starts without being queued
-# of one burst, 1 ms: a request takes 0.1 to 0.5 ms, 64 kB of empty frames take 100 ms. A new client has one slice, and one more
-# with each short burst: 250 new clients that flood the server go after its other clients as soon as each has had a slice.
+IMMEDIATE_SHARE = 0.5  # share of the time for work that starts without being queued
+# Maximum burst of an interactive client in slices, 1 ms in total: a request takes 0.1 to 0.5 ms, 64 kB of empty
+# frames take 100 ms. A new client has one slice, and gets one more with each short burst, so that 250 new clients
+# that flood the server are served after its other clients as soon as each has had a slice.
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients: interactive clients alone may use 200 ms before bulk clients get a slice again
 MAX_DEBT_TURNS = 10
@@ -73,8 +74,8 @@ class Share:
         self.expected = 0.0  # seconds that its next piece of work may take, estimated from earlier pieces
         self.pieces = 0  # number of pieces of work done while the client is new
         self.burst = 0.0  # seconds used since the client last had nothing to do
-        self.last_burst = 0.0  # seconds of the burst before
-        self.short_bursts = 0  # in succession, up to INTERACTIVE_SLICES
+        self.last_burst = 0.0  # seconds of the previous burst
+        self.short_bursts = 0  # number of short bursts in succession, up to INTERACTIVE_SLICES
         self.is_queued = False
         self.is_closed = False
 
@@ -146,7 +147,7 @@ class FairTurns:
         return bool(self._interactive.entries or self._bulk.entries)
 
     def join(self, work: Work) -> Share:
-        """Return the share of a new client: it has no advantage over clients that have been idle."""
+        """Return the share of a new client, which has no advantage over clients that have been idle."""
         self._interactive.update()
         return Share(work, self._interactive)
 
@@ -196,7 +197,7 @@ class FairTurns:
         return burst <= INTERACTIVE_SLICES * self._slice
 
     def _push(self, share: Share, start: float) -> None:
-        # Of clients that would end at the same tag the one that used less before goes first.
+        # If clients would end at the same tag, the one that has used less is served first.
         end = self._end_of(share, start)
         heapq.heappush(share.queue.entries, _Entry(end, share.tag, next(self._numbers), start, share))
 

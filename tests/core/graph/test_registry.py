@@ -45,7 +45,7 @@ def test_unregistering_needs_the_address_that_registered() -> None:
     assert not registry.unregister_subscriber("/s", "/t", "other")
     assert registry.unregister_subscriber("/s", "/t", "us")
     assert registry.nodes() == {}
-    # The type stays, as in rosmaster.
+    # The type is kept, as in rosmaster.
     assert registry.topic_types() == {"/t": "a/B"}
 
 

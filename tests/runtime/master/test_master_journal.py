@@ -804,7 +804,7 @@ def known(master: str) -> set[tuple[str, str, str]]:
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no kill -9")
 @pytest.mark.timeout(600)
 def test_two_hundred_nodes_survive_their_master() -> None:
-    """CRASHES=50 in the environment makes it a long test."""
+    """Set CRASHES=50 in the environment for a long test."""
     crashes = int(os.environ.get("CRASHES", "4"))
     loop, fakes = LoopThread("fakes"), Fakes()
 
@@ -920,7 +920,7 @@ class Oracle(BackgroundClient):
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no kill -9")
 @pytest.mark.timeout(1200)
 def test_double_start_leaves_one_master_with_graph_and_journal() -> None:
-    """CRASHES=50 in the environment makes it a long test."""
+    """Set CRASHES=50 in the environment for a long test."""
     crashes = int(os.environ.get("CRASHES", "2"))
     loop, fakes = LoopThread("fakes"), Fakes()
 

@@ -298,7 +298,7 @@ def test_close_does_not_wait_for_a_master_that_refuses_connections() -> None:
     async def scene() -> None:
         async with FakeMaster(multicall=True) as master:
             node = await publishing_node(master.uri)
-        # The limit for a silent master would exceed the scene's.
+        # The time limit for a silent master would be longer than the test's.
         await node.close()
 
     run(scene)

@@ -771,7 +771,7 @@ def test_a_master_that_forgot_everything_gets_all_registrations_again(
             subscription = await listen(b, "/t", box)
             again = threading.Event()
             b.when_registered_again.append(again.set)
-            # The publisher's endpoint opens a moment before the subscriber's.
+            # The publisher's end opens a moment before the subscriber's.
             await until(lambda: publication.links and subscription.links)
             link = subscription.links[0]
             port = master.port
@@ -837,7 +837,7 @@ def test_a_list_that_is_still_filling_drops_no_connected_publisher(monkeypatch: 
         async with graph("/a", "/b") as (_, (a, b)):
             publication = await publish(a, "/t")
             subscription = await listen(b, "/t", Box())
-            # The publisher's endpoint opens a moment before the subscriber's.
+            # The publisher's end opens a moment before the subscriber's.
             await until(lambda: publication.links and subscription.links)
             subscription.registered_again([])
             subscription.publishers_changed(["http://127.0.0.1:1/"])

@@ -228,7 +228,7 @@ def test_clients_do_not_wait_for_a_crowd_that_disconnects(is_known: bool) -> Non
 
 
 class Late:
-    """A connection that waits to be read."""
+    """A connection whose data has not been read yet."""
 
     def __init__(self, name: str, log: list[str]) -> None:
         self.name = name
