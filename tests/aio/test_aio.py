@@ -299,7 +299,7 @@ def test_queue_size_zero_is_refused(master: str) -> None:
 
 
 def test_publish_waits_with_queue_size_none(master: str) -> None:
-    """3 MB per message and a reader that has stopped: data counts as written when its socket has accepted it."""
+    """Send messages of 3 MB to a reader that has stopped. Data counts as written once its socket has accepted it."""
 
     async def main() -> None:
         async with Node("a") as a, Node("b") as b:
@@ -417,7 +417,7 @@ def test_wrong_values_are_refused_immediately(master: str) -> None:
 
 def test_undecodable_message_is_logged(master: str, caplog: pytest.LogCaptureFixture) -> None:
     class Wrong(String):
-        """The bytes of a String, deserialized as a too large count."""
+        """The bytes of a String, which are deserialized as a count that is too large."""
 
         def deserialize(self, data: Any) -> Any:
             raise ValueError("no such bytes")
@@ -434,7 +434,7 @@ def test_undecodable_message_is_logged(master: str, caplog: pytest.LogCaptureFix
 
 
 def test_topic_is_unsubscribed_and_subscribed_again_immediately(graph: MasterProxy) -> None:
-    """By several tasks, before the registration has reached the master, or during the unregistration."""
+    """Several tasks do this before the registration has reached the master, or during the unregistration."""
 
     async def main() -> None:
         async with Node("a") as node, Node("b") as other:

@@ -1,4 +1,4 @@
-"""A job object, which kills the children of a killed process: when it is created, and when it is closed."""
+"""Tests when a job object, which kills the children of a killed process, is created and closed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ KILL_ON_JOB_CLOSE, BREAKAWAY_OK = 0x2000, 0x800
 
 
 class Recorded:
-    """A system whose calls are recorded; those listed in ``failing`` fail."""
+    """A system whose calls are recorded; calls listed in ``failing`` fail."""
 
     def __init__(self, *failing: str) -> None:
         self.calls: list[str] = []
@@ -51,7 +51,7 @@ def test_children_end_with_the_process_until_the_last_guard_is_closed() -> None:
         assert system.calls[-1] == "kill"
     assert system.calls == ["create", "spare", "add", "kill", "spare"]
 
-    # A process is assigned to its job once.
+    # A process is assigned to its job only once.
     ChildLifetime(job).close()
     assert system.calls[5:] == ["kill", "spare"]
 

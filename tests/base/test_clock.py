@@ -1,4 +1,4 @@
-"""Clocks: sleeping with a time that the test sets."""
+"""Clocks: sleeping while the test sets the time."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Sleeping(threading.Thread):
             self.outcome = error
 
     def at(self, now: int) -> None:
-        """Set the time, and return when the thread has seen it and waits again."""
+        """Set the time, and return once the thread has seen it and waits again."""
         self.clock.set(now)
         assert self.waits.acquire(timeout=30)
 
@@ -65,7 +65,7 @@ class Sleeping(threading.Thread):
 
 
 def lines_until(step: int, is_set: bool, handle: Callable[[SignalSafeEvent], object]) -> int:
-    """Set or wait for an event; run a handler in the same thread before its line number ``step``. Return the number of lines."""
+    """Set or wait for an event, and run a handler in the same thread before line number ``step``. Return the number of lines."""
     event = SignalSafeEvent()
     lines = 0
 
@@ -91,7 +91,7 @@ def lines_until(step: int, is_set: bool, handle: Callable[[SignalSafeEvent], obj
 
 
 def wait_elsewhere(event: SignalSafeEvent) -> None:
-    """Join a thread that waits for the event, as a hook joins a thread that sleeps."""
+    """Join a thread that waits for the event, as a hook does with a thread that sleeps."""
     thread = threading.Thread(target=event.wait, args=(0.001,), daemon=True)
     thread.start()
     thread.join()

@@ -1,4 +1,4 @@
-"""environment: the meaning of the variables, and refused values."""
+"""environment: the meaning of the variables, and rejected values."""
 
 from __future__ import annotations
 
@@ -207,7 +207,7 @@ def test_minirospy_local_is_on_or_off(text: str, local: bool) -> None:
 
 
 def test_an_unknown_minirospy_local_is_refused() -> None:
-    """A misspelt value must not allow access that was meant to be closed."""
+    """A misspelt value must not allow access that the user wanted to prevent."""
     with pytest.raises(UsageError, match=r"MINIROSPY_LOCAL \[yes please\] is neither 1 nor 0"):
         Environment.read({"MINIROSPY_LOCAL": "yes please"})
 

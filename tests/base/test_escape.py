@@ -1,4 +1,4 @@
-"""Display of untrusted text: no terminal control sequences, no additional lines."""
+"""Display of untrusted text without terminal control sequences or additional lines."""
 
 from __future__ import annotations
 

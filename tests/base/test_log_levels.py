@@ -1,4 +1,4 @@
-"""log_levels: ROS's levels and the corresponding ones of Python's logging."""
+"""log_levels: ROS's levels and the corresponding levels of Python's logging."""
 
 from __future__ import annotations
 

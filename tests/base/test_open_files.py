@@ -1,4 +1,4 @@
-"""Files that another process has open, which Windows neither replaces nor removes; other systems imitate its refusal."""
+"""Files that another process has open, which Windows neither replaces nor removes. Other systems simulate its error."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def paths(tmp_path: Path) -> tuple[Path, Path]:
 
 @pytest.fixture
 def refused(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], threading.Event]:
-    """Return a function that makes os.replace fail several times, as on Windows; the event is set at the first failure."""
+    """Return a function that makes os.replace fail several times, as on Windows, and returns an event for the first failure."""
 
     def refuse(times: int) -> threading.Event:
         replace, failed, left = os.replace, threading.Event(), [times]

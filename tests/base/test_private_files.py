@@ -1,4 +1,4 @@
-"""Files at predictable names: links, FIFOs and folders of other users are refused."""
+"""Files with predictable names: links, FIFOs and folders that belong to other users are rejected."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_open_file_refuses_a_symbolic_link_to_nothing(
     tmp_path: Path, has_flag: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if has_flag:
-        # As if it had been created between the check and the opening.
+        # Simulate a link that is created between the check and the opening.
         monkeypatch.setattr(os.path, "islink", lambda path: False)
     else:
         monkeypatch.setattr(private_files, "_FLAGS", 0)
@@ -89,7 +89,7 @@ def test_open_text_empties_or_appends(tmp_path: Path) -> None:
 
 
 def test_read_file_reads_hard_links(tmp_path: Path, mine: Path) -> None:
-    """Backups use hard links; reading one is harmless."""
+    """Backups use hard links, and reading one is harmless."""
     os.link(mine, tmp_path / "name")
     assert private_files.read_file(tmp_path / "name") == (b"precious", mine.stat().st_mtime)
 
@@ -137,7 +137,7 @@ def test_journal_follows_no_link(
     journal.remove()
 
     assert mine.read_text() == "precious"
-    # A symbolic link is not read either. A hard link is removed without changing the file.
+    # A symbolic link is not read, either. A hard link is removed without changing the file.
     assert left
     assert not left.recovered.records
 

@@ -1,4 +1,4 @@
-"""Ctrl-Break of Windows, which a launcher sends to its children, is treated as Ctrl-C."""
+"""Ctrl-Break on Windows, which a launcher sends to its children, is treated like Ctrl-C."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from minirospy.ros.rosunit.runner.bare import interrupt_noted
 
 @pytest.fixture
 def control_break(monkeypatch: pytest.MonkeyPatch) -> Iterator[signal.Signals]:
-    """Return SIGBREAK; on other systems, another signal of that name."""
+    """Yield SIGBREAK, or on other systems another signal under that name."""
     number: signal.Signals = getattr(signal, "SIGBREAK" if sys.platform == "win32" else "SIGUSR1")
     monkeypatch.setattr(signal, "SIGBREAK", number, raising=False)
     before = signal.signal(number, signal.SIG_DFL)

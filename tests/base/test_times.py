@@ -1,4 +1,4 @@
-"""Times and durations compared with plain integers of nanoseconds."""
+"""Times and durations compared with integers in nanoseconds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Each XML reader refuses texts that expand to gigabytes, and reads those that real ROS reads."""
+"""Each XML reader rejects texts that expand to gigabytes, and accepts those that real ROS accepts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LAUGHS = (
     + "".join(f'<!ENTITY a{n} "' + f"&a{n - 1};" * 6 + '">' for n in range(1, 9))
     + "]>"
 )
-"""Expands to 17 MB at each ``&a8;``: expat accepts it within its own limit, 100 times the text plus 8 MiB."""
+"""Each ``&a8;`` in it expands to 17 MB, which expat accepts within its own limit, 100 times the text plus 8 MiB."""
 
 READERS: dict[str, tuple[str, Callable[[str], object], type[Exception]]] = {
     "robot description": ("robot", parse_robot, UrdfError),

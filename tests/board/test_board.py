@@ -1,4 +1,4 @@
-"""One board used by several processes: shared, persistent, started once, and replaced when it dies."""
+"""One board used by several processes is shared, persistent, started once, and replaced when it dies."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_watch_prints_the_chosen_pins_until_the_timeout(board: Board) -> None:
     assert not list(board.watch([12], timeout=0.05))
 
 
-# It listens before it prints: an edge before wait_for_edge() starts would be lost, as on hardware.
+# Start listening before printing: an edge before wait_for_edge() starts would be lost, as on hardware.
 CHILD = """
 import threading
 from RPi import GPIO
@@ -135,7 +135,7 @@ def test_many_start_one_server() -> None:
     edges = opened[1].watch([12], timeout=40)
     opened[2].press(12)
     assert next(edges).level == 1
-    # Servers that lost the race may still be exiting; one remains.
+    # Servers that were too late may still be exiting; only one remains.
     wait_until(lambda: len(servers(BoardDirectory.find())) == 1)
 
     for child in children:

@@ -44,7 +44,7 @@ def test_set_and_list(capsys: pytest.CaptureFixture[str]) -> None:
         (["press", "99"], 1, "pin 99 does not exist: BCM numbers are 0 to 53"),
         (["press", "x"], 2, "invalid int value: 'x'"),
         (["press"], 2, "the following arguments are required: pin"),
-        # Newer Pythons quote the value.
+        # Newer Python versions quote the value.
         (["set", "7", "2"], 2, "argument level: invalid choice: "),
         (["presss", "7"], 2, "did you mean press?"),
     ],
@@ -67,7 +67,7 @@ def test_watch_prints_a_line_for_each_edge() -> None:
             [sys.executable, "-c", code, "watch", "7", "-n", "2"], stdout=subprocess.PIPE, text=True
         ) as child,
     ):
-        # Whether it listens yet is not visible here: toggle the pin until it has received enough.
+        # The test cannot see when the listener is ready, so toggle the pin until it has received enough edges.
         for number in range(1, 400):
             board.set(7, number % 2)
             try:
@@ -194,7 +194,7 @@ def test_the_picture_of_a_person(encoding: str) -> None:
     body, scanner = ("█", "▲") if encoding == "utf-8" else ("#", "^")
     (top, *_, bottom) = [number for number, line in enumerate(lines) if body * 3 in line]
     (foot,) = [number for number, line in enumerate(lines) if scanner in line]
-    # 0.1 m per line: the person's body extends from 0.4 m to 0.6 m.
+    # Each line is 0.1 m high; the person's body extends from 0.4 m to 0.6 m.
     assert (foot - top, foot - bottom) == (6, 4)
 
 
@@ -216,7 +216,8 @@ def test_keys_press_buttons_and_move_the_person(
         def type_until(keys: bytes, condition: Callable[[], bool]) -> None:
             os.write(ours, keys)
             while not condition():
-                # Its output must be read, or it blocks. The change may reach this process after its drawing.
+                # Read the output, because the program would block otherwise. The change may reach this process after
+                # it was drawn.
                 if select.select([ours], [], [], 0.05)[0]:
                     os.read(ours, 65536)
 
@@ -236,7 +237,7 @@ def test_keys_press_buttons_and_move_the_person(
 
 
 def _read_all(terminal: int) -> None:
-    """Read until the other side is closed, which Linux reports as an error."""
+    """Read until the other end is closed, which Linux reports as an error."""
     with contextlib.suppress(OSError):
         while os.read(terminal, 65536):
             pass

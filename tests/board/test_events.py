@@ -1,4 +1,4 @@
-"""Which edges count, with a clock that the test controls."""
+"""Which edges are counted, with a clock that the test controls."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A board's messages: golden bytes, round trips, and refused messages."""
+"""A board's messages: golden bytes, round trips, and rejected messages."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def _prepare(gpio: Gpio) -> None:
             "Bouncetime must be greater than 0",
         ),
         (
-            # bouncetime is in milliseconds; this value would fit seconds.
+            # bouncetime is in milliseconds; this value would be plausible in seconds.
             lambda g: g.add_event_detect(11, GPIO.RISING, bouncetime=0.2),
             TypeError,
             NO_INTEGER.format("float"),
@@ -281,7 +281,7 @@ def test_cleanup_undoes_a_setup_that_a_signal_has_ended(
     ask = link.call
 
     def interrupted(operation: Setup) -> None:
-        # The board has set the pin, and the signal arrives before its response.
+        # Simulate a signal that arrives after the board has set the pin, but before its response.
         del vars(link)["call"]
         ask(operation)
         if not hook_cleans_up:
@@ -311,7 +311,7 @@ def test_a_signal_handlers_cleanup_lets_the_interrupted_call_end(bcm: Gpio, boar
     calls = {Gpio.input.__code__, Gpio.output.__code__}
 
     def interrupt(frame: FrameType, event: str, argument: object) -> None:
-        # Simulate a signal at the first step of the call: its handler runs before anything else.
+        # Simulate a signal at the first step of the call, whose handler runs before anything else.
         if event == "call" and frame.f_code in calls:
             sys.setprofile(None)
             with dispatching_signal():
@@ -429,7 +429,7 @@ def test_pwm_has_its_duty_cycle_and_ends_low(bcm: Gpio, board: Board) -> None:
     wave.set(duty=30)
     wave.start()
     high = [0.0]
-    # A machine that stalls makes some of them longer, but not for long.
+    # A machine that stalls makes some of the pulses longer, but only for a while.
     while sorted(high)[len(high) // 2] != pytest.approx(0.015, abs=0.008):
         several = [next(edges) for _ in range(11)]
         high = [after.time - edge.time for edge, after in itertools.pairwise(several) if edge.level]

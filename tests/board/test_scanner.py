@@ -1,4 +1,4 @@
-"""The simulated scanner: geometry, the person, noise, fields."""
+"""The simulated scanner: geometry, the person, noise and fields."""
 
 from __future__ import annotations
 

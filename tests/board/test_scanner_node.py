@@ -1,4 +1,4 @@
-"""The simulated scanner as a node: its messages, and the ways to move the person in front of it."""
+"""The simulated scanner as a node: its messages, and the interfaces that move the person in front of it."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ def scanner(master: str) -> Iterator[subprocess.Popen[str]]:
         said, _ = node.communicate(timeout=30)
         assert "Traceback" not in said
         assert node.returncode == 0
-        # The room is empty when the node closes.
+        # The person is removed when the node closes.
         asyncio.run(asyncio.wait_for(until_person_is(board, None), SECONDS))
 
 
 async def until_person_is(board: Board, wanted: object) -> None:
-    """Wait for the move on each board, which has its own connection."""
+    """Wait until each board, which has its own connection, has the person at this position."""
     await until(lambda: board.person == wanted)
 
 
@@ -92,7 +92,7 @@ def test_scan_follows_a_moved_person(scanner: subprocess.Popen[str]) -> None:
 def test_raw_data_match_the_scan(scanner: subprocess.Popen[str]) -> None:
     async def main() -> None:
         with Board() as board:
-            # Next to the reflector on the wall ahead.
+            # This position is next to the reflector on the wall ahead.
             board.move_person((0.0, 0.3))
             async with Node("test", namespace="sick_safetyscanners", rosout=False) as node:
                 await until_paths_are(node, PROTECTIVE)
@@ -109,7 +109,7 @@ def test_raw_data_match_the_scan(scanner: subprocess.Popen[str]) -> None:
         assert any(point.reflector for point in points)
         assert list(raw.general_system_state.safe_cut_off_path[:2]) == PROTECTIVE
         assert list(raw.application_data.outputs.evaluation_path_outputs_eval_out[:2]) == PROTECTIVE
-        # Switched off by its parameter.
+        # A parameter has switched this data off.
         assert raw.intrusion_data.data == []
 
     asyncio.run(asyncio.wait_for(main(), SECONDS))

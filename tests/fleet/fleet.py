@@ -1,4 +1,4 @@
-"""Masters, gateways and nodes of a fleet on one loop of the test: loopback only, no multicast."""
+"""Masters, gateways and nodes of a fleet on one event loop, which use only loopback and no multicast."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SECONDS = 60.0
 
 
 class Place:
-    """A master with its nodes: a robot or a control room."""
+    """A master and its nodes, which are a robot or a control room."""
 
     def __init__(self, fleet: Fleet, master: Master) -> None:
         self.fleet = fleet
@@ -44,7 +44,7 @@ class Place:
     def gateway(
         self, name: str = "", *, endpoint: str = "", listens: bool = False, **options: Any
     ) -> Gateway:
-        """Start a gateway: of a robot if it has a name, else of a control room."""
+        """Start a gateway, for a robot if it has a name, otherwise for a control room."""
         endpoint = endpoint or self.fleet.endpoint
         network = NetworkOptions(listen=(endpoint,)) if listens else NetworkOptions(connect=(endpoint,))
         options.setdefault("imports", not name)
@@ -138,7 +138,7 @@ class Fleet:
         self.until(are_gone)
 
     def stop(self, gateway: Gateway) -> None:
-        """Close a gateway and its node, as a shutdown does."""
+        """Close a gateway and its node, as at a shutdown."""
 
         async def ending() -> None:
             await gateway.close()

@@ -1,6 +1,6 @@
-"""A simulated robot with zenoh-bridge-ros1: written from that bridge's source, with eclipse-zenoh only.
+"""A simulated robot with zenoh-bridge-ros1, based only on that bridge's source and on eclipse-zenoh.
 
-It uses no code of minirospy: the keys are built independently.
+It uses no code from minirospy, so the keys are built independently.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ PERIOD = 1.0
 
 
 class Ros1Peer:
-    """Puts beacons, publishes, subscribes, offers services, calls them.
+    """Sends beacons, publishes, subscribes, offers services, and calls services.
 
-    It connects to ``endpoint``, or listens there if ``listens``.
+    It connects to ``endpoint``, or with ``listens``, listens there.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class Ros1Peer:
         self.session: Any = zenoh.open(config)
         self.namespace = namespace
         self.received: dict[str, int] = {}
-        """Beacons of other peers: their keys from the kind on, and their number."""
+        """The number of beacons from other peers, by key from the kind on."""
         self._beacons: dict[str, Any] = {}
         self._declared: list[Any] = []
         self._ended = threading.Event()
@@ -49,7 +49,7 @@ class Ros1Peer:
         return f"{type_.encode().hex()}/{md5sum}/{self.namespace}/{name.strip('/')}"
 
     def announce(self, kind: str, type_: str, md5sum: str, name: str) -> None:
-        """Put a resource's beacons until :meth:`withdraw`."""
+        """Send beacons for a resource until :meth:`withdraw`."""
         self.announce_key(f"ros1_discovery_info/*/{kind}/{self.key(type_, md5sum, name)}")
 
     def announce_key(self, key: str) -> None:
@@ -91,7 +91,7 @@ class Ros1Peer:
         return found
 
     def serve(self, type_: str, md5sum: str, name: str, answer: Callable[[bytes], bytes]) -> None:
-        """Offer a service as the bridge does: an error is returned as its text, and a query without payload gets no reply."""
+        """Offer a service as the bridge does: an error is sent as its text, and a query without payload gets no reply."""
 
         def asked(query: Any) -> None:
             with query:

@@ -155,19 +155,21 @@ def test_strings_flow_both_ways_without_loops(fleet: Fleet) -> None:
     robot, control = fleet.place(), fleet.place()
     control.gateway(listens=True)
     heard = collect(fleet, robot, "/chat", String)
-    # Start it before the gateway, which reads the header of a later publisher: that counts as a subscriber, too.
+    # Start it before the gateway, which queries the header of a publisher that starts later and then counts as a
+    # subscriber, too.
     said = publisher(fleet, robot, "/chat", String)
     robot.gateway("robot1")
     fleet.until_shown(control, "/robot1/chat")
     there = collect(fleet, control, "/robot1/chat", String)
     back = publisher(fleet, control, "/robot1/chat", String)
     fleet.run(said.wait_for_subscribers(2, SECONDS))
-    # The control room's gateway subscribes once it sees the publisher; the reader in the same room does immediately.
+    # The control room's gateway subscribes once it sees the publisher; the reader in the same room subscribes
+    # immediately.
     fleet.run(back.wait_for_subscribers(2, SECONDS))
     fleet.run(said.publish("from the robot"))
     fleet.run(back.publish("from the room"))
     fleet.until(lambda: len(heard) >= 2 and len(there) >= 2)
-    # Messages that came back to their origin would arrive before these.
+    # Messages that returned to their origin would arrive before these.
     fleet.run(said.publish("again from the robot"))
     fleet.run(back.publish("again from the room"))
     both = ["again from the robot", "again from the room", "from the robot", "from the room"]
@@ -210,7 +212,7 @@ def test_an_action_runs_on_a_robot_and_is_cancelled(fleet: Fleet) -> None:
             ActionClient(client_node, "robot1/fibonacci", FibonacciAction) as client,
         ):
             await client.wait_for_server(SECONDS)
-            # Only the status has arrived by then.
+            # By then, only the status has arrived.
             await server._feedback.wait_for_subscribers(1, SECONDS)
             await server._result.wait_for_subscribers(1, SECONDS)
             goal = client.send(FibonacciGoal(order=3))
@@ -245,7 +247,7 @@ def test_a_robot_sees_the_control_room_where_it_imports(fleet: Fleet) -> None:
     client = robot.node("client")
     fleet.run(client.wait_for_service("/base/door", SECONDS))
     assert fleet.run(client.call("/base/door", SetBool, True)).message == "granted"
-    # A topic from the other side is not exported to it again: it would arrive before this later topic.
+    # If the topic from the other side were exported to it again, it would arrive before this later topic.
     publisher(fleet, robot, "/later", String)
     fleet.until_shown(room, "/robot1/later")
     publisher(fleet, room, "/back", String, name="another")

@@ -1,4 +1,4 @@
-"""Hostile peers of a fleet, and peers that leave: no task ends, no table fills up, no data is lost permanently."""
+"""Hostile peers in a fleet, and peers that leave: no task fails, no table fills up, and no data is lost permanently."""
 
 from __future__ import annotations
 
@@ -320,13 +320,13 @@ def test_calls_that_wait_do_not_hold_up_pings_and_reports() -> None:
         for query in queries:
             arrived["call"](query)
         assert await queries[-1].answer == f"the gateway is answering {_QUERIES} other queries".encode()
-        # The other queries of the burst are answered.
+        # The other queries in the burst are answered.
         assert not any(query.answer.done() for query in queries[:-1])
         ping = Query()
         arrived["ping"](ping)
         assert await ping.answer == b"pong"
 
-        # Pings and reports do not take the places of calls, either.
+        # Pings and reports do not use the slots for calls, either.
         queries = [Query() for _ in range(_CONTROL_QUERIES + 1)]
         for query in queries:
             arrived["status"](query)

@@ -1,4 +1,4 @@
-"""Failures, false data and floods in a fleet: each has the result that docs/fleet.md describes."""
+"""Failures, false data and floods in a fleet; each has the result that docs/fleet.md describes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ __all__ = ["fleet"]
 
 
 class Proxy:
-    """A TCP proxy that can stop forwarding bytes without closing connections, like a link that is cut."""
+    """A TCP proxy that can stop forwarding bytes without closing connections, like an interrupted link."""
 
     def __init__(self, fleet: Fleet, to: str) -> None:
         self._fleet = fleet
@@ -169,7 +169,7 @@ def test_a_link_that_is_cut_is_noticed_and_mended(fleet: Fleet, quick: str) -> N
     try:
         gateway_of(robot, "robot1", NetworkOptions(connect=(proxy.endpoint,), config=quick))
         found = collect(fleet, control, "/robot1/map", String)
-        # A machine that stalls for two seconds loses the link, too.
+        # A machine that stalls for two seconds also loses the link.
         fleet.until(lambda: len(found) >= 1)
 
         proxy.cut()
@@ -206,7 +206,7 @@ def serve_never(fleet: Fleet, robot: Any) -> asyncio.Event:
 
 
 async def call_never(client: Any, called: asyncio.Event) -> asyncio.Future[Any]:
-    """Return a call of /robot1/slow that has arrived; repeat one that fails earlier because the machine stalled."""
+    """Return a call to /robot1/slow that has arrived; repeat calls that fail before that because the machine has stalled."""
     from std_srvs.srv import Trigger
 
     while True:
@@ -468,7 +468,7 @@ def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
 def answered(start: Callable[..., subprocess.Popen[str]], *words: str) -> tuple[int, str]:
     """Return the status and output of a command that has reached the fleet.
 
-    On a busy machine, connecting takes longer than the command waits.
+    Repeat the command, because on a busy machine, connecting may take longer than it waits.
     """
     while True:
         code, text = ended(start(*words))
@@ -621,19 +621,19 @@ def test_a_second_start_that_cannot_listen_does_not_end_the_first(
         assert code == 1
         assert "the fleet's network cannot be opened" in text
         assert "Traceback" not in text
-    # A gateway that waits for a router that does not run has not taken the name.
+    # A gateway that still waits for its router has not claimed the name.
     waiting = start(*words, "--connect", f"127.0.0.1:{free_port()}")
     until_line(waiting, "nothing of the fleet answers")
     assert running.poll() is None
 
-    # A gateway that works takes the name, and the first one prints why it exits.
+    # A gateway that is connected claims the name, and the first one prints why it exits.
     start(*words, "--listen", f"127.0.0.1:{free_port()}")
     assert until_line(running, "shutdown request").endswith("new node registered with same name\n")
     assert ended(running)[0] == 0
 
 
 def test_robot_stops_if_commands_stop_arriving(fleet: Fleet) -> None:
-    """The link is cut, and the loop of the robot's gateway is blocked: publishing zero needs neither."""
+    """The link is cut, and the event loop of the robot's gateway is blocked. Publishing zero velocity depends on neither."""
     robot, control = fleet.place(), fleet.place()
     control.gateway(listens=True)
     proxy = Proxy(fleet, fleet.endpoint)
@@ -666,7 +666,7 @@ def test_robot_stops_if_commands_stop_arriving(fleet: Fleet) -> None:
             blocked.set()
             released.wait()
 
-        # All loops of the test run in this thread; the receiver and the guard have their own threads.
+        # All event loops in the test run in this thread, whereas the receiver and the guard have their own threads.
         proxy.cut()
         fleet.loop.loop.call_soon_threadsafe(block)
         try:
@@ -683,7 +683,7 @@ def test_robot_stops_if_commands_stop_arriving(fleet: Fleet) -> None:
 
 
 class RawSubscriber:
-    """A robot's base without an event loop: a subscriber of /cmd_vel by XML-RPC and TCPROS."""
+    """A robot's base without an event loop: a subscriber to /cmd_vel, with raw XML-RPC and TCPROS."""
 
     def __init__(self) -> None:
         self._socket: socket.socket | None = None

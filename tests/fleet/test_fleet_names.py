@@ -1,4 +1,4 @@
-"""Two machines with the same name: the control room shows the one that it saw first, for any clocks and tokens."""
+"""Two machines with the same name. The control room shows the one that it saw first, regardless of clocks and tokens."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def control_room(fleet: Fleet, place: Place) -> Importer:
 
 
 def shown(importer: Importer) -> Claim | None:
-    """Return the claim of robot1 that is shown; None if there is none, as during a takeover."""
+    """Return the claim of robot1 that is shown, or None if there is none, as during a takeover."""
     robot = importer.robots.get("robot1")
     return robot.robot.claim if robot else None
 
@@ -189,7 +189,7 @@ def test_a_machine_whose_clock_is_behind_takes_no_name(
     gateway = robot.gateway("robot1", host="a" * 16)
     heard = collect(fleet, robot, "/cmd_vel", String)
     fleet.until_shown(control, "/robot1/cmd_vel")
-    # Its clock is a year behind: previously, it took the name and the commands within 0.1 s.
+    # Its clock is a year slow: in an earlier version, it took over the name and the commands within 0.1 s.
     other = late.gateway("robot1", host="b" * 16, clock=lambda: 1)
     stolen = collect(fleet, late, "/cmd_vel", String)
     fleet.until(lambda: importer.contents.waiting)
@@ -206,7 +206,7 @@ def test_a_machine_whose_clock_is_behind_takes_no_name(
     assert f"{'b' * 16} (gateway {other.id}) is refused" in line
     assert f"minirospy fleet takeover robot1 {'b' * 16}" in line
 
-    # The operator decides otherwise, and reverts the decision.
+    # The operator selects the other machine, and then reverts the choice.
     operator = control.node("operator")
     fleet.run(operator.set_param(f"{MACHINES}/robot1", "b" * 16))
     fleet.until(lambda: shown(importer) == other.claim)
@@ -222,7 +222,7 @@ def test_a_copied_token_takes_no_name(fleet: Fleet, caplog: pytest.LogCaptureFix
     fleet.until_shown(control, "/robot1/chat")
     with stranger(fleet) as session:
         copies = [
-            claim,  # replayed
+            claim,  # a replayed claim
             claim._replace(start=1, host="0" * 16),  # another machine behind the same gateway
             claim._replace(gateway="0" * 16, start=2**63),  # the same machine, apparently restarted
         ]

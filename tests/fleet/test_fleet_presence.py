@@ -1,4 +1,4 @@
-"""Robots that do not answer although their tokens remain: when they count as lost, and when as back."""
+"""Robots that do not respond although their tokens remain: when they count as lost, and when as returned."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.manual_loop import ManualLoop, run_manually
 
 
 class Fleet:
-    """Gateways with tokens, and those that answer."""
+    """Gateways with tokens, some of which respond."""
 
     def __init__(self) -> None:
         self.tokens: set[str] = {"a", "b"}
@@ -53,7 +53,7 @@ def test_a_robot_that_does_not_answer_twice_is_lost_until_it_does() -> None:
         assert fleet.presence.lost == {"b"}
         assert (fleet.queries, fleet.changes) == (3, 1)
 
-        # The lost robot is checked more often than the others, once each time.
+        # The lost robot is checked more often than the others, with one query each time.
         await loop.advance(10)
         assert (fleet.queries, fleet.changes) == (4, 1)
         fleet.answering = {"a", "b"}

@@ -1,4 +1,4 @@
-"""Gateways with zenoh-bridge-ros1's keys: real Zenoh sessions, masters and nodes, and a peer without code of minirospy."""
+"""Gateways with zenoh-bridge-ros1's keys, with real Zenoh sessions, masters and nodes, and a peer that uses no minirospy code."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def test_topic_of_the_bridge_is_shown_here_and_passed(fleet: Fleet, peer: Callab
 def test_messages_without_any_beacon_are_passed_both_ways(
     fleet: Fleet, peer: Callable[..., Ros1Peer]
 ) -> None:
-    """A bridge puts no beacon while another puts the same one; a program on Zenoh alone has none."""
+    """A bridge sends no beacon while another one sends the same; a program that only uses Zenoh sends none."""
     place = fleet.place()
     chat = publisher(fleet, place, "/out", String)
     received = collect(fleet, place, "/in", String)
@@ -182,7 +182,7 @@ def test_services_are_called_both_ways(fleet: Fleet, peer: Callable[..., Ros1Pee
     client = place.node("client")
     fleet.run(client.wait_for_service("/door", SECONDS))
     assert fleet.run(client.call("/door", SetBool, True)).message == "open"
-    # The bridge sends an error as if it were a response.
+    # The bridge sends an error in the same way as a response.
     with pytest.raises(ServiceException, match="the door is locked"):
         fleet.run(client.call("/door", SetBool, False))
 
@@ -263,7 +263,7 @@ def test_topics_removed_there_leave_this_master_and_return(
     robot.withdraw("sub", *STRING, "/orders")
     fleet.until_gone(place, "/orders")
     assert "/chat" in place.names()
-    # Its process is killed: only silence indicates that.
+    # Simulate a killed process, which others notice only by its silence.
     robot.close()
     fleet.until_gone(place, "/chat")
 
@@ -291,7 +291,7 @@ def test_removed_topics_are_not_announced_any_more(fleet: Fleet, peer: Callable[
     )
     fleet.run(chat.close())
     fleet.until(lambda: running.status()["announced"] == 1)
-    # A beacon that was in transit arrives before that of a later topic.
+    # A beacon that was in transit would arrive before that of a later topic.
     publisher(fleet, place, "/later", String, name="later")
     fleet.until(lambda: robot.has_received("pub", *STRING, "/later"))
     robot.received.clear()
@@ -351,7 +351,7 @@ def test_gateways_of_two_masters_pass_these_keys_without_loops(
         for name, each in said.items():
             fleet.run(each.publish(f"{turn} of {name}"))
         fleet.until(partial(all_received, turn))
-    # A message that came back would have arrived before the second round.
+    # A message that returned would have arrived before the second round.
     assert [sorted(messages) for messages in received("first")] == [["first of one", "first of two"]] * 3
 
 
@@ -367,7 +367,7 @@ def test_a_second_gateway_of_these_keys_is_refused(fleet: Fleet) -> None:
 def test_topics_of_another_gateway_of_this_master_are_not_announced(
     fleet: Fleet, peer: Callable[..., Ros1Peer], caplog: pytest.LogCaptureFixture
 ) -> None:
-    """As if two start at the same moment, or zenoh-bridge-ros1 itself starts later."""
+    """This happens if two gateways start at the same moment, or zenoh-bridge-ros1 itself starts later."""
     place = fleet.place()
     gateway(place, listens=True)
     chat = publisher(fleet, place, "/chat", String, name="ros1_to_zenoh_bridge", headers={MARK: "1"})
@@ -378,7 +378,7 @@ def test_topics_of_another_gateway_of_this_master_are_not_announced(
     fleet.until(lambda: robot.has_received("pub", *STRING, "/other"))
     assert [key.partition("/")[0] for key in robot.received] == ["pub"]
 
-    # Messages are not forwarded, either, before the graph has been read.
+    # Messages are not forwarded before the graph has been read, either.
     found = robot.subscribe(*STRING, "/chat")
     robot.announce("sub", *STRING, "/chat")
     mine = publisher(fleet, place, "/chat", String, name="mine")

@@ -1,4 +1,4 @@
-"""The keys of zenoh-bridge-ros1 and its beacons, without a network, with a clock that the test controls."""
+"""The keys of zenoh-bridge-ros1 and its beacons, without a network and with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tests.fleet.test_fleet_hostile import CLAIM
 
 MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 OTHER = "f" * 32
-# hex("std_msgs/String"), written out: as the bridge itself puts it.
+# hex("std_msgs/String"), written out as the bridge itself sends it.
 HEX = "7374645f6d7367732f537472696e67"
 CHAT = Resource("pub", "/arm/chat", "std_msgs/String", MD5)
 
@@ -122,7 +122,7 @@ def test_a_resource_is_lost_after_its_last_beacon() -> None:
 
 
 def test_resources_are_kept_after_the_process_did_not_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Zenoh's thread delivers the beacons of that time after the loop has continued."""
+    """Zenoh's thread delivers the beacons from that time only after the loop has continued."""
     clock = Mock()
     clock.monotonic.return_value = 0.0
     monkeypatch.setattr(ros1_side, "time", clock)
@@ -131,7 +131,7 @@ def test_resources_are_kept_after_the_process_did_not_run(monkeypatch: pytest.Mo
     side._sightings.received(CHAT, 0.0)
 
     def beat(times: Iterable[float]) -> list[Resource]:
-        """Let the beats arrive at these times; return the resources that are known after them."""
+        """Simulate beats at these times; return the resources that are known afterwards."""
         left = [*times]
 
         async def sleep(_: float) -> None:
@@ -145,7 +145,7 @@ def test_resources_are_kept_after_the_process_did_not_run(monkeypatch: pytest.Mo
         return list(side._sightings)
 
     assert beat([0.2, 100.0]) == [CHAT]
-    # Its beacons do not arrive any more.
+    # The beacons no longer arrive.
     assert beat([100.0 + 0.2 * number for number in range(30)]) == []
 
 
@@ -183,7 +183,7 @@ def test_a_beacon_that_another_puts_is_silent_until_that_one_ends() -> None:
     assert beacons.due(2.0) == []
     beacons.received("a")
     assert beacons.due(3.0) == []
-    # The other bridge has stopped: a beacon is due after a random part of a period.
+    # The other bridge has stopped, so a beacon is due after a random part of a period.
     assert beacons.due(4.0) == []
     assert beacons.due(4.2) == []
     assert beacons.due(4.25) == ["a"]

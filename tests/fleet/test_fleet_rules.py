@@ -1,4 +1,4 @@
-"""The pure parts of a fleet: keys, rules, payloads, queues, frames, clocks, the report."""
+"""The pure parts of a fleet: keys, rules, payloads, queues, frames, clocks and the report."""
 
 from __future__ import annotations
 
@@ -235,7 +235,7 @@ def test_all_gateways_together_have_a_limit_of_names(monkeypatch: pytest.MonkeyP
     assert "more than 10 topics and services" in fleet.refusal
     assert len(fleet._gateways) == 10
 
-    # A topic that is removed makes room, and a changed flag needs none.
+    # Removing a topic makes room for another, and a changed flag needs no room.
     assert fleet.add(keys.topic_key(tokens[0]._replace(is_subscribed=True)))
     assert fleet.remove(keys.topic_key(tokens[1]))
     assert fleet.add(keys.topic_key(tokens[12]))

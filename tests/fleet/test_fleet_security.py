@@ -1,4 +1,4 @@
-"""Which peers may join a fleet, and how its connections are encrypted: both set by Zenoh's configuration file."""
+"""Which peers may join a fleet, and how its connections are encrypted, as set in Zenoh's configuration file."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ def certificate(tmp_path: Path) -> tuple[str, str]:
         pytest.skip("openssl is not installed")
     key, cert = str(tmp_path / "key.pem"), str(tmp_path / "cert.pem")
     words = f"openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=localhost -keyout {key} -out {cert}"
-    # A self-signed certificate must not be marked as a CA: rustls does not accept a CA's certificate for a server.
+    # A self-signed certificate must not be marked as a CA, because rustls does not accept a CA's certificate for a
+    # server.
     extensions = ["-addext", "subjectAltName=DNS:localhost", "-addext", "basicConstraints=critical,CA:FALSE"]
     subprocess.run([*words.split(), *extensions], check=True, capture_output=True)
     return key, cert

@@ -1,4 +1,4 @@
-"""Velocities that arrive over the fleet and stop arriving: the messages that follow, with a clock that the test controls."""
+"""The messages that follow if velocities over the fleet stop arriving, with a clock that the test controls."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_stream_that_ends_is_followed_by_a_zero_once(caplog: pytest.LogCaptureFi
     robot.wake()
     wait_until(lambda: robot.published == [1, 2, 3, 0])
     wait_until(lambda: "/cmd_vel is stopped: no command came for 0.5 s" in caplog.text)
-    # It drives on as soon as commands arrive again.
+    # The robot moves again as soon as commands arrive.
     robot.send(4, 5)
     robot.now += 1
     robot.wake()

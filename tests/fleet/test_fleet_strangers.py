@@ -1,4 +1,4 @@
-"""A hostile peer in a fleet: wrong or missing answers, floods of names, a master that refuses; the robots keep working."""
+"""A hostile peer in a fleet: wrong or missing replies, floods of names, a master that rejects calls. The robots keep working."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_invalid_and_missing_answers_are_harmless(fleet: Fleet, handler: Any) ->
             fleet.call(lambda kind=kind: session.answer(f"{ROOT}/{kind}/{LIAR.gateway}/**", handler))
             for kind in ("ping", "status", "definition")
         ]
-        # Topics of the robot's type, so that the peer is queried for it first, and many more that it never describes.
+        # Topics with the robot's type, so that the peer is queried for it first, and many more that the peer never describes.
         token = TopicToken("liar", LIAR.gateway, "/things", "my_msgs/Thing", thing._md5sum, True, False)
         names = [token, *(token._replace(topic=f"/t{n}", md5sum=f"{n:032x}") for n in range(300))]
         for key in [claim_key(LIAR), *map(topic_key, names)]:
@@ -108,7 +108,7 @@ def test_a_query_that_ends_early_does_not_say_that_it_has_waited(fleet: Fleet) -
     serve_lamp(fleet, robot)
     control_room(fleet, control)
     gateway = robot.gateway("robot1")
-    # For a call that is cut by a broken link, Zenoh finishes the query without an answer, long before its timeout.
+    # If a broken link cuts off a call, Zenoh finishes the query without a reply, long before its timeout.
     match = "no answer: nobody answers there, or the link broke after"
     with stranger(fleet) as session, pytest.raises(QueryFailed, match=match):
         fleet.run(session.query(f"{ROOT}/call/robot1/{gateway.id}x/none", seconds=3600.0))
