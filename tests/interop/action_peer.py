@@ -126,7 +126,7 @@ def ask():
     state = client.send_goal_and_wait(
         numbered(3), rospy.Duration.from_sec(0.3), rospy.Duration.from_sec(SECONDS)
     )
-    # The state is RECALLED if the cancel request overtakes the goal, which uses another connection.
+    # The state is RECALLED if the cancel request, which uses another connection, overtakes the goal.
     say("out of time", NAMES[state] in ("PREEMPTED", "RECALLED"))
     state = client.send_goal_and_wait(numbered(2), rospy.Duration.from_sec(SECONDS))
     say("in time", NAMES[state])

@@ -1,4 +1,4 @@
-"""action_peer.py for asyncio programs: the same commands, with minirospy.ros.actionlib.actionlib.aio."""
+"""action_peer.py for asyncio programs: the same commands, implemented with minirospy.ros.actionlib.actionlib.aio."""
 
 import asyncio
 import itertools
@@ -53,7 +53,7 @@ async def ask(node):
 
     async def send(kind):
         number = next(tens) + kind
-        # Nothing that arrives during sending is lost.
+        # Nothing that arrives while the goal is being sent is lost.
         await node.set_param("/sent", number)
         return client.send(TestGoal(number))
 
@@ -97,7 +97,7 @@ async def ask(node):
     try:
         await goal
     except GoalError as error:
-        # The state is RECALLED if the cancel request overtakes the goal, which uses another connection.
+        # The state is RECALLED if the cancel request, which uses another connection, overtakes the goal.
         say("out of time", error.state.name in ("PREEMPTED", "RECALLED"))
     try:
         await (await send(2))

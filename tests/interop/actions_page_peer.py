@@ -1,4 +1,4 @@
-"""The action server /count on rospy or minirospy: each line on stdin lets the running goal take one step."""
+"""The action server /count on rospy or minirospy. Each line on stdin lets the running goal take one step."""
 
 import queue
 import sys

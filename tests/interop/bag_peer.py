@@ -1,4 +1,4 @@
-"""Write and read bags with Debian's rosbag or minirospy's, as the interpreter imports it.
+"""Write and read bags with Debian's rosbag or minirospy's, depending on the interpreter.
 
 Usage: bag_peer.py write|read|copy FOLDER.
 
@@ -44,7 +44,7 @@ def write(folder: Path) -> None:
                     bag.write(topic, message, genpy.Time(100 + number, number * 1000))
     rosbag.Bag(str(folder / "empty.bag"), "w").close()
 
-    # Messages out of order, and several with the same time.
+    # Write messages out of order, several of them with the same time.
     with rosbag.Bag(str(folder / "shuffled.bag"), "w", chunk_threshold=10_000_000) as bag:
         for number in range(100):
             bag.write(f"/t{number % 4}", Int32(number), genpy.Time(1 + number * 7 % 50, 0))

@@ -1,6 +1,6 @@
-"""One endpoint of a bond, minirospy's with our Python, Debian's with /usr/bin/python3.
+"""One endpoint of a bond; minirospy's runs with this Python, Debian's with /usr/bin/python3.
 
-Prints events; breaks the bond at "break".
+It prints events, and breaks the bond on the line "break".
 """
 
 import sys

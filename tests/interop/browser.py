@@ -1,4 +1,4 @@
-"""Drive Debian's chromium in tests by the DevTools protocol over its WebSocket: act as a user does, wait for visible results.
+"""Drive Debian's chromium in tests, through the DevTools protocol over its WebSocket: act like a user, wait for visible results.
 
 Source: https://chromedevtools.github.io/devtools-protocol.
 """
@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 CHROMIUM = shutil.which("chromium")
-PATIENCE = 200.0  # seconds to wait for a state; a loaded machine needs many of them
+PATIENCE = 200.0  # seconds to wait for a state; a loaded machine may need many
 
 _FLAGS = (
     "--headless=new",
@@ -118,7 +118,7 @@ class Page:
         self.wait("return document.readyState === 'complete'")
 
     def reload(self) -> None:
-        """Reload the page; return when the new page is loaded."""
+        """Reload the page; return once the new page is loaded."""
         self.evaluate("window.isLeftByTest = true")
         self.call("Page.reload")
         self.wait("return !window.isLeftByTest && document.readyState === 'complete'")
@@ -147,13 +147,13 @@ class Page:
             self.errors.append(params["entry"]["text"])
 
     def evaluate(self, script: str) -> Any:
-        """Return the value of an expression; await a promise."""
+        """Return the value of an expression; if it is a promise, await it."""
         result = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
     def wait(self, script: str) -> Any:
-        """Return the value of a function body once it is true, in this page or in a page that is loaded meanwhile."""
+        """Return the value of a function body once it is true, in this page or in one that is loaded in the meantime."""
         params = {
             "expression": _WAIT % (PATIENCE * 1000, script),
             "awaitPromise": True,
@@ -168,11 +168,11 @@ class Page:
         return answer["result"]["result"].get("value")
 
     def wait_text(self, find: str, text: str) -> str:
-        """Wait until a visible element has this text in it; return all of its text."""
+        """Wait until a visible element contains this text; return all of the element's text."""
         return str(self.wait(f"const e = {_finding(find, text)}; return e && e.textContent"))
 
     def click(self, find: str, text: str = "") -> None:
-        """Click the first visible element that has this text, once it exists, with mouse events.
+        """Click the first visible element that contains this text, once it exists, with mouse events.
 
         Repeat the click if the element moves away before the press, as a user would.
         """
@@ -181,13 +181,13 @@ class Page:
             self._arm(find, text)
             for kind in ("mousePressed", "mouseReleased"):
                 self._mouse(kind, find, text)
-            # A page that was just loaded has no record of the click that loaded it.
+            # A page that has just been loaded has no record of the click that loaded it.
             if self.evaluate("window.clickedByTest !== false"):
                 return
             assert time.monotonic() < end, f"the clicks do not reach {find} {text!r}"
 
     def press(self, find: str, text: str = "") -> None:
-        """Press the mouse button over an element and hold it; press again if the element has moved away."""
+        """Press the mouse button on an element and hold it; press again if the element has moved away."""
         end = time.monotonic() + PATIENCE
         while True:
             self._arm(find, text)
@@ -198,7 +198,7 @@ class Page:
             self._mouse("mouseReleased", find, text)
 
     def release(self, find: str, text: str = "") -> None:
-        """Release the mouse button over an element."""
+        """Release the mouse button on an element."""
         self._mouse("mouseReleased", find, text)
 
     def _arm(self, find: str, text: str) -> None:
@@ -212,7 +212,7 @@ class Page:
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
     def type(self, find: str, text: str) -> None:
-        """Replace the text of an input with key events."""
+        """Replace the text in an input, with key events."""
         self.wait(f"const e = {_finding(find)}; if (!e) return false; e.focus(); e.select(); return true")
         self.call("Input.insertText", text=text)
 

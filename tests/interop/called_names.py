@@ -1,4 +1,4 @@
-"""Call every callable name of the compatibility pages with no argument, None, wrong types and normal values.
+"""Call every callable name on the compatibility pages with no argument, None, wrong types and normal values.
 
 Runs under real ROS and under minirospy; test_interop_called_names.py compares the two. Stdin is JSON: ``names``, a list of
 [module, name or Class.member, parameters without default in real ROS]; ``left_out``, the calls that block; and
@@ -48,7 +48,7 @@ CHANGING = re.compile(
     r"|-\d+\.log\b|\d\d:\d\d:\d\d|[\d.]+ms\b"
     + rf"|(?<![\w.-])({'|'.join(map(re.escape, sorted(PATHS, key=len, reverse=True)))})\b[^ ,:;)\]'\"]*"
 )
-# Which of the two a wrong type raises depends on the operation that fails first.
+# A wrong type raises one or the other, depending on the operation that fails first.
 MIX_UP = (AttributeError, TypeError)
 
 AT_RANDOM = re.compile(
@@ -57,10 +57,10 @@ AT_RANDOM = re.compile(
 )
 """Names whose values differ between calls or machines, such as lists of installed packages."""
 
-# Standard library modules whose methods the classes inherit.
+# Standard library modules whose methods ROS's classes inherit.
 NOT_OF_ROS = ("http.server", "logging", "socketserver", "xmlrpc.server")
 
-# Parameter name -> expression of its normal value. A parameter that is not listed gets "/x".
+# Parameter names with expressions for their normal values. A parameter that is not listed gets "/x".
 NORMAL = {
     "a": "1.0", "addr": "'127.0.0.1'", "ai": "0.1", "aj": "0.2", "ak": "0.3", "angle": "0.5",
     "angles": "(0.1, 0.2, 0.3)", "arg": "'a:=b'", "args": "()", "argv": "['prog', 'a:=b', '__name:=n']",
@@ -144,7 +144,7 @@ NORMAL = {
     "visible": "True", "whitelist": "['/rosout']", "window_size": "5", "wrench": "PyKDL.Wrench()", "x": "0.3", "Z": "2.0",
 }  # fmt: skip
 
-# The same for the parameters of one module.
+# Normal values for the parameters of one module.
 NORMAL_OF = {
     "message_filters.f": "message_filters.SimpleFilter()", "message_filters.fs": "[message_filters.SimpleFilter()]",
     "tf.transformations.direction": "[1.0, 0.0, 0.0]", "tf.transformations.point": "[0.0, 0.0, 0.0]",
@@ -155,7 +155,7 @@ NORMAL_OF = {
     "rosmsg.type_": "'std_msgs/String'",
 }  # fmt: skip
 
-# Class -> expression that makes an object, if the constructor's normal case does not fit.
+# Classes with expressions that make an object, if the normal values do not suit the constructor.
 OBJECTS = {
     "rosbag.bag.Bag": "bag()", "rosbag.Bag": "bag()",
     "tf2_ros.buffer.Buffer": "tf2_ros.Buffer(debug=False)",
@@ -185,7 +185,7 @@ def bag():
 
 
 def rate():
-    """Return a Rate while the clock runs."""
+    """Return a Rate, after making the time available."""
     import rospy
 
     rospy.rostime.set_rostime_initialized(True)
@@ -256,14 +256,14 @@ def reconfigure_client():
 
     reconfigure_server()
     client = Client("/called", timeout=60)
-    # The values that arrive by topic are available after this call.
+    # The values that arrive on a topic are available after this call.
     client.get_configuration(60)
     client.get_group_descriptions(60)
     return client
 
 
 def generator():
-    """Return a configuration's generator, as catkin_make runs it."""
+    """Return a configuration's generator, as if catkin_make ran it."""
     from dynamic_reconfigure.parameter_generator_catkin import ParameterGenerator
 
     sys.argv = ["a.cfg", "share", "include", "docs", "lib"]
@@ -367,7 +367,7 @@ def shown(value, depth=0):
     if kind in ("Timer", "Thread", "UpdateContext", "EntryContext"):
         return f"an object {kind}"
     text = CHANGING.sub("#", repr(value))
-    if kind.startswith("float"):  # numpy's values, whose format differs between versions
+    if kind.startswith("float"):  # numpy's values, whose format differs between numpy versions
         return CHANGING.sub("#", repr(float(value)))
     if kind in ("str", "bytes", "int", "float", "bool", "NoneType"):
         return text[:300]
@@ -395,7 +395,7 @@ def outcome(function, arguments):
 
 
 def cases(module, required, has_optional):
-    """Return label -> the arguments of a call, as expressions."""
+    """Return the arguments of each call, as expressions, by label."""
     found = {"nothing": []}
     if required or has_optional:
         count = max(1, len(required))
@@ -406,12 +406,12 @@ def cases(module, required, has_optional):
 
 
 def normal(module, parameter):
-    """Return the expression of a parameter's normal value."""
+    """Return the expression for a parameter's normal value."""
     return NORMAL_OF.get(f"{module}.{parameter}") or NORMAL.get(parameter, "'/x'")
 
 
 def run(module, name, required, has_optional, todo, names, pipe):
-    """Make the calls of a name that are in ``todo``, and write one line for each."""
+    """Make those calls of a name that are in ``todo``, and write one line for each."""
     if not module.startswith("rospy"):
         # Most modules' objects need the time, which init_node initializes.
         names["rospy"].rostime.set_rostime_initialized(True)
@@ -435,7 +435,7 @@ def run(module, name, required, has_optional, todo, names, pipe):
 
 
 def made(module, owner, target, names):
-    """Return an object of a class, on which its members are called."""
+    """Return an object of a class, on which to call its members."""
     if not inspect.isclass(target):
         return target
     if f"{module}.{owner}" in OBJECTS:
@@ -487,7 +487,7 @@ def main():
 
 
 def forget(master, before, state):
-    """Unregister from the master all that killed children registered."""
+    """Unregister from the master everything that killed children have registered."""
     methods = (("unregisterPublisher", True), ("unregisterSubscriber", True), ("unregisterService", False))
     for (method, is_topic), old, new in zip(methods, before, state, strict=True):
         known = dict(old)

@@ -285,7 +285,7 @@ rosrun -h
 rosunit -h
 rosversion -h
 """
-"""minirospy prints ROS's help, then its own additions."""
+"""Commands for which minirospy prints ROS's help, followed by its own additions."""
 
 WRONG = f"""
 rostopic bw --nonsense
@@ -472,7 +472,7 @@ STREAMING = """
 3 rostopic pub -v -r 5 -s /out geometry_msgs/PointStamped '{header: auto}'
 4 rosnode ping scene
 """
-"""Each line has the number of output lines after which Ctrl-C is sent; numbers in the output are not compared."""
+"""Each line contains the number of output lines after which Ctrl-C is sent. Numbers in the output are not compared."""
 
 CHANGING = """
 rosparam set -v /q 5
@@ -561,7 +561,7 @@ rosparam load values.yaml
 """
 
 OTHER_WORDS = {"rostopic pub -1 -v /out geometry_msgs/Point 1 -2.5 -3"}
-"""Lines for which ROS prints an error that minirospy does not print first, because minirospy accepts them."""
+"""Lines for which ROS prints an error that minirospy does not print first, because minirospy accepts the arguments."""
 
 _ENDLESS = {
     """rostopic echo -n1 --filter "topic=='/poly'" /poly""",
@@ -590,7 +590,7 @@ _CHANGING = [
     (re.compile(r"(?<=package \[std_msgs\] in )\S*/"), "SHARE/"),
     (re.compile(r"(?<=on search path \[)\{.*?\}(?=\]$)", re.MULTILINE), "SHARE"),
     (re.compile(r"^(ROS path \[\d+\]=)\S+$", re.MULTILINE), r"\1SHARE"),
-    # roslaunch colours its errors also if they go to a file, and writes tracebacks that minirospy does not write.
+    # roslaunch colours its errors even in a file, and writes tracebacks, which minirospy does not.
     (re.compile(r"\033\[31m(.*?)\033\[0m", re.DOTALL), r"\1"),
     (re.compile(r"^The traceback for the exception was written to the log file\n", re.MULTILINE), ""),
 ]
@@ -614,14 +614,14 @@ class Row(NamedTuple):
 
     @property
     def equal(self) -> bool:
-        """Return whether stdout and exit status are equal; for help, whether minirospy's starts with ROS's."""
+        """Return whether stdout and exit status are equal; for help, whether minirospy's text starts with ROS's."""
         if self.typed.endswith(" -h") and self.real.out != self.ours.out:
             return self.real.status == self.ours.status and self.ours.out.startswith(self.real.out)
         return self.real[:2] == self.ours[:2]
 
     @property
     def has_ros_words(self) -> bool:
-        """Return whether ROS prints its own error message; tracebacks and warnings do not count."""
+        """Return whether ROS prints an error message, not counting tracebacks and warnings."""
         return bool(self.real.err.strip()) and not re.search("^(Traceback|WARNING)", self.real.err, re.M)
 
     @property
@@ -638,9 +638,9 @@ def compare(
     streaming: bool = False,
     prepare: Callable[[], object] | None = None,
 ) -> list[Row]:
-    """Run each line of ``text`` with both tools in parallel; with ``prepare``, run all lines with one tool, then with the other.
+    """Run each line of ``text`` with both tools in parallel.
 
-    ``prepare()`` is called before each of the two runs.
+    With ``prepare``, run all lines with one tool, then with the other, and call ``prepare()`` before each of the two runs.
     """
     lines = [line for line in text.strip().splitlines() if line]
     if prepare:
@@ -674,7 +674,7 @@ def compare(
 
 
 def unexpected(rows: Iterable[Row]) -> str:
-    """Return the rows that differ without a reason, or that have a reason and do not differ."""
+    """Return the rows that differ without a reason, and those that have a reason but do not differ."""
     return "\n".join(
         f"$ {row.typed}   ({row.why or 'no reason known'})\n--- real {row.real}\n--- ours {row.ours}"
         for row in rows
@@ -717,7 +717,7 @@ def page(sections: dict[str, list[Row]]) -> str:
 
 
 def verdicts(text: str) -> set[tuple[str, bool]]:
-    """Return the command lines of a page, each with whether the outputs are equal."""
+    """Return the command lines on a page, with whether the outputs are equal."""
     rows = re.findall(r"^\| `(.*)` \| .*? \| (equal|\*\*)", text, re.MULTILINE)
     return {(typed, verdict == "equal") for typed, verdict in rows}
 
@@ -782,7 +782,7 @@ def _run(line: str, tools: Path, uri: str, folder: Path, streaming: bool) -> End
         status = "never"
 
     if typed.startswith(("rosnode cleanup", "rosnode ping -a")):
-        # Real ROS lists nodes in the order of a set, which differs between runs.
+        # Real ROS lists nodes in arbitrary order.
         out = "".join(sorted(out.splitlines(keepends=True)))
         if "Usage: " not in err:
             err = "".join(sorted(err.splitlines(keepends=True)))
@@ -795,7 +795,7 @@ def _interrupted(program: subprocess.Popen[str], count: int) -> Ended:
     lines = "".join(_until_filled(program.stdout, count))
     program.send_signal(signal.SIGINT)
     _, err = program.communicate(timeout=PATIENCE)
-    # Numbers, their units and the column widths depend on the moment.
+    # Numbers, their units and the column widths vary between runs.
     text = re.sub(r"(?<=0)[KM]B", "B", _STREAM_NUMBERS.sub("0", lines))
     text = re.sub(r" {2,}", "  ", re.sub(r"={3,}", "===", text))
     return Ended(program.returncode, text, err)

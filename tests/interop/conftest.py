@@ -31,7 +31,7 @@ PATIENCE = 200.0  # seconds after which a program is considered hung: on a busy 
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    # Start the test that takes minutes first: the others run in parallel.
+    # Start the test that takes minutes first, so that the others run in parallel.
     items.sort(key=lambda item: item.name.partition("[")[0] != "test_the_table")
     for item in items:
         if HERE not in item.path.parents:
@@ -39,13 +39,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if not (REAL_BIN / "rosmaster").exists():
             item.add_marker(pytest.mark.skip(reason="real ROS 1 is not installed: make interop"))
         elif not item.get_closest_marker("timeout"):
-            # Longer than PATIENCE, whose error names the condition. The test may first run a compiler, in parallel
-            # with other tests.
+            # Use a longer timeout than PATIENCE, whose error names the condition. The test may first run a compiler,
+            # in parallel with other tests.
             item.add_marker(pytest.mark.timeout(3 * PATIENCE))
 
 
 def environment(uri: str, stack: str) -> dict[str, str]:
-    """Return the process environment for one of STACKS: each finds its own programs and modules first."""
+    """Return the process environment for one of STACKS, in which its own programs and modules are found first."""
     path = str(OUR_BIN) if stack == "ours" else str(REAL_BIN)
     return {**os.environ, "ROS_MASTER_URI": uri, "PATH": path + os.pathsep + os.environ["PATH"]}
 
@@ -57,7 +57,7 @@ def start(command: list[str], uri: str, stack: str, **kwargs: object) -> subproc
 
 
 def stop(program: subprocess.Popen[str]) -> None:
-    """Stop a program: close stdin, at which the peers exit, then send signals."""
+    """Stop a program: close stdin, which makes the peers exit, then send signals."""
     if program.stdin:
         program.stdin.close()
         with suppress(subprocess.TimeoutExpired):
@@ -76,7 +76,7 @@ def stop(program: subprocess.Popen[str]) -> None:
 
 
 def is_ready(master: subprocess.Popen[str], uri: str, stack: str) -> bool:
-    """Return whether this master answers, and not another test's, and a roscore's rosout node is registered."""
+    """Return whether this master, not another test's, responds, and a roscore's rosout node is registered."""
     try:
         with ServerProxy(uri) as proxy:
             pid: Any = proxy.getPid("/test")
@@ -87,7 +87,7 @@ def is_ready(master: subprocess.Popen[str], uri: str, stack: str) -> bool:
 
 
 def started_master(stack: str) -> tuple[subprocess.Popen[str], str]:
-    """Return a running master and its URI; or one that has exited because another process took its port."""
+    """Return a running master and its URI. If another process took its port, the master has exited."""
     port = free_port()
     uri = f"http://localhost:{port}"
     commands = {
@@ -108,7 +108,7 @@ def started_master(stack: str) -> tuple[subprocess.Popen[str], str]:
 
 
 def end_master(program: subprocess.Popen[str]) -> None:
-    # A master does not read its input.
+    # A master does not read stdin, so send a signal.
     program.terminate()
     stop(program)
 
@@ -155,7 +155,7 @@ def real_master() -> Iterator[str]:
 def compiled(source: str, factory: pytest.TempPathFactory, *libraries: str) -> Path:
     """Compile a C++ file of this folder with ``libraries`` (pkg-config names); return the program.
 
-    A compiler may take minutes on a busy machine: the first pytest worker compiles for all.
+    The compiler may take minutes on a busy machine, so the first pytest worker compiles for all.
     """
     import fcntl
 

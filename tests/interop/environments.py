@@ -1,4 +1,4 @@
-"""Virtual environments in build/ with third-party software from PyPI, for interop tests."""
+"""Virtual environments in build/ that contain third-party software from PyPI, for interop tests."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 
 @dataclass(frozen=True)
 class PeerEnvironment:
-    """A venv with packages. ``stamp`` is written when it is complete, and contains their versions."""
+    """A venv with packages. ``stamp`` is written when the venv is complete, and contains the packages' versions."""
 
     name: str
     packages: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""A TCP port that forwards to a bridge, which may be replaced: its clients reconnect to the same address."""
+"""A TCP port that forwards to a bridge, which may be replaced while its clients reconnect to the same address."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Gate", "serving"]
 
 
 class Gate:
-    """A port that stays open. ``target`` is the server's port, None while there is no server. Use it with ``async with``."""
+    """A port that stays open. ``target`` is the server's port, or None while there is no server. Use it with ``async with``."""
 
     def __init__(self) -> None:
         self.port = 0

@@ -31,7 +31,7 @@ LOADED = {}
 
 
 def compile_below(root, target):
-    """Compile all packages below ``root`` as catkin does: actions to messages, messages and services to modules."""
+    """Compile all packages below ``root`` as catkin does: actions to messages, and messages and services to modules."""
     search, sources = {}, {}
 
     for folder in sorted(root.iterdir()):
@@ -76,7 +76,7 @@ def load(name, kinds=("msg", "srv")):
 
 
 def element(type_, value):
-    """Return a field's value; return a value that is not a plain value of its type unchanged."""
+    """Return a field's value; return anything that is not a plain value of the type unchanged."""
     if type_ in TIMES and isinstance(value, tuple):
         made = TIMES[type_]()
         made.secs, made.nsecs = value
@@ -133,7 +133,7 @@ def describe(argument):
 
 
 def dynamic(argument):
-    """Make classes from a full definition text; return the properties of the type's class."""
+    """Make classes from a full definition text; return the properties of the class for the type."""
     name, text = argument
     made = genpy.dynamic.generate_dynamic(name, text)
     LOADED.update(made)
@@ -141,7 +141,10 @@ def dynamic(argument):
 
 
 def exchange(argument):
-    """Return a value's bytes; and, for other bytes, their serialized form after deserialization, and their text form."""
+    """Return the serialized bytes of a value.
+
+    For other bytes, return their bytes after deserializing and serializing, and their text.
+    """
     name, value, data = argument
     again = load(name)().deserialize(data)
     return packed(build(name, value)), packed(again), genpy.message.strify_message(again)

@@ -29,14 +29,14 @@ PYTHON, STAMP = PEER.python, PEER.stamp
 
 
 def main() -> int:
-    """Install; return 0 in any case, since the tests are skipped if the installation fails."""
+    """Install; always return 0, because the tests are skipped if the installation fails."""
     if PEER.is_complete:
         return 0
     if not PEER.create():
         print("ROS 2 cannot be installed from PyPI here: the bridge to it is not tested against it")
         return 0
 
-    # Put minirospy, its libraries and its own packages after the packages of ROS 2.
+    # Put minirospy, its libraries and its own packages behind ROS 2's packages.
     places = [sysconfig.get_path("purelib"), str(ROOT), str(ROOT / "minirospy" / "overlay")]
     site = next((PEER.folder / "lib").glob("python*/site-packages"))
     (site / "zz_minirospy.pth").write_text("".join(f"{place}\n" for place in places))

@@ -24,7 +24,7 @@ CACHE = PEER.folder / "cydr"
 
 
 def main() -> int:
-    """Install; return 0 in any case, since the tests are skipped if the installation fails."""
+    """Install; always return 0, because the tests are skipped if the installation fails."""
     if PEER.is_complete:
         return 0
     if not PEER.create():
@@ -32,7 +32,7 @@ def main() -> int:
             "pyzeros and zenoh-ros2-sdk cannot be installed here: the bridge over Zenoh is not tested against them"
         )
         return 0
-    # pyzeros compiles its attachments' serializer at first use, which takes minutes on a busy machine.
+    # pyzeros compiles its attachments' serializer on first use, which takes minutes on a busy machine.
     code = "from pyzeros.builtin_msgs import Attachment; Attachment().serialize()"
     environment = {**os.environ, "CYDR_CACHE_DIR": str(CACHE)}
     if subprocess.run(

@@ -1,6 +1,6 @@
-"""An interactive marker server, by Debian's interactive_markers or minirospy's, as the interpreter imports it.
+"""An interactive marker server, based on Debian's interactive_markers or minirospy's, depending on the interpreter.
 
-Prints each viewer event as JSON; commands on stdin: move NAME X Y, erase NAME, lose (an update), big, hostile.
+It prints each viewer event as JSON, and reads commands from stdin: move NAME X Y, erase NAME, lose (an update), big, hostile.
 """
 
 import json
@@ -78,7 +78,7 @@ def chosen(feedback):
         menu.setCheckState(checked, MenuHandler.CHECKED)
     menu.reApply(server)
     server.applyChanges()
-    # Print the event after its consequences are complete.
+    # Print the event after its effects are complete.
     said(feedback)
 
 

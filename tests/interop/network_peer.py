@@ -20,7 +20,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 SECONDS = 150
 
 if os.environ.get("TEST_KEEPALIVE"):
-    # Detect a pulled cable after seconds in place of a minute.
+    # Detect a pulled cable after seconds instead of a minute.
     from minirospy.runtime.transport import sockets
 
     sockets._KEEPALIVE.update(dict.fromkeys(sockets._KEEPALIVE, 1))

@@ -1,4 +1,4 @@
-"""Run a script with the page's pure modules under node, and return its result from JSON."""
+"""Run a script with the page's pure modules under node, and return its result, which is passed as JSON."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ KINDS = {"bool": Bool, "string": String, "scan": LaserScan, "image": Image}
 
 
 def digest(message):
-    """Return the length and CRC-32 of the message's bytes, without the sequence number, which the publisher sets."""
+    """Return the length and CRC-32 of the message's bytes, excluding the sequence number, which the publisher sets."""
     if hasattr(message, "header"):
         message.header.seq = 0
     buffer = BytesIO()
@@ -42,7 +42,7 @@ def digest(message):
 
 
 def say(*words):
-    """Print a line with a single write: callbacks of several topics run concurrently."""
+    """Print a line with a single write, because the callbacks of several topics run concurrently."""
     sys.stdout.write(" ".join(map(str, words)) + "\n")
     sys.stdout.flush()
 

@@ -1,4 +1,4 @@
-"""A robot in a room for the 3D view: its frames, description, sensors, map and plans, as latched messages."""
+"""A robot in a room, for tests of the 3D view: its frames, description, sensors, map and plans, as latched messages."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def frames() -> TFMessage:
 
 
 def scan() -> LaserScan:
-    """Return the scan of the room by a scanner at the frame laser."""
+    """Return the scanner's scan of the room, in the frame laser."""
     x, y, yaw = _laser()
     count = 540
     step = math.radians(0.5)
@@ -128,7 +128,7 @@ def _laser() -> tuple[float, float, float]:
 
 
 def cloud(points: Sequence[tuple[float, float, float]] | None = None, frame: str = "map") -> PointCloud2:
-    """Return a point cloud with x, y, z, intensity and rgb; without ``points``, a column in the corner of the room."""
+    """Return a point cloud with x, y, z, intensity and rgb. Without ``points``, it is a column in the corner of the room."""
     if points is None:
         points = [
             (-2.6 + 0.5 * math.cos(angle / 20), 2.4 + 0.5 * math.sin(angle / 20), height / 40)
@@ -233,7 +233,7 @@ def markers() -> MarkerArray:
 
 
 def others() -> dict[str, Any]:
-    """Return topic -> message for the remaining types."""
+    """Return the messages of the remaining types, by topic."""
     odometry = stamped(Odometry, "odom")
     odometry.pose.pose = pose(0.3, -0.5, 0.6)
     odometry.pose.covariance[0] = odometry.pose.covariance[7] = 0.04
@@ -263,7 +263,7 @@ def _wrench() -> Any:
 
 
 def everything() -> dict[str, Any]:
-    """Return topic -> message for all messages."""
+    """Return all messages by topic."""
     return {
         "/tf_static": frames(),
         "/scan": scan(),

@@ -69,7 +69,7 @@ def fields_of(message):
 
 
 def say(**fields):
-    # A single write, since two threads print.
+    # Use a single write, because two threads print.
     with SAYING:
         print(json.dumps(fields), flush=True)
 
@@ -92,15 +92,15 @@ class Peer:
         except ExternalShutdownException:
             pass
         except Exception:  # noqa: BLE001 - whatever rclpy raises
-            # Make a test that waits for a message fail now, not at its timeout.
+            # Make a test that is waiting for a message fail now, not at its timeout.
             traceback.print_exc()
             say(op="ended")
 
     def in_executor(self, work):
         """Run a function in the executor's thread and return its result.
 
-        Entities for which the executor waits are not added or removed meanwhile:
-        rclpy shows an action to the executor before it is complete, and destroys it while the executor uses it.
+        The entities for which the executor waits are then not added or removed at the same time. rclpy shows an action to
+        the executor before it is complete, and destroys it while the executor uses it.
         """
         done = concurrent.futures.Future()
 

@@ -1,4 +1,4 @@
-"""A roslibpy client: `roslibpy_peer.py PORT` performs the test's operations on the bridge, and prints the results as JSON.
+"""A roslibpy client. `roslibpy_peer.py PORT` performs the test's operations on the bridge, and prints the results as JSON.
 
 It prints a second line when the bridge has been replaced.
 """

@@ -53,7 +53,7 @@ for _a, _b, _c in ((0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)):
 
 
 def display(cls: str, topic: str = "", **settings: object) -> Settings:
-    """Return a display; settings that are not given keep each program's default."""
+    """Return a display. Settings that are not given keep each program's default."""
     key = {"Marker": "Marker Topic", "MarkerArray": "Marker Topic"}.get(cls, "Topic")
     found: Settings = {
         "Class": f"rviz/{cls}",
@@ -123,7 +123,10 @@ def _cells() -> GridCells:
 
 
 def depth_camera() -> dict[str, Any]:
-    """Return the messages of a depth camera at the frame lens: a wavy wall, a ball in front of it, and an area without depths."""
+    """Return a depth camera's messages in the frame lens.
+
+    They show a wavy wall, a ball in front of it, and an area without depths.
+    """
     width, height, focal = 80, 60, 70.0
     depths, colors = [], bytearray()
     for y in range(height):
@@ -149,16 +152,16 @@ def depth_camera() -> dict[str, Any]:
 
 
 def shapes() -> MarkerArray:
-    """Return one marker of each type, and a transparent one."""
+    """Return one marker of each type, and a transparent marker."""
     return MarkerArray(
         [*robot_scene.markers().markers, _two_point_arrow(), *_glass(), mesh(2.6, -3.2, "part.stl")]
     )
 
 
 def messages() -> dict[str, Any]:
-    """Return topic -> message for all messages."""
+    """Return all messages by topic."""
     found = robot_scene.everything()
-    # Larger than the values that RViz hides as too small.
+    # The torque must be larger than the values that RViz hides.
     found["/wrench"].wrench.torque.y = 0.5
     lens = robot_scene.transform("map", "lens", 0, 0, 1)
     lens.transform.rotation = Quaternion(-0.5, 0.5, -0.5, 0.5)
@@ -241,7 +244,7 @@ SCENES: dict[str, tuple[list[Settings], Settings]] = {
         orbit(2.6, x=1.5, z=1, yaw=-2.6, pitch=0.3),
     ),
 }
-"""Name -> displays, and the view."""
+"""Displays and view of each scene, by name."""
 
 
 def write_file(path: Path, scene: str) -> None:
@@ -376,7 +379,7 @@ def enlarge(page: Page) -> None:
 
 
 def prepare(folder: Path) -> None:
-    """Create the package that has the scenes' meshes."""
+    """Create the package that contains the scenes' meshes."""
     package = folder / "rviz_meshes"
     package.mkdir()
     (package / "package.xml").write_text(

@@ -80,7 +80,7 @@ rospy.set_param(
         "l": [1, "a: b", [2, 3]], "d": {"q": {"r": 1e-7}, "t": "yes"}, "big": 1e20,
     },
 )  # fmt: skip
-# The connections that the tools list: the node's own, and that of roscore's rosout node if it runs.
+# Wait for the connections that the tools list: the node's own, and that of roscore's rosout node, if it runs.
 wanted = {"/button_state", "/rosout"} & {topic for topic, _ in rosgraph.Master("/scene").getSystemState()[1]}
 while not wanted <= connected_topics():
     rospy.sleep(0.02)

@@ -1,4 +1,4 @@
-"""Action servers and clients of minirospy, actionlib in Python and actionlib in C++, in every combination."""
+"""Action servers and clients by minirospy, actionlib in Python and actionlib in C++, in every combination."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The view Actions in Debian's chromium, with action servers of minirospy and of Debian's actionlib."""
+"""The view Actions in Debian's chromium, with action servers by minirospy and by Debian's actionlib."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FIND = "tr[data-goal] "
 
 @pytest.fixture(params=["ours", "rospy"])
 def counter(request: pytest.FixtureRequest, serve: Callable[..., Served]) -> Iterator[Served]:
-    """Serve a page, and run the action server /count of either stack, which takes one step per line on stdin."""
+    """Serve a page, and run one stack's action server /count, which takes one step per line on stdin."""
     import sys
 
     served = serve()

@@ -57,7 +57,7 @@ def peer(any_master: str) -> Iterator[subprocess.Popen[str]]:
     assert program.stdout
     assert program.stdout.readline() == "ready\n"
     yield program
-    # Close stdin, at which the program exits.
+    # Close stdin, which makes the program exit.
     program.communicate(timeout=PATIENCE)
 
 

@@ -1,4 +1,4 @@
-"""Bonds between minirospy's bondpy, Debian's bondpy and bondcpp: formed, broken by one endpoint, and by killing an endpoint."""
+"""Bonds between minirospy's bondpy, Debian's bondpy and bondcpp are formed, and are broken by an endpoint or by killing one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def cpp_bond(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def end(master: str, request: pytest.FixtureRequest) -> Iterator[Start]:
-    """Return a function that starts a bond endpoint of a stack; stop the endpoints after the test."""
+    """Return a function that starts an endpoint of a bond with a stack; stop the endpoints after the test."""
     with ExitStack() as stack:
 
         def make(
@@ -53,7 +53,7 @@ def send(program: subprocess.Popen[str], word: str) -> None:
 
 
 def lines(program: subprocess.Popen[str], count: int) -> list[str]:
-    """Return the next lines, sorted: a callback and a waiting thread print in any order."""
+    """Return the next lines, sorted, because a callback and a waiting thread print in any order."""
     assert program.stdout
     return sorted(program.stdout.readline().strip() for _ in range(count))
 
@@ -71,7 +71,7 @@ def test_bond_broken_by_one_endpoint_breaks_at_the_other(one: str, other: str, e
 
 @pytest.mark.parametrize(("one", "other"), PAIRS)
 def test_bond_with_a_killed_end_breaks(one: str, other: str, end: Start) -> None:
-    # A live endpoint may stall for this long.
+    # A live endpoint may stall for up to this long.
     ends = end(one, heartbeat_timeout=10.0), end(other)
     assert [lines(each, 1) for each in ends] == [["formed"], ["formed"]]
     send(ends[0], "wait")

@@ -27,7 +27,7 @@ __all__ = ["modules"]
 
 DATA = bytes(range(256)) * 3600
 DIGEST = hashlib.sha1(DATA).hexdigest()
-SECONDS = 500  # limit of a scene: longer than the sum of its waits
+SECONDS = 500  # timeout of a scene, longer than the sum of its waits
 
 
 def transform(child: str, node: Node) -> TFMessage:
@@ -80,7 +80,7 @@ async def robot() -> AsyncIterator[Node]:
 
 
 async def call(node: Node, name: str) -> str:
-    """Return a service's response once it is registered: a client that offers a service is not notified when it is."""
+    """Return a service's response once it is registered. A client that offers a service is not notified of the registration."""
     await node.wait_for_service(name, PATIENCE)
     return str((await node.call(name, SetBool, True)).message)
 

@@ -1,7 +1,8 @@
-"""Compare calls of every callable name of the compatibility pages: no argument, None, wrong types, normal values.
+"""Compare calls of every callable name on the compatibility pages, with no argument, None, wrong types and normal values.
 
-called_names.json has the differences by reason: call -> [real, ours]; and the calls that block in both, which are not
-repeated. RECORD=1 rewrites it: a new difference gets the reason "", which fails until a reason is written.
+called_names.json contains the differences by reason, as dicts from call to [real, ours], and the calls that block in
+both, which are not repeated. RECORD=1 rewrites it. A new difference gets the reason "", which fails until a reason is
+written.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ sys.path.pop(0)
 
 
 def callable_names() -> list[list[object]]:
-    """Return [module, name or Class.member, its parameters without default, whether it has others] for the pages' names."""
+    """Return [module, name or Class.member, its parameters without default, whether it has others] for the names on the pages."""
     real, ours = (
         compare_surface.described_by(python) for python in (compare_surface.REAL_PYTHON, sys.executable)
     )
@@ -56,7 +57,7 @@ def outcomes(python: str, task: dict[str, object], master: str, folder: Path) ->
         **dict.fromkeys(("HOME", "ROS_HOME"), str(folder)),
         "ROS_MASTER_URI": master,
         "ROS_IP": "127.0.0.1",
-        # Real roslib needs both variables.
+        # Real roslib needs this variable and the next one.
         "ROS_ROOT": "/nowhere",
         "ROS_PACKAGE_PATH": "/nowhere",
     }
@@ -75,7 +76,7 @@ def outcomes(python: str, task: dict[str, object], master: str, folder: Path) ->
 
 
 def wait_for_rosout(*masters: str) -> None:
-    """Wait until each master's rosout node has registered everything: the calls' results include it."""
+    """Wait until each master's rosout node has registered everything, because the calls' results include it."""
     for uri in masters:
         with ServerProxy(uri) as master:
             wait_until(lambda master=master: master.lookupService("/t", "/rosout/set_logger_level")[0] == 1)  # type: ignore[misc]
@@ -86,7 +87,7 @@ def test_calls_have_the_recorded_outcomes(tmp_path: Path) -> None:
     record = json.loads(RECORD.read_text())
     names = callable_names()
     assert len(names) > 1100
-    # Calls that are known to block are left out; the others get as much time as a busy machine needs.
+    # Skip calls that are known to block; the others get as much time as a busy machine needs.
     task = {"names": names, "left_out": [] if RECORDS else record["waits"], "seconds": 4 if RECORDS else 60}
     with running_master("ours") as one, running_master("ours") as other, ThreadPoolExecutor(2) as pool:
         wait_for_rosout(one, other)

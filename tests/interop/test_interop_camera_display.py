@@ -24,7 +24,7 @@ from tests.web.dashboard.conftest import serve
 __all__ = ["browse", "serve"]
 
 WIDTH, HEIGHT = 160, 120
-FAR = 2.0  # metres from the camera to the front of the cube
+FAR = 2.0  # distance in metres from the camera to the front of the cube
 
 
 def camera_info(**fields: Any) -> CameraInfo:
@@ -57,7 +57,7 @@ def projected(info: CameraInfo, point: tuple[float, float, float], zoom: float =
     [
         [160, 0, 80, 0, 0, 160, 60, 0, 0, 0, 1, 0],
         [120, 0, 70, 0, 0, 200, 66, 0, 0, 0, 1, 0],
-        # The right camera of a stereo pair.
+        # This is the right camera of a stereo pair.
         [160, 0, 80, -16, 0, 160, 60, 8, 0, 0, 1, 0],
     ],
 )
@@ -93,7 +93,7 @@ def test_info_is_next_to_the_image() -> None:
 
 
 def scene() -> dict[str, Any]:
-    """Return a camera that looks along x, a red cube in front of it, and its image, which is blue."""
+    """Return a camera that looks along x, a red cube in front of it, and the camera's image, which is blue."""
     lens = robot_scene.transform("map", "lens", 0, 0, 1)
     lens.transform.rotation = Quaternion(-0.5, 0.5, -0.5, 0.5)
     cube = Marker(type=Marker.CUBE, scale=Vector3(1, 1, 1), color=ColorRGBA(1, 0, 0, 1))
@@ -108,7 +108,7 @@ def scene() -> dict[str, Any]:
 
 
 def color(page: Page, x: float, y: float) -> list[int]:
-    """Return the color of the camera's view at a position: 0 to 1 from left to right, and from top to bottom."""
+    """Return the color in the camera's view at a position, from 0 to 1 from left to right and from top to bottom."""
     found: list[int] = page.evaluate(
         "(() => { const c = document.querySelector('canvas.inset');"
         f"return [...c.getContext('2d').getImageData(c.width * {x}, c.height * {y}, 1, 1).data].slice(0, 3) }})()"
@@ -142,7 +142,8 @@ def test_scene_is_seen_through_the_camera(serve: Serve, browse: Callable[..., Pa
         "return at(0.1, 0.5)[0] > 60 && Math.abs(at(0.9, 0.25)[2] - 100) <= 3 && at(0.52, 0.6)[0] < 5"
     )
 
-    # The cube's front ends at the image's middle; it is a metre wide at two metres: 80 of 160 pixels.
+    # The cube's front ends at the middle of the image. It is a metre wide at a distance of two metres, so 80 of 160
+    # pixels.
     side, outside = color(page, 0.1, 0.5), color(page, 0.9, 0.25)
     assert side[0] > 60, side
     assert side[2] in range(40, 110), side
@@ -151,7 +152,7 @@ def test_scene_is_seen_through_the_camera(serve: Serve, browse: Callable[..., Pa
     assert color(page, 0.48, 0.6)[0] > 60
     assert color(page, 0.52, 0.6)[0] < 5
 
-    # Draw the picture opaque over the scene.
+    # Draw the picture opaquely over the scene.
     page.type("[data-name='Camera'] input[aria-label='Overlay Alpha']", "1")
     page.evaluate("document.activeElement.dispatchEvent(new Event('change'))")
     page.wait(

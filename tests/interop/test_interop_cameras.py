@@ -1,4 +1,4 @@
-"""Calibrations that minirospy writes equal those of the real convert; random cameras give the real model's numbers."""
+"""Calibrations written by minirospy equal those by the real convert; random cameras yield the same numbers as the real model."""
 
 from __future__ import annotations
 

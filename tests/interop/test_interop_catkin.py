@@ -1,4 +1,4 @@
-"""One tree of packages, built by real catkin_make and by minirospy's: equal modules, types and variables."""
+"""One tree of packages, built by real catkin_make and by minirospy's, with equal modules, types and variables."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from distutils.core import setup
 from catkin_pkg.python_setup import generate_distutils_setup
 setup(**generate_distutils_setup(packages=['wild', 'wild.deep'], package_dir={'': 'python'}, scripts=['bin/wild_tool']))
 """
-# Notations of CMakeLists.txt found in third-party packages.
+# Unusual notations in CMakeLists.txt, found in third-party packages.
 WILD = """catkin_python_setup()
 FILE(GLOB found RELATIVE "${${PROJECT_NAME}_SOURCE_DIR}/msg" msg/*.msg) # all of them
 list(REMOVE_ITEM found Left.msg)
@@ -87,8 +87,8 @@ endif()
 """
 TALK = "#!/usr/bin/env python3\nimport sys\nprint('talk', sys.argv[1:], __name__)\n"
 
-# As in ros_tutorials, common_tutorials and the workshop: messages, services, actions, Python, and all of them
-# together.
+# Packages like those in ros_tutorials, common_tutorials and the workshop: messages, services, actions, Python, and
+# all of them together.
 PACKAGES = {
     "beginner_tutorials": (
         ["std_msgs", "geometry_msgs"],
@@ -158,7 +158,7 @@ PACKAGES = {
     ),
 }  # fmt: skip
 
-# Real catkin finds these for the md5sum of a message that contains them, but generates no class; minirospy does.
+# Real catkin needs these for the md5sum of a message that contains them, but generates no class; minirospy does.
 UNLISTED = ("wild.msg.Left", "half_listed.msg.Unlisted")
 
 LOOK = """
@@ -208,7 +208,7 @@ def run(command: list[str], folder: Path, path: str) -> str:
         "PATH": path,
         "HOME": str(folder),
         "LANG": "C.UTF-8",
-        # Only Python is compared; genmsg runs these generators when catkin makes messages.
+        # Disable these generators, which genmsg runs when catkin makes messages, because only Python is compared.
         "ROS_LANG_DISABLE": "gencpp:genlisp",
         "ROS_VERSION": "1",
     }
@@ -221,7 +221,7 @@ def run(command: list[str], folder: Path, path: str) -> str:
 
 @pytest.fixture(scope="module")
 def trees(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Return the tree as built by real catkin_make, and as built by minirospy's."""
+    """Return the tree built by real catkin_make, and the tree built by minirospy's."""
     if not Path("/usr/bin/catkin_make").exists():
         pytest.fail("real catkin_make is not installed: tests/interop/install_ros.sh")
     real, ours = (tmp_path_factory.mktemp(name) for name in ("real", "ours"))
@@ -266,7 +266,7 @@ def files(folder: Path) -> dict[str, bool]:
         for path in sorted(folder.rglob("*"))
         if path.is_file()
         and not any(each in str(path) for each in NOT_COMPARED)
-        # Real catkin also keeps an action's messages as text.
+        # Real catkin also keeps an action's messages as .msg files.
         and not re.search(r"(Action|Goal|Result|Feedback)\.msg$", path.name)
     }
 
@@ -278,7 +278,7 @@ def test_devel_files_are_equal(trees: tuple[Path, Path]) -> None:
             {name: bit for name, bit in files(root / place).items() if "/" in name} for root in trees
         )
         stubs = {name for name in ours if name.endswith("/__init__.pyi")}
-        # minirospy adds stubs for editors; a test of messages covers them.
+        # minirospy also generates stubs for editors, which a test of messages covers.
         assert stubs
         modules = {"lib/python3/dist-packages/{}/{}/_{}.py".format(*name.split(".")) for name in UNLISTED}
         assert modules <= ours.keys()
@@ -298,7 +298,7 @@ def test_programs_are_on_path_in_devel_and_install(trees: tuple[Path, Path]) -> 
 
 @pytest.mark.timeout(1200)
 def test_real_python_imports_our_generated_modules(trees: tuple[Path, Path]) -> None:
-    """minirospy's modules need only genpy: real ROS imports them too, and serializes the same bytes."""
+    """minirospy's modules need only genpy, so real ROS can import them, too, and serializes the same bytes."""
     code = (
         "from io import BytesIO; from beginner_tutorials.msg import Person, Num; b = BytesIO()\n"
         "Person(name='x', nums=[Num(1)]).serialize(b); print(b.getvalue().hex(), Person().deserialize(b.getvalue()).nums)"
@@ -312,7 +312,7 @@ def test_real_python_imports_our_generated_modules(trees: tuple[Path, Path]) -> 
 
 @pytest.mark.timeout(1200)
 def test_setup_variables_are_equal(trees: tuple[Path, Path]) -> None:
-    """minirospy's own packages come last, in the place of /opt/ros or /usr in real ROS."""
+    """minirospy's own packages are last, in the place of /opt/ros or /usr in real ROS."""
     script = ". '{}/devel/setup.bash'; echo $CMAKE_PREFIX_PATH; echo $PYTHONPATH; echo $ROS_PACKAGE_PATH"
     said = []
     for root, path in zip(trees, ("", f"{BIN}:"), strict=True):

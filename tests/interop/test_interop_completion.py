@@ -1,4 +1,4 @@
-"""TAB completion compared with rosbash's: on the same graph and packages, minirospy offers everything that rosbash offers."""
+"""TAB completion compared with rosbash's. On the same graph and packages, minirospy offers everything that rosbash offers."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def uri(workspace: None) -> Iterator[str]:
 
 
 def offered(functions: Path, uri: str, stack: str) -> dict[str, list[str]]:
-    """Return line -> the completions that bash gets for TAB at its end."""
+    """Return the completions that bash receives for TAB at the end of each line, by line."""
     script = [f". {functions}"]
 
     for line in _LINES:
@@ -104,7 +104,7 @@ def offered(functions: Path, uri: str, stack: str) -> dict[str, list[str]]:
 def covers(ours: str, real: str) -> bool:
     """Return whether minirospy's candidate equals the real one or is its prefix.
 
-    minirospy quotes, adds :=, completes types in two steps.
+    minirospy quotes candidates, adds :=, and completes types in two steps.
     """
     ours = ours.replace("\\ ", " ")
     return ours == real or (ours.endswith("/") and real.startswith(ours)) or ours == f"{real}:="
@@ -116,7 +116,7 @@ def test_completion_offers_the_words_of_rosbash(uri: str) -> None:
     ours: dict[str, list[str]] = {line: [] for line in _LINES}
     missing: dict[str, list[str]] = {}
     for _ in range(5):
-        # TAB gives up if the graph does not answer within a second; a user presses it again.
+        # Repeat: TAB gives up if the graph does not respond within a second, and a user would press it again.
         ours = {line: ours[line] + found for line, found in offered(_OURS, uri, "ours").items()}
         missing = {
             line: lost

@@ -1,4 +1,4 @@
-"""The dashboard in Debian's chromium, operated as by a user; and the page's codec under node."""
+"""The dashboard in Debian's chromium, operated as by a user, and the page's codec under node."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def browse() -> Iterator[Callable[..., Page]]:
     yield browsing
     errors = []
     for page in opened:
-        page.evaluate("1")  # errors that it logged before have arrived by then
+        page.evaluate("1")  # after this call, errors logged before it have arrived
         errors += [each for each in page.errors if "WebSocket connection" not in each]
         page.close()
     assert errors == []
@@ -315,7 +315,7 @@ def test_console_holds_many_lines_with_few_elements(
     page.wait_text(".bar", "1 of 1 lines")
     for first in range(0, 20_000, 2000):
         log(*((2, "/many", f"line {number}") for number in range(first, first + 2000)))
-        # Publish in parts: a browser that is slower than this test would drop lines, as intended.
+        # Publish in parts, because a browser that is slower than this test would drop lines, as intended.
         page.wait_text(".bar", f"{first + 2001} of {first + 2001} lines")
     page.wait_text(".line .text", "line 19999")
     assert page.evaluate("document.querySelectorAll('.line').length") < 100
@@ -370,7 +370,7 @@ def test_console_keeps_long_texts_in_their_rows(
     widths = "['.bar select', '.bar'].map(find => document.querySelector(find).getBoundingClientRect().width)"
     select, bar = page.evaluate(widths)
     assert select < bar / 2
-    # The view follows the newest line even if the list shrinks before its scroll event arrives.
+    # The view must follow the newest line even if the list shrinks before its scroll event arrives.
     for number in range(60):
         served.run(log.publish(Log(level=2, name="/n", msg=f"line {number}")))
     page.wait_text(".line .text", "line 59")
@@ -543,7 +543,7 @@ def test_graph_shows_nodes_and_topics_and_their_details(
     page.wait_text(".node text", "/listener")
     page.wait("return document.querySelectorAll('.edge').length === 2")
     page.click(".graph .topic", "/chatter")
-    # The view subscribes to a selected topic: its list changes once.
+    # The view subscribes to a selected topic, so its list changes once.
     page.wait_text(".side", "std_msgs/String")
     page.wait_text(".side button", "/dashboard")
     page.evaluate("[...document.querySelectorAll('.side button')].forEach(button => button.isOld = true)")
@@ -587,7 +587,7 @@ def test_board_lights_and_is_pressed(serve: Callable[..., Served], browse: Calla
         page.wait_text(".panel", "0.60 m ahead")
         board.move_person((0.3, 0.0))
         page.wait_text(".panel", "in the protective field")
-        # The field names are readable in front of the person, who can still be dragged.
+        # The field names can be read in front of the person, who can still be dragged.
         for name in ("warning field", "protective field"):
             label = f"[...document.querySelectorAll('.room text')].find(e => e.textContent === '{name}')"
             assert page.evaluate(
@@ -718,7 +718,7 @@ def test_topic_without_publisher_is_published(
     page.wait_text("p[role=status]", "1 published")
     assert page.evaluate("document.querySelector('input[name=x]').value") == "2"
 
-    # A new name and type.
+    # Enter a new name and type.
     page.choose("select[aria-label=Topic]", "new")
     page.type("input[aria-label='Name of the new topic']", "greeting")
     page.type("input[aria-label='Its type']", "std_msgs/Strin")
@@ -811,7 +811,7 @@ def test_turtles_are_drawn_with_their_trails_and_come_and_go(
     page.wait_text("[data-name='/leo']", "x 2 y 2")
     page.click("button", "Spawn")
     page.wait_text(".error", "leo")
-    # A circle, which ends where it started.
+    # Drive in a circle, which ends where it started.
     twist = Twist()
     twist.linear.x, twist.angular.z = 1.0, 2.0
     with repeated(served, publisher(served, "/turtle1/cmd_vel", Twist), twist):
@@ -827,7 +827,7 @@ def test_turtles_are_drawn_with_their_trails_and_come_and_go(
 
 
 def listener(served: Served, topic: str, name: str = "robot") -> Callable[[Callable[[Twist], bool]], None]:
-    """Return a function that waits for a message of a topic that fulfils a condition."""
+    """Return a function that waits for a message on a topic that meets a condition."""
     robot = served.node(name)
 
     async def listen() -> Any:
@@ -967,7 +967,7 @@ def test_diagnostics_are_a_tree_with_levels_and_values(
     page.wait_text(".empty", "Nothing has come on /diagnostics.")
     row = "[data-path='/Robot{}']"
     with repeated(served, publisher(served, "/diagnostics_agg", type(message)), message):
-        # A group whose items are not reported takes the worst level of its children.
+        # The level of a group whose items are not reported is the worst level of its children.
         page.wait_text(row.format("/Drive") + " .badge", "Error")
         page.wait_text(row.format("/Scan") + " .badge", "OK")
         page.click(row.format("/Drive/left") + " .report")
@@ -1039,7 +1039,7 @@ def test_hostile_names_of_nodes_and_frames_are_text(
     served.run(publisher(served, "/diagnostics", type(message), latch=True).publish(message))
     served.run(served.node("setter").set_param("/hostile", HOSTILE))
     page = browse(address(served, view))
-    if view == "topics":  # images are subscribed to when they are opened
+    if view == "topics":  # images are only subscribed to once they are opened
         page.click("button.topic", "/hostile/image")
         page.wait_text(".row[data-topic='/hostile/image'] .fields", HOSTILE)
     elif view == "parameters":
@@ -1073,12 +1073,12 @@ def test_hostile_names_in_the_graph_are_text(
 
 
 def saved(page: Page, folder: Path, name: str, button: str) -> bytes:
-    """Click a button; return the file that the browser saves."""
+    """Click a button; return the contents of the file that the browser saves."""
     page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
     page.click("button", button)
     end = time.monotonic() + PATIENCE
     file = folder / name
-    # The browser writes to a temporary name first, and may create this one empty.
+    # The browser writes to a temporary name first, and may create this file empty.
     while not file.exists() or not file.stat().st_size or any(folder.glob("*.crdownload")):
         assert time.monotonic() < end, f"{name} is not saved"
         page.evaluate("new Promise(resolve => setTimeout(resolve, 30))")
@@ -1101,7 +1101,7 @@ def test_csv_and_png_of_a_plot_are_saved(
     assert head.replace('"', "").split(",") == ["time", "/odometry/x", "/odometry/y"]
     assert first.split(",")[1:] == ["1.5", "0"]
     page.wait("return document.querySelector('.chart canvas').width > 300")
-    # The picture also names a computed series.
+    # The picture also labels a computed series.
     page.choose(".series[data-label='/odometry/x'] select", "derivative")
     page.evaluate(
         """{ window.drawn = []; const draw = CanvasRenderingContext2D.prototype.fillText;
@@ -1143,7 +1143,7 @@ def test_csv_of_the_console_is_saved(
             "mono8",
             [(0, 0, 0), (10, 10, 10), (200, 200, 200), (255, 255, 255)],
         ),
-        # One red, two green, one blue: missing colors of a pixel come from its neighbors.
+        # One red, two green and one blue pixel: a pixel's missing colors are taken from its neighbors.
         ("bayer_rggb8", bytes((200, 100, 50, 30)), "bayer_rggb8", [(200, 75, 30)] + 3 * [None]),
         ("bayer_bggr8", bytes((200, 100, 50, 30)), "bayer_bggr8", [(30, 75, 200)] + 3 * [None]),
         (
@@ -1214,7 +1214,7 @@ def test_image_is_zoomed_and_its_depths_are_scaled(
     page.wait_text(".status", "(3, 0): 1000")
     page.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-800)
     page.wait(f"return document.querySelector('canvas').getBoundingClientRect().width > {wide} * 2")
-    # The object under the mouse is shown again.
+    # Moving the mouse shows the object under it again.
     page.call("Input.dispatchMouseEvent", type="mouseMoved", x=x + 1, y=y)
     page.wait_text(".status", "(3, 0): 1000")
     assert page.evaluate("document.querySelector('.frame').scrollLeft") > 0

@@ -31,7 +31,7 @@ Serve = Callable[..., Served]
 
 
 def publish(served: Served, messages: dict[str, Any]) -> Callable[[str, Any], None]:
-    """Publish latched messages, topic -> message; return a function that publishes more."""
+    """Publish latched messages, given by topic; return a function that publishes more."""
     node = served.node("robot")
     publishers: dict[str, Any] = {}
 
@@ -49,7 +49,7 @@ def publish(served: Served, messages: dict[str, Any]) -> Callable[[str, Any], No
 
 
 class Listener:
-    """A subscriber of a topic."""
+    """A subscriber to a topic."""
 
     def __init__(self, served: Served, topic: str, cls: type) -> None:
         node = served.node("listener" + topic.replace("/", "_"))
@@ -83,7 +83,7 @@ def status(page: Page, name: str, text: str) -> None:
 
 
 def levels(page: Page) -> dict[str, str]:
-    """Return display name -> level."""
+    """Return the displays' levels by name."""
     found = page.evaluate(
         "Object.fromEntries([...document.querySelectorAll('.displays .display')].map(e => [e.dataset.name, e.dataset.level]))"
     )
@@ -166,7 +166,7 @@ def test_robot_in_its_room_is_shown_without_a_click(serve: Serve, browse: Browse
     )
     assert {"map", "odom", "base_link", "laser", "dock"} <= set(labels)
     assert "map: OK" in page.wait_text(".scene-side", "OK")
-    # The background, the map's free cells below the grid, the cloud, the path.
+    # The colors of the background, of the map's free cells below the grid, and of the cloud and the path.
     for wanted in ((48, 48, 48), (197, 197, 197), (25, 255, 0)):
         wait_color(page, wanted, 16)
 
@@ -360,7 +360,7 @@ def test_robot_has_its_meshes_and_follows_its_joints_without_transforms(
 
 
 def wait_hue(page: Page, wanted: tuple[bool, bool, bool]) -> None:
-    """Wait until the picture has a color with these red, green and blue components, for any lighting."""
+    """Wait until the picture has a color with these red, green and blue components, regardless of lighting."""
     end = time.monotonic() + PATIENCE
     while not any(
         all(part > 150 if is_lit else part < 60 for part, is_lit in zip(color, wanted, strict=True))
@@ -407,7 +407,7 @@ def test_collada_meshes_have_their_colors_and_unit(
     status(page, "Marker /shape", "1 markers")
     metre = look_down(page)
     wait_hue(page, (False, True, True))
-    # The click points two metres to the side, and half a metre above the marker.
+    # The click is two metres to the side of the marker, and half a metre above it.
     page.click(".tools button", "Focus")
     drag(page, (-0.7 * metre, 0), (-0.7 * metre, 0))
     page.wait_text("[role=status]", "(-0.70, 0.00, 0.70)")

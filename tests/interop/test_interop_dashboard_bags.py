@@ -91,7 +91,7 @@ def test_bag_is_played_moved_through_and_published(
     page.wait("return document.querySelector(\".card[data-topic='/camera'] canvas\").width === 40")
     page.wait_text(".now", "0:00.000 / 0:19.900")
 
-    # Click on the timeline, step by button and by key, and back.
+    # Click on the timeline, and step by button and by key, and back.
     page.click("canvas.bag-rows")
     number = int(
         page.wait(
@@ -117,7 +117,7 @@ def test_bag_is_played_moved_through_and_published(
     page.call("Input.dispatchKeyEvent", type="keyDown", key="ArrowRight")
     page.wait_text(".card[data-topic='/chatter']", f"{HOSTILE}message 2")
 
-    # Play without publishing, then with it.
+    # Play first without publishing, then with it.
     page.evaluate(
         "const s = document.querySelector('input[aria-label=Speed]'); s.value = '1'; s.dispatchEvent(new Event('change'))"
     )

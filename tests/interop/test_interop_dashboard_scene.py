@@ -1,4 +1,4 @@
-"""The pure parts of the 3D view under node: frames compared with tf2, robots with core/urdf, clouds, .rviz files."""
+"""The pure parts of the 3D view under node: frames (compared with tf2), robots (compared with core/urdf), clouds, .rviz files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STILL = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
 
 
 def run(*calls: dict[str, Any]) -> list[Any]:
-    """Return the results of the page's modules: values, or error texts."""
+    """Return the results of calls to the page's modules: values, or error texts."""
     done = subprocess.run(
         ["node", str(FOREIGN / "scene.mjs")],
         input="".join(json.dumps(call) + "\n" for call in calls),
@@ -99,7 +99,7 @@ def test_lookups_agree_with_tf2() -> None:
         try:
             wanted = buffer.lookup(target, source, round(time * SECOND))
         except ExtrapolationException:
-            # If there are several faults, tf2 reports the first on the path towards the root.
+            # If there are several faults, tf2 reports the first one on the path towards the root.
             assert found["kind"] in ("future", "past", "unconnected")
             seen.add(found["kind"])
         except ConnectivityException:

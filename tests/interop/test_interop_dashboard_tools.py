@@ -57,7 +57,7 @@ def test_launch_file_is_started_watched_and_stopped(
     page.wait_text(".launch-arg", "what is printed")
     page.type(".launch-arg input[name='word']", "good day")
     page.type(".launch-arg input[name='needed']", "yes")
-    # The script dispatches the event that a user's keys would cause.
+    # The script dispatches the event that the user's keys would cause.
     page.evaluate("document.querySelector('.launch-form').dispatchEvent(new Event('input'))")
     page.wait_text(".launch-form code", "roslaunch lamp lamp.launch word:='good day' needed:=yes")
     page.click(".launch-form button", "Start")
@@ -185,7 +185,7 @@ def test_states_are_drawn_with_the_active_ones_and_their_userdata(
         page.wait(
             f"return [...document.querySelectorAll('.smach-title')].some(e => e.textContent === {path})"
         )
-    # A transition from a state to itself starts and ends at its right side.
+    # A transition from a state to itself starts and ends at the state's right side.
     at = page.evaluate(
         """{
         const edge = [...document.querySelectorAll('.edge')].find(e => e.lastChild.textContent === 'again');
@@ -290,7 +290,7 @@ for (const line of {json.dumps(lines)}) {{
 
 @needs_node
 def test_integer_of_userdata_that_is_very_long_is_only_named() -> None:
-    # All its bytes would keep the page busy for minutes.
+    # Decoding all its bytes would keep the page busy for minutes.
     body = """
         const bytes = new Uint8Array(1_000_008).fill(255);
         bytes.set([0x80, 2, 0x8b, 0x40, 0x42, 0x0f, 0]);

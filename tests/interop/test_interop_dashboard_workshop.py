@@ -32,7 +32,7 @@ with open({links!r}, "a") as file:
 
 
 def commands() -> list[str]:
-    """Return the commands of the chapter."""
+    """Return the commands in the chapter."""
     chapter = DOCS.read_text(encoding="utf-8").partition("## The workshop's chapter on visualization\n")[2]
     return re.findall(r"^    \$ (.+)$", chapter.partition("\n## ")[0], re.MULTILINE)
 
@@ -136,7 +136,7 @@ def test_chapter_on_visualization_shows_the_pressed_button(student: Student) -> 
 
     is_shown = "document.querySelector('main').textContent.includes('The chapter ends')"
     while not lines.evaluate(is_shown):
-        # It publishes for three seconds, within which roscore may not be connected.
+        # Repeat, because the command publishes for only three seconds, within which roscore may not connect.
         student.type(
             "rostopic pub -1 /rosout rosgraph_msgs/Log '{level: 4, name: /student, msg: The chapter ends}'"
         ).wait()

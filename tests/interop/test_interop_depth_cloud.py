@@ -1,4 +1,4 @@
-"""The display DepthCloud of the 3D view: a depth image as colored points at the positions that image_geometry computes."""
+"""The display DepthCloud in the 3D view: a depth image as colored points at the positions that image_geometry computes."""
 
 from __future__ import annotations
 
@@ -162,7 +162,7 @@ def test_depth_image_is_seen_as_points(serve: Serve, browse: Callable[..., Page]
     status(page, "DepthCloud", "No image received on [/color/image]")
     send("/color/image", red)
     status(page, "DepthCloud", f"Showing {count} points from 4800")
-    # A picture of another size, with the next stamp; either message may arrive first.
+    # Use a picture of another size with the next stamp; either message may arrive first.
     red.height //= 2
     for topic, message in (("/color/image", red), ("/depth/image", scene["/depth/image"])):
         message.header.stamp = Time(101, 0)

@@ -1,4 +1,4 @@
-"""diagnostic_aggregator: Debian's programs publish the recordings of tests/ros/packages/aggregator; bonds between both stacks."""
+"""diagnostic_aggregator: Debian's programs publish the recordings in tests/ros/packages/aggregator; bonds connect both stacks."""
 
 from __future__ import annotations
 

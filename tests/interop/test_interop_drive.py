@@ -31,7 +31,7 @@ def test_gamepad_has_the_order_and_signs_of_joy_node() -> None:
     pad = json.loads(json.dumps(PAD))
     for index in (0, 9, 12, 15):  # A, start, up, right
         pad["buttons"][index]["pressed"] = True
-    pad["buttons"][7]["value"] = 1  # the right trigger
+    pad["buttons"][7]["value"] = 1  # right trigger
     found = run_script("joyOf", "js/joy.js", f"return joyOf({json.dumps(pad)})")
     assert found == {
         "axes": [0, 1, 1, -0.5, 0, -1, -1, 1],
@@ -42,12 +42,12 @@ def test_gamepad_has_the_order_and_signs_of_joy_node() -> None:
 
 
 def hold_forward(served: Served, browse: Callable[..., Page]) -> tuple[Page, Callable[..., Any]]:
-    """Return a page that drives forward, and a function that waits for messages."""
+    """Return a page on which the robot drives forward, and a function that waits for messages."""
     until = listen(served)
     page = browse(address(served, "teleop"))
     page.wait_text("#state", "connected")
     page.wait_text("p[role=status]", "stopped")
-    # The browser repeats a key that is held; the view tracks held keys itself.
+    # The browser repeats a key that is held down, but the view tracks held keys itself.
     press(page, "rawKeyDown", "ArrowUp")
     until(lambda twist: twist.linear.x == 0.5)
     return page, until
@@ -108,6 +108,6 @@ def test_gamepad_is_published_as_joy(serve: Callable[..., Served], browse: Calla
     until(lambda joy: list(joy.axes) == [0, 1, 1, -0.5, 0, 1, 0, 0])
     page.evaluate("pad.buttons[0].pressed = true")
     until(lambda joy: joy.buttons[0] == 1)
-    # The remaining values are published when the view is closed.
+    # The pending values are published when the view is closed.
     page.evaluate("location.hash = '#/topics'")
     until(lambda joy: not any(joy.axes) and not any(joy.buttons))

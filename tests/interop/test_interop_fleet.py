@@ -1,4 +1,4 @@
-"""A fleet with real ROS 1: its masters, nodes and commands on both sides; and a slow link between namespaces, which is cut."""
+"""A fleet with real ROS 1 masters, nodes and commands on both sides, and a slow link between network namespaces, which is cut."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_real_nodes_and_commands_on_both_sides(running: ExitStack) -> None:
     while "rosout" not in (answer := call()):
         assert time.monotonic() < end, answer
 
-    # The reverse direction: a command in the control room for a node of the robot.
+    # Test the reverse direction: a command in the control room for one of the robot's nodes.
     listener = (
         "import rospy; from std_msgs.msg import Int32; rospy.init_node('listener'); "
         "print(rospy.wait_for_message('/order', Int32))"
@@ -119,7 +119,7 @@ class Peer:
         self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
     def until(self, condition: Callable[[Any], Any]) -> Any:
-        """Return the first observation that fulfils a condition."""
+        """Return the first observation that meets a condition."""
         assert self._process.stdout
         end = time.monotonic() + PATIENCE
         while True:

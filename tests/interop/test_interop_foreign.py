@@ -1,6 +1,6 @@
 """Third-party ROS 1 clients from npm, rosnodejs and @foxglove/ros1, with minirospy's master and nodes, in both directions.
 
-They are installed once, into the user's cache folder.
+The clients are installed once, into the user's cache folder.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Peer:
 
     @classmethod
     async def start(cls, modules: Path, script: str, **variables: str) -> Peer:
-        """Start ``script`` of the folder foreign."""
+        """Start ``script`` from the folder foreign."""
         # Node looks for a module next to its script's real path, then in NODE_PATH.
         environ = {**os.environ, "NODE_PATH": str(modules), "ROS_PACKAGE_PATH": str(MSGS), **variables}
         environ.setdefault("CMAKE_PREFIX_PATH", str(MSGS))  # rosnodejs needs the variable, with any value
@@ -88,7 +88,7 @@ class Peer:
         return (await asyncio.wait_for(self._process.stdout.readline(), PATIENCE)).decode().rstrip()
 
     async def says(self, what: str) -> Any:
-        """Return the value that it prints, now or earlier, for the key ``what``."""
+        """Return the value that the program prints for the key ``what``, now or earlier."""
         while not self.said.get(what):
             line = await self.line()
             assert line, f"it ended without {what}: {self.said}"
@@ -233,7 +233,7 @@ def test_our_nodes_use_the_master_of_foxglove(modules: Path) -> None:
                 await node.serve("/ours/flag", SetBool, set_flag)
                 assert (await others.call("/ours/flag", SetBool, data=True)).success
                 assert await others.get_param("/ours/param/list") == [1, "two", 3.5]
-                # The client has no getPid, with which rospy's init_node checks the master.
+                # The client has no getPid, which rospy's init_node calls to check the master.
                 words = [
                     sys.executable,
                     "-c",

@@ -80,7 +80,7 @@ def sdk() -> Iterator[Callable[..., Any]]:
 
 
 def test_frames_have_the_form_of_those_of_the_sdk(bridge: Running, sdk: Callable[..., Any]) -> None:
-    """For the same topic, both servers send fields of the same names and types, and binary messages with the same header."""
+    """For the same topic, both servers send fields with the same names and types, and binary messages with the same header."""
     import foxglove
 
     context = foxglove.Context()
@@ -103,7 +103,7 @@ def test_frames_have_the_form_of_those_of_the_sdk(bridge: Running, sdk: Callable
     bridge.run(publisher.publish("hi"))
     frames = [ours.next_binary(1)]
     while len(frames) < 2:
-        # Repeat until the subscription has arrived at the server.
+        # Repeat until the subscription has reached the server.
         channel.log(body, log_time=7)
         try:
             theirs.socket.socket.settimeout(1.0)

@@ -55,7 +55,7 @@ def transforms(*pairs: tuple[str, str]) -> Any:
 
 
 def again(served: Served) -> Any:
-    """Return another node's publisher of /tf."""
+    """Return a publisher of /tf that belongs to another node."""
     node = served.node("another")
 
     async def advertise() -> Any:

@@ -1,4 +1,4 @@
-"""The view Graph in Debian's chromium: traffic, dead nodes, mismatched types, folded actions; pure parts under node."""
+"""The view Graph in Debian's chromium: traffic, dead nodes, mismatched types and folded actions; its pure parts under node."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PARTS = ("goal", "cancel", "status", "feedback", "result")
 
 
 def table(**rows: list[str]) -> dict[str, object]:
-    """Return a Map: name below / -> its nodes."""
+    """Return a JavaScript Map from each name, below /, to its nodes."""
     return {"map": [["/" + name.replace("__", "/"), nodes] for name, nodes in rows.items()]}
 
 
@@ -142,7 +142,7 @@ def test_parts_that_are_not_connected_fill_a_narrow_view_in_rows(
         ".map(({x, y}) => [x, y])"
     )
     assert [len({each[axis] for each in places}) for axis in (0, 1)] == [2, 2]
-    # Nodes that share only their namespace form one component, too.
+    # Nodes that share only their namespace also form one component.
     page.click("label", "namespaces")
     page.wait("return document.querySelectorAll('.graph .namespace').length === 4")
     for key in ("n/part3/node2", "t/part0/topic1"):
@@ -197,7 +197,7 @@ def test_traffic_and_faults_are_shown_without_subscribing(
 
 
 def register_dead(name: str, topic: str) -> None:
-    """Register a subscriber that does not answer."""
+    """Register a subscriber that does not respond."""
     with ServerProxy(os.environ["ROS_MASTER_URI"]) as master:
         answer = master.registerSubscriber(name, topic, "std_msgs/String", "http://127.0.0.1:1/")
         assert answer[0] == 1, answer  # type: ignore[index]
@@ -218,7 +218,7 @@ def test_click_is_not_lost_while_the_graph_changes(
     page = browse(address(served, "graph"))
     page.click(key_of("/first"))
     page.wait_text(".side h2", "/first")
-    # The pressed topic takes the focus from the first one, and the graph changes before the release.
+    # The pressed topic receives the focus instead of the first one, and the graph changes before the release.
     page.press(key_of("/second"))
     register_dead("/late", "/second")
     page.wait_text("[role=status].error", "2 dead nodes")
@@ -227,7 +227,7 @@ def test_click_is_not_lost_while_the_graph_changes(
     page.wait("return document.querySelector(\"[data-key='n/late']\")")
     # After the redraw, the keyboard focus is unchanged.
     assert page.evaluate("document.activeElement.dataset.key") == "t/second"
-    # The page moves below the mouse.
+    # The page moves while the mouse button is pressed.
     page.press(key_of("/third"))
     x, y = middle(page, key_of("/third"))
     page.evaluate("document.querySelector('.bar').style.paddingBottom = '200px'")
@@ -254,7 +254,7 @@ def test_drag_of_a_node_moves_the_drawing_and_a_trembling_click_does_not(
     assert page.evaluate(where) == before
     drag(page, key_of("/words"), 2)
     page.wait_text(".side h2", "/words")
-    # The graph is still fitted: the details occupy part of the area.
+    # The graph is fitted again, because the details occupy part of the area.
     page.wait(f"return {where} !== {before!r}")
 
 

@@ -1,4 +1,4 @@
-"""republish: images through a chain of minirospy's and Debian's programs, and the usage messages of both."""
+"""republish: images pass through a chain of minirospy's and Debian's programs; the usage messages of both are compared."""
 
 from __future__ import annotations
 

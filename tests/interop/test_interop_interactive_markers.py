@@ -1,4 +1,4 @@
-"""Interactive markers in the 3D view, from servers of minirospy and of Debian's interactive_markers: dragged, clicked, chosen."""
+"""Interactive markers in the 3D view, from minirospy's and Debian's servers: dragged, clicked, and chosen from menus."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Server:
 
 @pytest.fixture(params=["ours", "rospy"])
 def served(request: pytest.FixtureRequest, serve: Serve) -> Iterator[tuple[Served, Server]]:
-    """Serve a page, and run the marker server of either stack."""
+    """Serve a page, and run one stack's marker server."""
     page = serve(access=Access(read_token="read-token-00", write_token="write-token-0", requires_token=True))
     interpreter = {"ours": sys.executable, "rospy": REAL_PYTHON}[request.param]
     program = start([interpreter, str(SERVER)], os.environ["ROS_MASTER_URI"], request.param)
@@ -96,7 +96,7 @@ def test_arrow_is_dragged_and_the_marker_follows(served: tuple[Served, Server], 
     # The marker moves only along the axis.
     assert events[-1]["place"] == pytest.approx([1, 0, 0.2], abs=0.03)
 
-    # The server has moved it: a new page shows it where it was dropped, and it can be dragged back.
+    # The server has moved the marker, so a new page shows it where it was dropped, and it can be dragged back.
     page, metre = opened(served[0], browse)
     drag(page, (1.78 * metre, 0.02 * metre), (0.78 * metre, 0))
     assert served[1].until("up")[-1]["place"] == pytest.approx([0, 0, 0.2], abs=0.03)
@@ -119,7 +119,7 @@ def test_ring_turns_and_plane_slides(served: tuple[Served, Server], browse: Brow
     assert (event["marker"], event["control"]) == ("flat", "slide")
     assert event["place"] == pytest.approx([1, 3, 0], abs=0.03)
 
-    # A control that turns with the view: seen from above, its plane is the ground.
+    # This control turns with the view; seen from above, its plane is the ground.
     drag(page, (2 * metre, 2 * metre), (3 * metre, 2 * metre))
     event = served[1].until("up")[-1]
     assert (event["marker"], event["control"]) == ("facing", "slide_view")
@@ -145,7 +145,7 @@ def test_button_is_clicked_and_menu_entry_chosen(served: tuple[Served, Server], 
     assert (event["marker"], event["control"], event["entry"]) == ("listed", "", 3)
     assert event["point"] == pytest.approx([-2, 2, 0.2], abs=0.1)
 
-    # The server has set the check box: it is checked in a new page.
+    # The server has set the check box, so it is checked in a new page.
     page, metre = opened(served[0], browse)
     drag(page, (-2 * metre, -2 * metre), (-2 * metre, -2 * metre))
     page.click(".marker-menu button", "More")
@@ -161,7 +161,7 @@ def test_markers_follow_their_server(served: tuple[Served, Server], browse: Brow
     status(page, DISPLAY, "Markers: 4 interactive markers")
     served[1].tell("move flat 0.5 3")
     served[1].tell("lose")
-    # Includes the marker of the lost update.
+    # The five markers include the one in the lost update.
     status(page, DISPLAY, "Markers: 5 interactive markers")
     status(page, DISPLAY, "/marker_server: OK")
     drag(page, (0.5 * metre, -3 * metre), (1.5 * metre, -3 * metre))
@@ -212,7 +212,7 @@ def test_markers_of_a_read_only_page_cannot_be_dragged(served: tuple[Served, Ser
     drag(page, (0.78 * metre, 0.02 * metre), (1.78 * metre, 0))
     page.wait_text("[role=status]", "This token is read-only.")
     drag(page, (-2 * metre, 2 * metre), (-2 * metre, 2 * metre))
-    # The server accepts the first event, which is another page's.
+    # The server accepts the first event, which is from another page.
     writer, metre = opened(served[0], browse)
     drag(writer, (-2 * metre, 2 * metre), (-2 * metre, 2 * metre))
     assert [each["event"] for each in served[1].until("up")] == ["pose", "down", "click", "pose", "up"]

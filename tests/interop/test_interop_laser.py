@@ -1,4 +1,4 @@
-"""laser_geometry: the point cloud of a scan by a moving laser, compared with that of the C++ class (laser_peer.cpp)."""
+"""laser_geometry: the point cloud from a scan by a moving laser, compared with that of the C++ class (laser_peer.cpp)."""
 
 from __future__ import annotations
 

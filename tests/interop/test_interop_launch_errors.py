@@ -1,5 +1,5 @@
 # ruff: noqa: E501
-"""The error messages of real roslaunch and minirospy for broken launch files: both contain the words that a script may match."""
+"""The error messages of real roslaunch and minirospy for broken launch files both contain the words that scripts may match."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Layouts of the dashboard: their text form under node; panes in chromium, operated as by a user."""
+"""Layouts of the dashboard: their text form under node, and panes in chromium, operated as by a user."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ LAYOUT = "js/layout.js"
         ("row(plot?path=%2Fa%2Fb,board)", "row(plot?path=%2Fa%2Fb,board)"),
         ("row(2:board,2:plot)", "row(board,plot)"),
         ("row(3:board,1:column(plot,console))", "row(75:board,25:column(plot,console))"),
-        # A row of one element is that element; a row within a row is flattened.
+        # A row with one element is that element; a row within a row is flattened.
         ("row(column(plot))", "plot"),
         ("row(1:board,1:row(plot,console))", "row(50:board,25:plot,25:console)"),
     ],
@@ -174,7 +174,7 @@ def opened(
 
 
 def tree_of(page: Page) -> str:
-    """Return the layout in the URL, as text."""
+    """Return the layout in the URL as text."""
     return str(page.evaluate("new URLSearchParams(location.hash.split('?')[1]).get('tree')"))
 
 
@@ -227,7 +227,7 @@ def test_workshop_shows_the_pressed_button_in_its_plot(
         page.release(".push[data-pin='11']")
         assert next(edges).level == 0
     assert page.evaluate("document.querySelectorAll('.pane').length") == 4
-    # Only the divider is between panes.
+    # There is only the divider between the panes.
     upper, lower = page.evaluate(
         "[...document.querySelectorAll('.box.column > .pane')].slice(0, 2).map(e => e.getBoundingClientRect().toJSON())"
     )
@@ -279,7 +279,7 @@ def test_pane_is_docked_by_dragging_its_head(
     head = middle(page, f"{pane('console')} .pane-about")
     drag(page, head, (head[0] - 20, head[1]), middle(page, pane("topics")))
     wait_tree(page, "row(column(console,parameters),topics)")
-    # Drag to the edge of the whole layout.
+    # Drag the pane to the edge of the whole layout.
     head = middle(page, f"{pane('topics')} .pane-about")
     left, top = middle(page, ".dock", 0.3, 0.0)
     drag(page, head, (head[0] - 20, head[1]), (left, top + 4))
@@ -341,7 +341,7 @@ def test_views_work_twice_on_one_page(serve: Callable[..., Served], browse: Call
     ids = page.evaluate("[...document.querySelectorAll('[id]')].map(e => e.id)")
     assert len(ids) == len(set(ids))
     page.wait("return document.querySelectorAll(\".pane[data-pane='6'] .edge\").length >= 1")
-    # Closing one leaves the other unchanged.
+    # Closing one pane leaves the other unchanged.
     page.click(".pane[data-pane='1'] button[title='Close this pane']")
     served.run(moving.publish(1.0, 7.0, 3.0))
     page.wait_text(".pane[data-pane='2'] .series .num", "7")
@@ -402,7 +402,7 @@ def test_layout_is_saved_by_name_exported_imported_and_shared(
         "layout": "row(topics,parameters?filter=robot)",
     }
     link = page.evaluate("location.href")
-    # Later: open the layout from the list.
+    # Open the layout from the list, as on a later visit.
     page.evaluate("location.hash = '#/layout'")
     page.wait_text("button.start", "my robot")
     page.choose("select[aria-label=Layout]", "saved my robot")
@@ -410,7 +410,7 @@ def test_layout_is_saved_by_name_exported_imported_and_shared(
     wait_tree(page, "row(topics,parameters?filter=robot)")
     page.click(".layout-bar button", "Delete")
     page.wait_text(".layout-bar", "my robot is deleted.")
-    # Load a file; the error names a broken one.
+    # Load a file; if it is broken, the error names it.
     broken = tmp_path / "broken.json"
     broken.write_text('{"minirospy layout": 1, "layout": "row("}', encoding="utf-8")
     for name in (broken, tmp_path / "my robot.json"):

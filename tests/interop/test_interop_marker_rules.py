@@ -14,7 +14,10 @@ pytestmark = needs_node
 
 
 def updates(*steps: tuple[str, int]) -> list[Any]:
-    """Return the changes of these steps, and the server's status; a step is full, update or alive, with a sequence number."""
+    """Return the changes that these steps cause, and the server's status.
+
+    A step is full, update or alive, with a sequence number.
+    """
     body = f"""
         const updates = new MarkerUpdates();
         const found = [];
@@ -41,7 +44,7 @@ WAITING = "Waiting for all markers."
         # Updates that arrived before the full state are part of it, or follow it.
         ([("update", 3), ("update", 4), ("full", 3)], [["all", 3], ["one", 4]], "OK"),
         ([("update", 3), ("update", 4), ("full", 4)], [["all", 4]], "OK"),
-        # A full state from before a gap, or newer than the updates, does not connect to them.
+        # A full state from before a gap, or newer than the updates, cannot be combined with them.
         ([("update", 5), ("full", 3)], [], WAITING),
         ([("update", 3), ("full", 5)], [], WAITING),
         ([("update", 3), ("full", 5), ("update", 4), ("update", 5)], [["all", 5]], "OK"),
@@ -174,7 +177,7 @@ _START = "pose: {p: [0, 0, 0], q: [0, 0, 0, 1]}"
 
 
 def dragged(mode: int, axis: str, grabbed: str, *to: tuple[float, float], by: str = "{}") -> Any:
-    """Return the pose after a drag seen from above, to points on the ground."""
+    """Return the pose after a drag, seen from above, to points on the ground."""
     body = f"""
         const down = (x, y) => ({{origin: [x, y, 10], direction: [0, 0, -1]}});
         const grabbed = {grabbed};
@@ -192,13 +195,13 @@ HALF = math.sqrt(0.5)
 @pytest.mark.parametrize(
     ("mode", "axis", "grabbed", "to", "by", "wanted"),
     [
-        # Along an axis; the distance cannot be determined if the view is along it.
+        # Drag along an axis. The distance cannot be determined if the view is along it.
         (3, "[1, 0, 0]", "[0.7, 0.05, 0.1]", [(1.7, 3)], "{}", [1, 0, 0, 0, 0, 0, 1, 0]),
         (3, "[0, 0, 1]", "[0, 0, 0.7]", [(1, 1)], "{}", None),
         (4, "[0, 0, 1]", "[0.1, 0, 0.2]", [(2.1, 3)], "{}", [2, 3, 0, 0, 0, 0, 1, 0]),
         (4, "[1, 0, 0]", "[0.1, 0, 0.2]", [(2.1, 3)], "{}", None),
         (5, "[0, 0, 1]", "[0.5, 0, 0]", [(0, 9)], "{}", [0, 0, 0, 0, 0, HALF, HALF, math.pi / 2]),
-        # Seen from its side, a ring turns by its part that is nearest to the eye.
+        # Seen from its side, a ring turns by the part that is closest to the eye.
         (
             5,
             "[1, 0, 0]",
@@ -207,7 +210,7 @@ HALF = math.sqrt(0.5)
             "{}",
             [0, 0, 0, math.sin(0.25), 0, 0, math.cos(0.25), 0.5],
         ),
-        # A drag straight away from the middle only moves the marker; a drag sideways turns it as well.
+        # A drag straight away from the middle only moves the marker; a drag to the side also turns it.
         (6, "[0, 0, 1]", "[0.5, 0, 0]", [(1.5, 0)], "{}", [1, 0, 0, 0, 0, 0, 1, 0]),
         (6, "[0, 0, 1]", "[0.5, 0, 0]", [(0, 0.5)], "{}", [0, 0, 0, 0, 0, HALF, HALF, math.pi / 2]),
         (6, "[0, 0, 1]", "[0.5, 0, 0]", [(0, 0.5), (0, 2.5)], "{}", [0, 2, 0, 0, 0, HALF, HALF, math.pi / 2]),
@@ -258,7 +261,7 @@ def test_axes_of_controls_follow_the_marker_or_the_view_or_stay() -> None:
 
 
 def test_display_of_a_file_keeps_what_rviz_has_set() -> None:
-    # As saved by Debian's RViz.
+    # This is a file saved by Debian's RViz.
     saved = {
         "Class": "rviz/InteractiveMarkers",
         "Enable Transparency": True,

@@ -1,4 +1,4 @@
-"""Real rosmaster and minirospy's master answer the same calls equally."""
+"""Real rosmaster and minirospy's master respond equally to the same calls."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GOLDEN = Path(test_master.__file__).with_name("master_answers.json")
 
 
 def test_golden_answers_are_those_of_rosmaster(real_master: str) -> None:
-    """RECORD=1 in the environment records the answers again."""
+    """Compare the golden responses with rosmaster's. RECORD=1 in the environment records them again."""
     recording = "RECORD" in os.environ
     golden = {} if recording else json.loads(GOLDEN.read_text())
     found = {

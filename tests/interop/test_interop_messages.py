@@ -1,6 +1,6 @@
-"""minirospy's message compiler compared with real genpy: equal definitions, bytes, texts, errors and values from YAML.
+"""minirospy's message compiler compared with real genpy: definitions, bytes, texts, errors and values from YAML are equal.
 
-genpy_peer.py runs real genpy; a message's value is passed as a plain dictionary of its fields.
+genpy_peer.py runs real genpy; a message's value is passed to it as a plain dictionary of its fields.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ Plain = dict[str, Any]
 
 
 class RealError(Exception):
-    """An exception of real genpy: its class name and its text."""
+    """An exception in real genpy: its class name and its text."""
 
     def __init__(self, kind: str, text: str) -> None:
         super().__init__(kind, text)
@@ -57,14 +57,14 @@ class RealError(Exception):
 
 
 class Peer:
-    """Real genpy, with definitions below ``roots`` that it compiles, or those that Debian compiled."""
+    """Real genpy, with the definitions below ``roots``, which it compiles, or those that Debian has compiled."""
 
     def __init__(self, folder: Path, *roots: Path) -> None:
         command = [REAL_PYTHON, str(HERE / "genpy_peer.py"), str(folder), *map(str, roots)]
         self._program = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
 
     def ask(self, command: str, argument: Any) -> Any:
-        """Return the answer to one of genpy_peer's commands. Raise RealError."""
+        """Return the response to one of genpy_peer's commands. Raise RealError if genpy raises an exception."""
         assert self._program.stdin
         assert self._program.stdout
         request = pickle.dumps((command, argument))
@@ -78,7 +78,7 @@ class Peer:
         return answer
 
     def close(self) -> None:
-        """End the program."""
+        """Stop the program."""
         assert self._program.stdin
         assert self._program.stdout
         self._program.stdin.close()
@@ -88,7 +88,7 @@ class Peer:
 
 @pytest.fixture(scope="session")
 def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Peer]]:
-    """Return a function: root -> real genpy with the definitions below it."""
+    """Return a function from a root folder to real genpy with the definitions below that folder."""
     peers: dict[str, Peer] = {}
     with ExitStack() as running:
 
@@ -162,7 +162,7 @@ def packed(message: Any) -> bytes:
 
 
 def described(data_class: Any) -> dict[str, Any]:
-    """Return the properties that must be equal in two classes of one type; as in genpy_peer.py."""
+    """Return the properties that must be equal in two classes of one type, as genpy_peer.py does."""
     return {
         "type": data_class._type,
         "md5sum": data_class._md5sum,
@@ -283,7 +283,7 @@ def message_values(spec: MessageSpec, lookup: Lookup) -> st.SearchStrategy[Plain
 
 
 def check_exchange(peer: Peer, ours: Ours, name: str, value: Plain) -> None:
-    """Assert that both serialize to the same bytes, deserialize them, and print the same text."""
+    """Assert that both serialize a value to the same bytes, deserialize these, and print the same text."""
     data = packed(ours.build(name, value))
     written, again, text = peer.ask("exchange", (name, value, data))
     assert data == written == again
@@ -320,7 +320,7 @@ def check_drawn(peer: Peer, ours: Ours, name: str) -> None:
         if root == "ours" or package not in CATALOGUES["ours"].packages
     ],
 )
-# Hypothesis warns of values with a long repr, as those of MoveIt's types are.
+# Hypothesis warns about values with a long repr, such as those of MoveIt's types.
 @pytest.mark.filterwarnings("ignore:Generating overly large repr")
 def test_values(real: Callable[[str], Peer], root: str, package: str) -> None:
     """Exchange drawn values of every type of a package."""
@@ -330,7 +330,7 @@ def test_values(real: Callable[[str], Peer], root: str, package: str) -> None:
 
 
 def test_strings_as_text(real: Callable[[str], Peer]) -> None:
-    """Print each string that YAML quotes or folds specially: alone, and first, middle and last in a list."""
+    """Print each string that YAML quotes or folds specially, alone, and as first, middle and last item of a list."""
     ours = ours_of("ours", "sensor_msgs")
     for one in ODD_STRINGS:
         for names in ([one], [one, "plain"], ["plain", one, "x"], ["a", one]):
@@ -434,7 +434,7 @@ ODD = {
 
 @pytest.mark.parametrize("text", ODD.values(), ids=ODD.keys())
 def test_odd_definitions(real: Callable[[str], Peer], text: str) -> None:
-    """Compare md5sum, full text, bytes and text of definitions in unusual notations."""
+    """Compare md5sum, full text, bytes and text of definitions with unusual notations."""
     name = "odd_msgs/Odd"
     theirs = real("debian").ask("dynamic", (name, text))
     if "\r" in text:
@@ -480,14 +480,15 @@ REFUSED = {
 
 @pytest.mark.parametrize("text", REFUSED.values(), ids=REFUSED.keys())
 def test_refused_definitions(real: Callable[[str], Peer], text: str) -> None:
-    """minirospy refuses definitions that real genpy refuses, and reports the name and line."""
+    """minirospy rejects definitions that real genpy rejects, and reports the name and line."""
     with pytest.raises(RealError):
         real("debian").ask("dynamic", ("odd_msgs/Odd", text))
     with pytest.raises(DefinitionError):
         class_from_text("odd_msgs/Odd", text)
 
 
-# Definitions that real genpy refuses or compiles to a broken class, and minirospy accepts -> minirospy's constants.
+# Definitions that real genpy rejects or compiles to a broken class, but minirospy accepts, with minirospy's
+# constants.
 OURS_ONLY = {
     "hexadecimal": ("int32 X=0x1F\n", {"X": "31"}),
     "tabs": ("int32\tX=1\n", {"X": "1"}),
@@ -502,7 +503,7 @@ OURS_ONLY = {
 def test_definitions_that_only_minirospy_accepts(
     real: Callable[[str], Peer], text: str, constants: dict[str, str]
 ) -> None:
-    """genpy itself fails on these and minirospy does what was meant; avoid them in definitions for both."""
+    """genpy itself fails on these, whereas minirospy does what was intended; avoid them in definitions for both."""
     with pytest.raises(RealError):
         real("debian").ask("dynamic", ("odd_msgs/Odd", text))
     data_class = class_from_text("odd_msgs/Odd", text)
@@ -510,7 +511,7 @@ def test_definitions_that_only_minirospy_accepts(
     assert data_class().deserialize(packed(data_class())) == data_class()
 
 
-# Definitions that real genpy accepts and minirospy refuses: the two would interpret them differently.
+# Definitions that real genpy accepts but minirospy rejects, because the two would interpret them differently.
 REAL_ONLY = {
     "a constant twice": "int32 X=1\nint32 X=2\n",
     "a name beyond ASCII": "int32 zażółć\n",
@@ -526,7 +527,7 @@ def test_definitions_that_only_real_genpy_takes(real: Callable[[str], Peer], tex
 
 
 def test_arrays_of_empty_messages(real: Callable[[str], Peer]) -> None:
-    """Elements of an empty message occupy no bytes: only the count is serialized."""
+    """Elements that are empty messages occupy no bytes, so only the count is serialized."""
     name, text = "odd_msgs/Odd", text_of("Empty[] a\n", odd_msgs__Empty="")
     real("debian").ask("dynamic", (name, text))
     check_exchange(real("debian"), Ours(specs_of_text(name, text).__getitem__), name, {"a": [{}, {}, {}]})
@@ -535,7 +536,7 @@ def test_arrays_of_empty_messages(real: Callable[[str], Peer]) -> None:
 def test_a_message_and_a_service_of_one_name(
     real: Callable[[str], Peer], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Compiled to modules on disk, each is found among its own kind.
+    """After compiling to modules on disk, each is found among its own kind.
 
     A separator in a service may have more than three minus signs.
     """
@@ -567,7 +568,7 @@ def test_a_message_and_a_service_of_one_name(
 
 
 def test_backslashes_stay_as_they_are(real: Callable[[str], Peer]) -> None:
-    """Real genpy interprets them as escapes in its generated source; the md5sum is of the original text."""
+    """Real genpy interprets them as escapes in its generated source, but the md5sum is that of the original text."""
     text = "# C:\\new\nstring X=a\\tb\n"
     theirs = real("debian").ask("dynamic", ("odd_msgs/Odd", text))
     ours = described(class_from_text("odd_msgs/Odd", text))
@@ -580,7 +581,7 @@ def test_backslashes_stay_as_they_are(real: Callable[[str], Peer]) -> None:
 
 # --- wrong values
 
-# Type, value: real genpy's error names the field, and minirospy's has the same text.
+# Types and values. Real genpy's error names the field, and minirospy's has the same text.
 WRONG: list[tuple[str, Plain]] = [
     ("std_msgs/Int8", {"data": 128}),
     ("std_msgs/Int8", {"data": -129}),
@@ -631,7 +632,7 @@ WRONG: list[tuple[str, Plain]] = [
     ("sensor_msgs/JointState", {"name": [5]}),
     ("sensor_msgs/JointState", {"name": [None]}),
 ]
-# Type, value, real genpy's exception (unhelpful text, or not a SerializationError), minirospy's text.
+# Types and values with real genpy's exception (unhelpful text, or not a SerializationError) and minirospy's text.
 WRONG_OTHERWISE: list[tuple[str, Plain, str, str]] = [
     ("std_msgs/String", {"data": "\ud800"}, "UnicodeEncodeError", "surrogates not allowed"),
     ("std_msgs/UInt8MultiArray", {"data": "abc"}, "SerializationError", "field data must be a list or tuple"),
@@ -691,7 +692,7 @@ def test_wrong_values(real: Callable[[str], Peer], name: str, value: Plain) -> N
 def test_wrong_values_that_only_minirospy_reports(
     real: Callable[[str], Peer], name: str, value: Plain, kind: str, text: str
 ) -> None:
-    """minirospy raises a SerializationError that names the fault; real genpy raises various errors."""
+    """minirospy raises a SerializationError that names the error, whereas real genpy raises various other errors."""
     with pytest.raises(RealError) as theirs:
         real("ours").ask("serialize", (name, value))
     assert theirs.value.kind == kind
@@ -717,7 +718,7 @@ def plain_value(spec: MessageSpec, lookup: Lookup) -> Plain:
 
 @pytest.mark.parametrize("package", sorted(CATALOGUES["ours"].packages))
 def test_cut_and_corrupted_bytes(package: str) -> None:
-    """Every truncation is refused; a huge length at any position is refused or harmless, and allocates no memory."""
+    """Every truncation is rejected; a huge length at any position is rejected or harmless, and allocates no memory."""
     ours = ours_of("ours", package)
     for name, spec in specs_of("ours", package).items():
         data_class = ours.load(name)
@@ -733,7 +734,7 @@ def test_cut_and_corrupted_bytes(package: str) -> None:
 
 
 def test_a_huge_count_of_empty_messages() -> None:
-    """Elements without bytes do not add to the message's size: the count alone must not exhaust the memory."""
+    """Elements without bytes do not add to the message's size, so a huge count alone must not exhaust the memory."""
     data_class = class_from_text("odd_msgs/Odd", text_of("Empty[] a\n", odd_msgs__Empty=""))
     with pytest.raises(DeserializationError):
         data_class().deserialize(b"\xff\xff\xff\xff")
@@ -806,7 +807,7 @@ FILLED = [
 
 @pytest.mark.parametrize(("name", "source"), FILLED)
 def test_values_from_yaml(real: Callable[[str], Peer], name: str, source: str) -> None:
-    """Call fill_message_args as rostopic pub does: both give the same bytes, or both refuse."""
+    """Call fill_message_args as rostopic pub does: both produce the same bytes, or both reject the values."""
     words = {"now": (12, 34)}
     try:
         theirs = real("ours").ask("fill", (name, source, words))
@@ -824,7 +825,7 @@ def test_values_from_yaml(real: Callable[[str], Peer], name: str, source: str) -
 
 
 def test_a_dictionary_without_a_list_around_it(real: Callable[[str], Peer]) -> None:
-    """Real genpy fails for one with a single field (KeyError: 0); minirospy accepts it."""
+    """Real genpy fails with KeyError: 0 if it has a single field, but minirospy accepts it."""
     with pytest.raises(RealError, match="KeyError"):
         real("ours").ask("fill", ("std_msgs/String", "{data: hello}", {}))
     message = message_class("std_msgs/String")()

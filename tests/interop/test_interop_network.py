@@ -72,7 +72,7 @@ class Network:
             folder = Path("/etc/netns") / self.names[machine]
             folder.mkdir(parents=True)
             (folder / "hosts").write_text(HOSTS)
-            # A name server that refuses immediately: an external one would time out.
+            # This name server refuses immediately, whereas an external one would time out.
             (folder / "resolv.conf").write_text("nameserver 127.0.0.1\n")
 
         for switch in ("ipv4/ip_forward", "ipv6/conf/all/forwarding"):
@@ -88,7 +88,7 @@ class Network:
             shutil.rmtree(Path("/etc/netns") / name, ignore_errors=True)
 
     def command(self, machine: str, words: list[str]) -> list[str]:
-        """Return a command that runs ``words`` in a machine, with its host name, as one process, which receives the signals."""
+        """Return a command that runs ``words`` on a machine, with its host name, as one process that receives the signals."""
         script = f'hostname {machine} && exec "$@"'
         return [
             "ip",
@@ -107,7 +107,7 @@ class Network:
     def start(self, machine: str, words: list[str], **variables: str) -> Program:
         """Start a program on a machine."""
         environ = {"ROS_MASTER_URI": URI, **variables}
-        # Tests run with ROS_HOSTNAME=localhost, which machines of a network do not set.
+        # Tests run with ROS_HOSTNAME=localhost, which is not set on machines in a network.
         kept = {name: value for name, value in os.environ.items() if name != "ROS_HOSTNAME"}
         program = Program(self.command(machine, words), {**kept, **environ})
         self.running.callback(program.end)
@@ -140,7 +140,7 @@ class Network:
 
 
 class Program:
-    """A program, with methods that wait for lines on stdout or stderr."""
+    """A program, with methods that wait for lines on its stdout or stderr."""
 
     def __init__(self, command: list[str], environ: dict[str, str]) -> None:
         self._process = subprocess.Popen(
@@ -157,7 +157,7 @@ class Program:
         self._reader.start()
 
     def wait_for(self, text: str) -> str:
-        """Return the next line with ``text`` in it."""
+        """Return the next line that contains ``text``."""
         end = time.monotonic() + PATIENCE
         while True:
             try:
@@ -227,7 +227,7 @@ def network(built: Network) -> Iterator[Network]:
 
 
 def start_master(network: Network, machine: str = "alpha", stack: str = "ours", **variables: str) -> Program:
-    """Start a master on a machine, and return when it runs."""
+    """Start a master on a machine, and return once it runs."""
     if stack == "ours":
         master = network.start(
             machine, [str(OUR_BIN / "roscore"), "-p", str(PORT), "--no-journal"], **variables
@@ -261,7 +261,7 @@ ALL = [
 def test_two_machines_exchange_messages_calls_and_goals(
     network: Network, core: str, robot: str, laptop: str
 ) -> None:
-    """ROS_MASTER_URI is the only variable: machines announce their host names, which the hosts files resolve."""
+    """ROS_MASTER_URI is the only variable set. Machines announce their host names, which the hosts files resolve."""
     start_master(network, stack=core)
     network.peer("alpha", "robot", robot).wait_for("ready")
     lines = network.peer("beta", "laptop", laptop).lines_until_end()
@@ -283,7 +283,7 @@ def test_two_machines_exchange_messages_by_ipv6(network: Network) -> None:
 
 
 def test_subscriber_names_the_side_with_the_wrong_address(network: Network) -> None:
-    """The address is an unknown host name, an unused address, or has ports that a firewall blocks."""
+    """The address is an unknown host name or an unused address, or a firewall blocks its ports."""
     start_master(network)
 
     with network.firewall(f"to {ALPHA} ipproto tcp dport 20000-20019"):
@@ -334,7 +334,7 @@ def test_doctor_checks_the_return_path_from_the_master(network: Network) -> None
 
 
 def test_two_doctors_check_both_directions(network: Network) -> None:
-    """The master is on alpha; beta listens. Check alpha's report if all is well, without a name, and behind a firewall."""
+    """The master is on alpha, and beta listens. Check alpha's report without faults, without a name, and behind a firewall."""
     start_master(network)
     listener = network.start("beta", [str(OUR_BIN / "minirospy"), "doctor", "--listen"])
     listener.wait_for("listening: type `minirospy doctor` on the other machine")
@@ -360,7 +360,7 @@ def test_two_doctors_check_both_directions(network: Network) -> None:
     )
 
     with network.firewall(f"from {BETA} to {ALPHA}"):
-        # beta's answers are lost, so it counts as unreachable.
+        # beta's responses are lost, so it counts as unreachable.
         (line,) = [each for each in network.doctor("alpha") if each.startswith("PROBLEM")]
 
     assert "nothing comes back from 'beta' -> if `ping beta` fails too" in line
@@ -399,7 +399,7 @@ def test_doctor_explains_an_unreachable_master(network: Network, uri: str, said:
 
 
 def test_connection_recovers_after_a_cable_was_pulled(network: Network) -> None:
-    """The cable is out for longer than keepalive takes: the subscriber closes the connection, and reconnects when it can."""
+    """The cable is unplugged for longer than keepalive takes, so the subscriber closes the connection, and reconnects later."""
     start_master(network)
     robot = network.peer("alpha", "robot")
     listener = network.peer("beta", "listen", TEST_KEEPALIVE="1")
@@ -407,7 +407,7 @@ def test_connection_recovers_after_a_cable_was_pulled(network: Network) -> None:
     robot.wait_for("subscribed")
     for end in ("va", "vb"):
         network.ip("router", f"link set {end} down")
-    time.sleep(3.5)  # the silence itself is tested
+    time.sleep(3.5)  # the test needs this silence
     for end in ("va", "vb"):
         network.ip("router", f"link set {end} up")
     robot.wait_for("subscribed")
@@ -415,7 +415,7 @@ def test_connection_recovers_after_a_cable_was_pulled(network: Network) -> None:
 
 
 def test_nodes_register_again_with_an_empty_master(network: Network) -> None:
-    """Nodes register again with the new master, also those of the other machine, and connections stay open."""
+    """Nodes, also those on the other machine, register again with the new master, and connections stay open."""
     master = start_master(network)
     robot = network.peer("beta", "robot")
     robot.wait_for("ready")
@@ -425,7 +425,7 @@ def test_nodes_register_again_with_an_empty_master(network: Network) -> None:
     start_master(network)
     listener.wait_for("has restarted: registered again")
     network.peer("alpha", "listen").wait_for("beat")
-    # Its output may arrive later than the message that it sent.
+    # The program's output may arrive later than the message that it sent.
     for _ in range(2):
         robot.wait_for("subscribed")
     assert sum(line == "subscribed" for line in robot.seen) == 2

@@ -28,7 +28,7 @@ def lines_until_ready(program: subprocess.Popen[str]) -> list[str]:
 
 @pytest.mark.parametrize(("talker", "listener"), PAIRS)
 def test_messages_arrive_byte_for_byte(any_master: str, peer: Peer, talker: str, listener: str) -> None:
-    """Send Bool, String, LaserScan with 1651 beams, and an Image of 6 MB, to a subscriber that joins late."""
+    """Send Bool, String, LaserScan with 1651 beams, and a 6 MB Image to a subscriber that joins late."""
     said = lines_until_ready(peer(talker, "talk", any_master))
     output, errors = peer(listener, "listen", any_master).communicate(timeout=PATIENCE)
     heard = {

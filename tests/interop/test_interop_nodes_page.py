@@ -55,7 +55,7 @@ def test_nodes_of_each_kind_are_shown_pinged_and_killed(
         page.click(".side button", "Kill")
         page.click(".question button", "Kill")
         page.wait_text(".note", f"{name} was requested to shut down")
-        # The node has unregistered; its program runs until stdin is closed.
+        # The node has unregistered, but its program runs until stdin is closed.
         page.wait(f'return !document.querySelector("{ROW.format(name)}")')
 
 
@@ -113,7 +113,7 @@ def test_dead_nodes_are_marked_and_cleaned_up(
     page.wait_text(".note", "Removed: /dead.")
     page.type("input[type=search]", "")
     page.wait(f'return !document.querySelector("{ROW.format("/dead")}")')
-    # The master has no address for an illegal name: the row stays, as for rosnode cleanup, and is plain text.
+    # The master has no address for an illegal name, so the row stays as plain text, as with rosnode cleanup.
     page.wait_text("tr.dead td", HOSTILE)
     assert page.evaluate("document.querySelectorAll('main img, main script').length") == 0
     assert page.evaluate("document.title") == "Nodes · minirospy"

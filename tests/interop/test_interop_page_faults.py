@@ -1,4 +1,4 @@
-"""Faults that must not affect other parts of the page: views that fail, lost connections, late responses."""
+"""Faults that must not affect other parts of the page: views that fail, lost connections, and late responses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small panels of the dashboard: their text form and messages under node; read, moved and pressed in chromium."""
+"""Small panels on the dashboard: their text form and messages under node; reading, moving and pressing them in chromium."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plot in Debian's chromium: derivatives, averages, one series over another; the computations under node."""
+"""Plot in Debian's chromium: derivatives, averages, and one series over another; the computations under node."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ def test_derivative_uses_header_stamps_if_present() -> None:
         None,
         2,
     ]
-    # The first points have no value; they are kept with the points, also when the buffer grows and the oldest are
-    # dropped.
+    # The first points have no value. They are kept with the other points, also when the buffer grows and the oldest
+    # are dropped.
     points = evaluated(
         "(made => { made.append([1, 2], [0, 0]); made.append(new Float64Array(2000).fill(3), new Float64Array(2000),"
         " new Float64Array(2000).fill(7)); made.append([4], [0]); const all = [...made.stamps.subarray(0, made.count)];"
@@ -131,7 +131,7 @@ def test_derivative_of_messages_that_come_in_batches_has_no_spikes(
 def test_average_is_that_of_the_last_seconds() -> None:
     found = evaluated("[...derivedOf('average1').append([0, 0.5, 1, 1.5, 9], [2, 4, NaN, 8, 1])]")
     assert found == [2, 3, 3, 6, 1]
-    # With many points, rounding errors do not accumulate.
+    # Rounding errors do not accumulate over many points.
     long = evaluated(
         "(d => { const n = 50000; const t = Float64Array.from({length: n}, (_, i) => i / 100);"
         "const v = t.map((x) => 1e9 + Math.sin(x)); return d.append(t, v)[n - 1]; })(derivedOf('average1'))"
@@ -161,7 +161,7 @@ def test_series_over_another_takes_its_newest_value_of_the_moment() -> None:
 
 
 def selected(path: str) -> dict[str, float]:
-    """Return label -> value for a path in a message with markers, or the error's text."""
+    """Return the values by label for a path in a message with markers, or the error's text."""
     body = f"""
       const markers = [["goal", 1, 0.5], ["goal", 2, 1.5], ["base", 2, 2.5]].map(([ns, id, x], index) => (
         {{ ns, id, on: index > 0, stamp: {{ secs: index, nsecs: 0 }}, pose: {{ x }} }}));
@@ -223,7 +223,7 @@ def test_path_that_is_wrong_is_refused_before_a_message_comes(
         page.type("form input", path)
         page.click("form button", "Plot")
         page.wait_text(".series-missing .error", f"{path}: {why}")
-    # A valid path that does not exist yet waits.
+    # A valid path that does not exist yet is pending.
     page.type("form input", "/late[0:5]{a==1}.b/c")
     page.click("form button", "Plot")
     page.wait_text(".series-missing .muted", "waiting for /late[0:5]{a==1}.b/c")
@@ -327,7 +327,7 @@ COLORS = {"x": [0x2F, 0x7E, 0xD8], "y": [0xE4, 0x57, 0x2E], "z": [0x2A, 0x9D, 0x
 
 
 def middle(page: Page, number: int) -> tuple[float, float]:
-    """Return the position of a y axis's labels; ``number`` counts the axes in use, from 0."""
+    """Return the position of a y axis's labels; ``number`` counts the axes in use from 0."""
     x, y = page.evaluate(
         "(r => [r.x + r.width / 2, r.y + r.height / 2])"
         f"(document.querySelectorAll('.u-axis.scaled')[{number}].getBoundingClientRect())"
@@ -368,7 +368,7 @@ def test_series_have_axes_of_their_own_that_are_kept_in_the_address(
     page.wait("return location.hash.includes('range=5+-10+0') && location.hash.includes('label=2+mm')")
     page.wait(f"return Math.abs({HEIGHT_OF % COLORS['z']} - 0.5) < 0.05")
 
-    # The same link in another page shows the same plot, also before a message has arrived.
+    # The same link shows the same plot in another page, also before a message has arrived.
     page.reload()
     assert "range=5+-10+0" in page.evaluate("location.hash")
     assert "axis=2+%2Fpath%2Fy" in page.evaluate("location.hash")
@@ -407,7 +407,7 @@ def test_axis_is_zoomed_and_panned_alone_by_the_wheel_and_by_dragging(
         page.call(
             "Input.dispatchMouseEvent", type=kind, x=x, y=y + down, button="left", buttons=1, clickCount=1
         )
-    # The axis follows the drag downwards; the other axis stays.
+    # The axis follows the drag downwards, while the other axis stays.
     page.wait(f"return {HEIGHT_OF % COLORS['y']} < 0.4")
     page.wait(f"return Math.abs({HEIGHT_OF % COLORS['x']} - 0.5) < 0.05")
     for count in (1, 2):
@@ -434,7 +434,7 @@ def test_chart_is_panned_and_zoomed_by_keys_and_fingers(
         page.wait(f"return {shown}")
         press_key(page, "Escape")
         page.wait(f"return !{shown}")
-    # One finger pans, two zoom.
+    # One finger pans, two fingers zoom.
     x, y = page.evaluate(
         "(r => [r.x + r.width / 2, r.y + 50])(document.querySelector('.u-over').getBoundingClientRect())"
     )

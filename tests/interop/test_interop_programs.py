@@ -1,4 +1,4 @@
-"""minirospy's maps with nodes of Debian's ROS: real rospy receives them, and map_saver saves a map that real rospy publishes."""
+"""minirospy's maps with nodes of Debian's ROS: real rospy receives them, and map_saver saves a map published by real rospy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""dynamic_reconfigure: generators, servers, clients and dynparam of minirospy and Debian, in every combination."""
+"""dynamic_reconfigure: generators, servers, clients and dynparam from minirospy and Debian, in every combination."""
 
 from __future__ import annotations
 
