@@ -108,7 +108,7 @@ def lines_until(program: subprocess.Popen[str], word: str) -> list[str]:
 def played(
     serve: Callable[[str, str], subprocess.Popen[str]], uri: str, server: str, client: str, modules: Path
 ) -> str:
-    """Return the output of a server and of a client."""
+    """Return the output of a server and of a client, run together."""
     serving = serve(server, uri)
     before = lines_until(serving, "ready")
     done = subprocess.run(
@@ -242,7 +242,7 @@ def test_dynparam_prints_the_same_as_the_real_one(
     assert run("dump", "/lamp", str(file)) == ("", 0)
     assert run("set", "/lamp", "{'power': 1, 'angle': 2}") == ("", 0)
     if server == "rospy":
-        # ROS's server refuses nested group states, which its own dynparam sends, too.
+        # ROS's server also rejects nested group states, which its own dynparam sends.
         assert run("load", "/lamp", str(file))[1] == 1
         return
     for other in ("rospy", "ours"):
