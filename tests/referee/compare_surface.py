@@ -264,7 +264,7 @@ REASONS = {
         ("ROS_LOG_DIR", "makedirs_with_parent_perms", "renew_latest_logdir"), "the inside of rospy's logging"
     ),
 }
-"""Name of real rospy -> the reason why it is not offered: only rospy itself uses it."""
+"""The reasons why names in real rospy are not offered, by name: only rospy itself uses them."""
 
 MEMBERS_INSIDE = {
     "acquire_impl": "rospy's inside",
@@ -324,7 +324,7 @@ PACKAGES = (
 
 
 def private_names(not_only_own: bool = False) -> dict[str, list[str]]:
-    """Return submodule -> its own functions and classes whose names start with an underscore, or all of its names."""
+    """Return each submodule's functions and classes whose names start with an underscore, or all of its names."""
     found = {}
     for name in submodules():
         try:
@@ -353,7 +353,7 @@ def submodules() -> list[str]:
 
 
 def describe() -> Description:
-    """Return module -> name -> its home module and what it is, for the rospy of this interpreter."""
+    """Return the names in each module, each with its home module and description, for this interpreter's rospy."""
     return {
         module: {
             name: value
@@ -365,7 +365,7 @@ def describe() -> Description:
 
 
 def describe_value(value: Any) -> dict[str, Any] | None:
-    """Return the parts of a value that are compared; None if it is not rospy's own."""
+    """Return the parts of a value that are compared, or None if it is not rospy's own."""
     if isinstance(value, (bool, int, float, str)):
         return {"home": "", "is": repr(value)}
     home = getattr(value, "__module__", None) or ""
@@ -384,7 +384,7 @@ def describe_value(value: Any) -> dict[str, Any] | None:
 
 
 def parameters(value: Any) -> list[list[str]] | None:
-    """Return [name, default, kind] of each parameter; None if it cannot be determined."""
+    """Return [name, default, kind] for each parameter, or None if it cannot be determined."""
     try:
         signature = inspect.signature(value)
     except (TypeError, ValueError):
@@ -406,7 +406,7 @@ def shown_default(default: Any) -> str:
 
 
 def compare(real: Any, ours: Any) -> str:
-    """Return one of: same; wider (minirospy accepts every call that real rospy accepts); differs."""
+    """Return "same", "wider" (minirospy accepts every call that real rospy accepts) or "differs"."""
     if real == ours or real is None:
         return "same"
     if not isinstance(real, list) or not isinstance(ours, list):
@@ -435,7 +435,7 @@ def shown(value: Any) -> str:
 
 
 def rows_of(module: str, real: dict[str, Any], ours: dict[str, Any]) -> list[tuple[str, str, str, str]]:
-    """Return (name, real signature, state, note) of a module's names; of those that it only re-exports, the missing ones."""
+    """Return (name, real signature, state, note) for a module's names; of names that it re-exports, only the missing ones."""
     rows = []
 
     for name, is_real in sorted(real.items(), key=lambda item: item[0].lower()):
@@ -561,7 +561,7 @@ NOT_OFFERED = {
     "rospy.impl": "rospy's threads and sockets; ours are minirospy.runtime",
     "": "its command's inside",
 }
-"""Prefix of a module's name -> what it is."""
+"""Descriptions of modules that are not offered, by the prefix of their names."""
 
 
 def described_by(python: str, option: str = "--describe") -> dict[str, Any]:
