@@ -28,12 +28,12 @@ entrypoints = [
     { name = "catkin", install-path = "/home/me/.local/bin/catkin", from = "minirospy" },
 ]
 """
-"""The format of uv 0.13."""
+"""The format used by uv 0.13."""
 
 
 @pytest.fixture
 def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the folder of an environment in which this process seems to run."""
+    """Return the folder of an environment in which this process appears to run."""
     folder = tmp_path / "minirospy"
     folder.mkdir()
     monkeypatch.setattr(sys, "prefix", str(folder))

@@ -1,4 +1,4 @@
-"""Wait for a condition that no event reports: the only place in the tests that polls.
+"""Wait for a condition that no event reports. No other module in the tests polls.
 
 A test that uses a loop with a stopped clock needs ``until`` of :mod:`tests.manual_loop`.
 """
@@ -18,7 +18,7 @@ _PAUSE = 0.005  # seconds between two calls of a condition
 def wait_until(
     condition: Callable[[], object], seconds: float = _PATIENCE, error: str = "the condition does not hold"
 ) -> None:
-    """Return once a condition is true. Raise TimeoutError with the text ``error`` if it is not in time."""
+    """Return once a condition is true. Raise TimeoutError with the message ``error`` if that takes too long."""
     end = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > end:
@@ -27,7 +27,7 @@ def wait_until(
 
 
 async def until(condition: Callable[[], object], seconds: float = _PATIENCE) -> None:
-    """Let the loop run until a condition is true. Raise TimeoutError if it is not in time."""
+    """Let the loop run until a condition is true. Raise TimeoutError if that takes too long."""
     end = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > end:

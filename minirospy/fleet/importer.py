@@ -142,7 +142,10 @@ class Importer:
         return list(self.robots)
 
     async def start(self) -> None:
-        """Show robots until :meth:`close`. Raise MasterUnreachableError if no master answers, or RpcError if the call fails."""
+        """Show robots until :meth:`close`.
+
+        Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
+        """
         self._node.parameters.listeners.append(self._parameter_changed)
         await self._node.parameters.add(MACHINES)
         await self._read_machines()

@@ -1,4 +1,4 @@
-"""The output of `rostopic echo`, byte for byte as the real one's, and messages from YAML values."""
+"""The output of `rostopic echo`, which equals the real one's byte for byte, and messages from YAML values."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_notes_in_the_place_of_arrays_and_strings() -> None:
 
 
 def test_notes_are_as_ros_writes_them() -> None:
-    """Messages in arrays are shown completely; the note of an array of fixed length keeps its bracket."""
+    """Messages in arrays are printed completely; the note for an array with a fixed length keeps its bracket."""
     info = CameraInfo()
     assert 'K: "<array type: float64[9, length: 9>"\n' in echo(info, arrays=False)
     markers = MarkerArray([Marker(ns="n", text="t")])

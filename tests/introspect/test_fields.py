@@ -1,4 +1,4 @@
-"""Field paths: parsed, followed into messages, and typed."""
+"""Field paths: parsing them, following them into messages, and their types."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ def node(master: str) -> Iterator[ToolNode]:
         )
         tool._loop.run(tool._node.serve(server))
         yield tool
-    gc.collect()  # objects that user code does not close are closed on deletion
+    gc.collect()  # objects that user code does not close are closed when they are deleted
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")

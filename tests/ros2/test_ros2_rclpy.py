@@ -1,4 +1,4 @@
-"""The ROS 2 bridge in the thread of rclpy's executor, with classes in place of rclpy's."""
+"""The ROS 2 bridge in the thread of rclpy's executor, with fake classes in place of rclpy's."""
 
 from __future__ import annotations
 

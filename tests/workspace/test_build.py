@@ -1,4 +1,4 @@
-"""catkin_make: plans, order, generated modules, relays, and one-line errors."""
+"""catkin_make: plans, build order, generated modules, relays, and one-line errors."""
 
 from __future__ import annotations
 
@@ -234,7 +234,7 @@ def test_the_ways_to_write_a_setup(scene: Scene, text: str) -> None:
 
 
 def test_programs_are_in_devel(scene: Scene) -> None:
-    """Scripts of setup.py are on PATH, as in catkin; scripts installed as Python programs are found by real rosrun."""
+    """Scripts in setup.py are on PATH, as in catkin; real rosrun finds scripts that are installed as Python programs."""
     lines = (
         "#!/usr/bin/env python3\nimport helper, sys\nprint(__name__, __file__, helper.VALUE, sys.argv[1:])\n"
     )
@@ -524,7 +524,7 @@ def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
     ],
 )
 def test_a_dependency_that_package_xml_lacks(scene: Scene, depends: str, cmake: str, text: str) -> None:
-    """As in catkin, exported dependencies must be declared."""
+    """Exported dependencies must be declared, as in catkin."""
     folder = scene.package("p", cmake, depends)
     error = mistakes(scene)
     assert error.file == str(folder / "CMakeLists.txt")
@@ -534,7 +534,7 @@ def test_a_dependency_that_package_xml_lacks(scene: Scene, depends: str, cmake: 
 
 
 def test_missing_package_with_a_similar_name_is_a_warning(scene: Scene) -> None:
-    """As in catkin, other packages of the workspace and the rest of this one are built."""
+    """The workspace's other packages and the rest of this one are built, as in catkin."""
     folder = scene.package("p", "find_package(catkin REQUIRED COMPONENTS\n std_msg)")
     scene.messages("q", {"msg/A.msg": "int8 a\n"})
 
@@ -619,7 +619,7 @@ def test_warnings(scene: Scene) -> None:
 
 
 def test_message_that_is_used_but_not_listed_is_found(scene: Scene) -> None:
-    """Found by its own package and by others, also if it uses another one; as in ROS, which generates no class for it."""
+    """Its own package and others find it, even if it uses another such message. ROS does the same, but generates no class."""
     first = (
         "find_package(catkin REQUIRED COMPONENTS rospy message_generation)\nadd_message_files(FILES A.msg)\n"
     )
@@ -643,7 +643,7 @@ def test_message_that_is_used_but_not_listed_is_found(scene: Scene) -> None:
     said = python(scene, "import p.msg, q.msg; print(p.msg.A().b[1].c.x, q.msg.A([p.msg.D(3)]).many[0].D)")
     assert said == "0 3\n"
 
-    # It counts as a source of the other messages.
+    # The message counts as a source of those that use it, so that a change to it is detected.
     assert not scene.build()["p"].changed
     (folder / "msg" / "C.msg").write_text("int8 y\n")
     assert scene.build()["p"].changed
@@ -653,7 +653,7 @@ def test_message_that_is_used_but_not_listed_is_found(scene: Scene) -> None:
 def test_large_package_reads_each_definition_a_few_times(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Robot arm drivers have hundreds of services: the steps grow with their number, not with its square."""
+    """Robot arm drivers have hundreds of services, so the number of steps must be proportional to theirs, not to its square."""
     files = {f"srv/S{number}.srv": "---\n" for number in range(30)}
     files |= {f"action/A{number}.action": "---\n---\n" for number in range(10)}
     scene.messages("arm", files, "std_msgs actionlib_msgs")
@@ -696,7 +696,7 @@ def test_package_xml_that_catkin_would_refuse_is_a_warning(scene: Scene) -> None
 def test_cmake_lists_that_catkin_would_refuse_is_a_warning(
     scene: Scene, cmake: str, line: int, text: str
 ) -> None:
-    """It builds here, and warns the author before a robot with real ROS refuses it."""
+    """The package builds here, but its author is warned before a robot with real ROS rejects it."""
     parts = {
         "find": "find_package(catkin REQUIRED COMPONENTS message_generation)",
         "add": "add_message_files(FILES A.msg)",
@@ -715,7 +715,7 @@ def test_cmake_lists_that_catkin_would_refuse_is_a_warning(
 
 
 def test_a_package_of_another_build_is_left_out(scene: Scene) -> None:
-    """A ROS 2 package in the same repository has no CMakeLists.txt, or one of ament."""
+    """A ROS 2 package in the same repository has no CMakeLists.txt, or one for ament."""
     folder = scene.package("p", "ament_package(")
     file = folder / "package.xml"
     file.write_text(
@@ -729,14 +729,14 @@ def test_a_package_of_another_build_is_left_out(scene: Scene) -> None:
 
 
 def test_nothing_to_generate_is_no_error(scene: Scene) -> None:
-    """As in catkin: some third-party packages still have such a line."""
+    """catkin does the same, because some third-party packages still have such a line."""
     folder = scene.package("p", "find_package(catkin REQUIRED)\ngenerate_messages()")
     (warning,) = scene.build()["p"].warnings
     assert warning.startswith(f"{folder / 'CMakeLists.txt'}:4: generate_messages(): nothing to generate")
 
 
 def test_an_empty_list_of_files_is_empty(scene: Scene) -> None:
-    """FILES without a name adds none; without FILES, the complete folder is used."""
+    """FILES without a name adds no files; without FILES, the complete folder is used."""
     scene.package(
         "p",
         "add_message_files(DIRECTORY msg FILES A.msg)\nadd_service_files(DIRECTORY srv FILES ${NONE})\n"
@@ -790,7 +790,7 @@ def test_built_packages_are_usable_despite_a_faulty_one(
 
 
 def test_variables_of_cmake(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    """-DNAME=VALUE is visible in CMakeLists.txt; some names are catkin's own."""
+    """-DNAME=VALUE is visible in CMakeLists.txt; some names are reserved for catkin."""
     scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
     scene.package("p", 'option(LAMP "with a lamp" OFF)\nif(LAMP)\ncatkin_python_setup()\nendif()')
     words = ["-C", str(scene.root)]
@@ -845,7 +845,7 @@ def test_typed_wrong(
 
 
 def test_in_the_wrong_folder(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    """In src, in a subfolder of it, in devel: the error names the right folder."""
+    """In src, in a subfolder of src, and in devel, the error names the right folder."""
     scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
     assert catkin_make(["-C", str(scene.root)]) == 0
     for below in ("src", "src/led_msgs/msg", "devel"):
@@ -864,7 +864,7 @@ def test_not_in_the_package(scene: Scene, capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_ctrl_c_in_a_setup(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    """`catkin_make && roslaunch ...` stops; the next build does the rest."""
+    """`catkin_make && roslaunch ...` stops; the next build completes the rest."""
     folder = scene.package("tools", "catkin_python_setup()", "", {"setup.py": "raise KeyboardInterrupt\n"})
     words = ["-C", str(scene.root)]
     for command in (catkin_make, catkin_make_isolated):
@@ -951,7 +951,7 @@ def test_install(scene: Scene) -> None:
 
 
 def test_missing_files_are_errors_of_install_only(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    """As in CMake: a package whose install rules list files that do not exist builds."""
+    """As in CMake, a package whose install rules list missing files can still be built."""
     folder = scene.package("p", "install(DIRECTORY lanch\n DESTINATION share)", "", {"launch/x.launch": ""})
     assert catkin_make(["-C", str(scene.root)]) == 0
     assert catkin_make(["-C", str(scene.root), "install"]) == 1

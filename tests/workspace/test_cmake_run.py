@@ -1,4 +1,4 @@
-"""The evaluation of CMakeLists.txt: conditions, loops, variables, and included files."""
+"""The evaluation of CMakeLists.txt: conditions, loops, variables and included files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def run(folder: Path, text: str, **variables: str) -> list[Command]:
 
 
 def said(folder: Path, text: str, **variables: str) -> list[str]:
-    """Return the arguments of each `f(...)` that is run, joined."""
+    """Return the arguments of each `f(...)` that is run, joined to a string."""
     return [" ".join(each.arguments) for each in run(folder, text, **variables) if each.name == "f"]
 
 
@@ -133,7 +133,7 @@ def test_loop_over_too_many_numbers_is_refused(tmp_path: Path, stop: str) -> Non
 
 
 def test_macros(tmp_path: Path) -> None:
-    """A macro's body runs only when it is called; a call knows its arguments."""
+    """A macro's body runs only when it is called, and the call passes its arguments."""
     text = (
         "macro(Twice A)\n f(${A} ${ARGN} ${ARGC})\n return()\n f(never)\nendmacro()\n"
         "function(unused)\n f(unused)\nendfunction()\ntwice(a b c)\nTWICE(d)\nf(${A}.)"
@@ -142,7 +142,7 @@ def test_macros(tmp_path: Path) -> None:
 
 
 def test_macro_sets_the_variable_that_an_argument_names(tmp_path: Path) -> None:
-    """A macro's arguments are not variables: `${NAME}` remains the argument even after a set() of that name."""
+    """A macro's arguments are not variables, so `${NAME}` remains the argument even after a set() of that name."""
     text = (
         'macro(Find NAME KIND)\n set(NAME "")\n set(INNER ${KIND})\n'
         " foreach(P IN ITEMS ${ARGN})\n  if(${KIND} STREQUAL k)\n   list(APPEND NAME x${P})\n  endif()\n endforeach()\n"

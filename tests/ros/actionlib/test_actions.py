@@ -79,7 +79,7 @@ reported.wait(30)
         assert "ValueError: bad done callback" in said
 
     def test_cancel_of_all_does_not_overtake_a_goal(self) -> None:
-        """A goal of a third-party client waits a moment before it is accepted, and a cancel request waits longer."""
+        """A goal from a third-party client is accepted after a short delay; a cancel request is delayed longer."""
         said = run("""
 from types import SimpleNamespace
 import minirospy.ros.actionlib.actionlib.server as module
@@ -121,7 +121,7 @@ print(client.gh.get_comm_state() == actionlib.CommState.DONE, client.get_state()
         assert said == "True 3\n"
 
     def test_statuses_of_many_goals_are_published_less_often(self) -> None:
-        """With few goals each change publishes the list; with 600 goals, lists are at least 60 ms apart."""
+        """With few goals, each change publishes the list; with 600 goals, lists are at least 60 ms apart."""
         said = run("""
 from types import SimpleNamespace
 import minirospy.ros.actionlib.actionlib.server as module
@@ -171,7 +171,7 @@ print(client.wait_for_result())
         assert said == "True\n[False]\nTrue\n"
 
     def test_goal_and_cancel_callbacks_never_meet_a_lock_crosswise(self) -> None:
-        """A goal arrives while another finishes: actionlib takes its two locks in opposite orders."""
+        """A goal arrives while another one finishes. actionlib would acquire its two locks in opposite orders."""
         said = run("""
 def ask():
     own = actionlib.SimpleActionClient("server", TestAction)

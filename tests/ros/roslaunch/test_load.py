@@ -379,7 +379,7 @@ def test_file_that_explodes_is_refused_in_one_line(packages: Packages, body: str
 
 
 def test_files_that_include_the_next_one_twice_are_refused(packages: Packages, tmp_path: Path) -> None:
-    # 2^40 includes, without a limit.
+    # Without a limit, there would be 2^40 includes.
     for number in range(40):
         include = f'<include file="$(dirname)/f{number + 1}.launch"/>'
         (tmp_path / f"f{number}.launch").write_text(f"<launch>{include * 2}</launch>")
@@ -410,7 +410,7 @@ def test_args_that_double_are_refused(packages: Packages) -> None:
     ids=["open", "nested", "bracket", "package", "words"],
 )
 def test_long_substitutions_take_no_time(packages: Packages, text: str, why: str | None) -> None:
-    # The first one took 20 s: each of its characters was tried as the end of two parts.
+    # Without the fix, the first one took 20 s, because each character was tried as the end of two parts.
     if why is None:
         assert load(packages, f'<param name="p" value="{text}"/>').params == {"/p": text}
         return
