@@ -11,6 +11,7 @@ import pytest
 import roslaunch
 import roslaunch.roslaunch_logs
 
+from minirospy.ros.roslaunch.launcher.spec import ParameterCommand
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
 from tests.waiting import wait_until
@@ -202,3 +203,13 @@ def test_nothing_is_left_of_a_program_that_forgets_its_launch(master: str, packa
     )
     assert "pid " in done.stdout
     assert done.returncode == 0
+
+
+def test_a_configuration_runs_the_commands_that_it_was_given() -> None:
+    config = roslaunch.ROSLaunchConfig()
+    text = '<launch><rosparam command="delete" param="a"/><rosparam command="dump" file="f" ns="b"/><bogus/></launch>'
+    roslaunch.XmlLoader().load_string(text, config, verbose=False)
+    config.add_executable(roslaunch.core.Executable("echo", ["hi"], roslaunch.core.PHASE_SETUP))
+    assert config.spec.commands == [ParameterCommand("/a"), ParameterCommand("/b", "f")]
+    assert config.config_errors == ["unrecognized tag bogus"]
+    assert [str(warning) for warning in config.spec.warnings] == ["<stdin>:1: unrecognized tag <bogus>"]

@@ -88,6 +88,11 @@ def test_private_params_go_to_the_nodes_that_follow(packages: Packages) -> None:
     assert spec.params == {"/after/x": 1}
 
 
+def test_a_param_takes_precedence_over_a_rosparam_of_its_node(packages: Packages) -> None:
+    node = '<node pkg="rpi_feros" type="n" name="n"><param name="a" value="1"/><rosparam>{a: 2, b: 3}</rosparam></node>'
+    assert load(packages, f'<param name="~b" value="4"/>{node}').params == {"/n/a": 1, "/n/b": 4}
+
+
 def test_rosparam_sets_leaves_and_leaves_siblings_alone(packages: Packages) -> None:
     spec = load(
         packages,
