@@ -466,7 +466,10 @@ print(eventually(lambda: publisher.get_num_connections() == 0))
     assert errors.count("LookupError: bad property") == 1
 
 
-MISSING_SPIN = "the program ends while it subscribes to {}, before any message has arrived. rospy.spin() at its end keeps it running"
+MISSING_SPIN = (
+    "the program ends while it subscribes to {}, before any message has arrived. "
+    "rospy.spin() at its end keeps it running"
+)
 
 
 @pytest.mark.parametrize(
