@@ -6,6 +6,7 @@ Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
@@ -30,6 +31,7 @@ _log = logging.getLogger("rosout")
 _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _BUFF_SIZE = 65536
+_NEW_SECONDS = 2.0  # a program that ends sooner after its last Subscriber has not waited for messages
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
 """Topics that are not counted: the statistics themselves, and the clock that provides their times."""
 
@@ -159,6 +161,18 @@ class SubscribedTopic(SharedTopic):
         self._statistics: StatisticsPublisher | None = None
         self._misfits = RateLimitedLogger(_log)
         self._registered = False
+        self._since = time.monotonic()  # when the last Subscriber was created
+
+    @property
+    def has_callback(self) -> bool:
+        """Return whether a Subscriber has a callback."""
+        return any(handle.callback is not None for handle in self._handles)
+
+    @property
+    def is_new(self) -> bool:
+        """Return whether no message has arrived, and the last Subscriber was created just before."""
+        has_received = any(link.received for link in self.links)
+        return not has_received and time.monotonic() - self._since < _NEW_SECONDS
 
     @property
     def links(self) -> tuple[InLink, ...]:
@@ -199,6 +213,7 @@ class SubscribedTopic(SharedTopic):
             self.buff_size = buff_size
         self.tcp_nodelay = self.tcp_nodelay or tcp_nodelay
         self._handles.append(handle)
+        self._since = time.monotonic()
         self._update()
 
     def leave(self, handle: Subscriber[Message]) -> None:

@@ -237,9 +237,9 @@ class _Builder:
             *(ours / "core" / "idl").glob("*.py"),
             *(ours / "ros" / "dynamic_reconfigure" / "dynamic_reconfigure").glob("*.py"),
         ]
-        made_of = [
-            path for plan in plans for path in (*plan.definitions, *_option_files(plan), plan.cmake_lists)
-        ]
+        made_of = [path for plan in plans for path in (*plan.definitions, *_option_files(plan))]
+        # A package that is left out may have no CMakeLists.txt.
+        made_of += [plan.cmake_lists for plan in plans if plan.cmake_lists.is_file()]
         self._key = _key([*made_of, *compiler])
 
     def package(self, plan: Plan) -> Report:

@@ -157,7 +157,12 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
         collector.warn(manifest.path, *problem)
 
     if not file.is_file():
-        raise BuildError(str(file), 0, f"package [{manifest.name}] has no CMakeLists.txt")
+        collector.warn(
+            manifest.path,
+            1,
+            f"package [{manifest.name}] is left out: it has no CMakeLists.txt, of which `catkin_create_pkg` writes an example",
+        )
+        return collector.plan()
 
     try:
         for command in run_cmake(file, {**_variables(folder, manifest.name), **(variables or {})}):

@@ -504,8 +504,6 @@ def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
         (folder / "setup.py").write_text(line)
         assert mistakes(scene).text == text
 
-    (folder / "CMakeLists.txt").unlink()
-    assert mistakes(scene).text == "package [p] has no CMakeLists.txt"
     (folder / "package.xml").write_text("<package>\n<name>p</nam></package>")
     error = mistakes(scene)
     assert isinstance(error, ManifestError)
@@ -723,9 +721,28 @@ def test_a_package_of_another_build_is_left_out(scene: Scene) -> None:
             "</package>", "<export><build_type>ament_cmake</build_type></export></package>"
         )
     )
-    report = scene.build()["p"]
-    assert report.warnings == (f"{file}:1: left out: it is built by [ament_cmake], not by catkin",)
-    assert report.made == ""
+    for _ in range(2):
+        report = scene.build()["p"]
+        assert report.warnings == (f"{file}:1: left out: it is built by [ament_cmake], not by catkin",)
+        assert report.made == ""
+        (folder / "CMakeLists.txt").unlink(missing_ok=True)
+
+
+def test_package_without_cmake_lists_is_left_out(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    folder = scene.package("copied", "")
+    (folder / "CMakeLists.txt").unlink()
+    warning = (
+        f"{folder / 'package.xml'}:1: package [copied] is left out: it has no CMakeLists.txt, of which `catkin_create_pkg` "
+        "writes an example"
+    )
+    reports = scene.build()
+    assert (reports["copied"].warnings, reports["copied"].made) == ((warning,), "")
+    assert reports["led_msgs"].made == "1 message"
+    assert python(scene, "import led_msgs.msg; print(led_msgs.msg.Led(number=1).number)") == "1\n"
+
+    assert catkin_make(["-C", str(scene.root)]) == 0
+    assert capsys.readouterr().err == f"WARNING: {warning}\n"
 
 
 def test_nothing_to_generate_is_no_error(scene: Scene) -> None:

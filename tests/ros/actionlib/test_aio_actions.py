@@ -17,6 +17,7 @@ from minirospy import Node
 from minirospy.base.errors import ROSException, ROSInterruptException
 from minirospy.core.graph.goals import GoalState
 from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, GoalError, ServerGoal
+from minirospy.ros.actionlib.actionlib.aio import client as client_module
 from minirospy.ros.actionlib.actionlib.aio import server as server_module
 from minirospy.ros.actionlib.actionlib.spec import ActionException
 from tests.waiting import until
@@ -322,6 +323,57 @@ def test_a_server_that_ends_aborts_and_one_that_forgot_loses() -> None:
             await goal
 
     run(forgetful)
+
+
+SERVER = """
+import asyncio
+import minirospy
+from actionlib import msg
+from minirospy.ros.actionlib.actionlib.aio import ActionServer
+
+async def execute(goal):
+    print("got", goal.request.goal, flush=True)
+    await asyncio.sleep(1000)
+
+async def main():
+    async with minirospy.Node("other") as node, ActionServer(node, "other", msg.TestAction, execute):
+        print("ready", flush=True)
+        await node.spin()
+
+asyncio.run(main())
+"""
+
+
+def test_goal_is_lost_when_its_server_dies(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(client_module, "SERVER_SECONDS", 0.2)
+
+    async def main() -> None:
+        server = await asyncio.create_subprocess_exec(
+            sys.executable, "-c", SERVER, stdout=asyncio.subprocess.PIPE
+        )
+        assert server.stdout
+        async with (
+            Node("client", rosout=False) as node,
+            ActionClient(node, "other", msg.TestAction) as client,
+        ):
+            assert await server.stdout.readline() == b"ready\n"
+            goal = client.send(msg.TestGoal(3))
+            assert await server.stdout.readline() == b"got 3\n"
+            server.kill()
+            with pytest.raises(GoalError, match="lost: the server has died or is unreachable"):
+                await goal
+            await server.wait()
+            assert goal.state is GoalState.LOST
+            # A goal that has not been sent waits for the next server.
+            waiting = client.send(msg.TestGoal(1))
+            await asyncio.sleep(0.5)
+            assert not waiting.done
+        text = f"The action server [/other] has died or is unreachable: goal {goal.id} is LOST"
+        assert caplog.messages.count(text) == 1
+
+    asyncio.run(asyncio.wait_for(main(), SECONDS))
 
 
 def test_a_goal_waits_for_its_server() -> None:
