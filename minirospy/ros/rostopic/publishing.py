@@ -69,11 +69,13 @@ def publish_message(
         )
         publish_latched(pub, message, once, verbose)
     except rospy.ROSSerializationException as error:
-        from minirospy.ros.rosmsg.rosmsg import get_msg_text
+        from minirospy.introspect.interfaces import Interfaces, Kind
+        from minirospy.workspace.packages import Packages
 
+        definition = Interfaces(Packages(), Kind.MESSAGE).description(msg_class._type)
         raise ROSTopicException(
             "Unable to publish message. One of the fields has an incorrect type:\n"
-            f"  {error}\n\nmsg file:\n{get_msg_text(msg_class._type)}"
+            f"  {error}\n\nmsg file:\n{definition}"
         ) from error
 
 
