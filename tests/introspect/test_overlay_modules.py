@@ -165,7 +165,7 @@ def test_rosmsg() -> None:
     assert rosmsg.get_srv_text("std_srvs/SetBool") == "bool data\n---\nbool success\nstring message\n"
     assert "std_msgs/Bool" in rosmsg.list_msgs("std_msgs")
     assert rosmsg.list_srvs("std_srvs") == ["std_srvs/Empty", "std_srvs/SetBool", "std_srvs/Trigger"]
-    with pytest.raises(rosmsg.ROSMsgException, match="not found"):
+    with pytest.raises(rosmsg.ROSMsgException, match="Cannot locate"):
         rosmsg.get_msg_text("std_msgs/Nope")
 
 
