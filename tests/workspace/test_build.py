@@ -890,6 +890,15 @@ def test_tests_are_run(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
     assert "Summary: 1 tests, 0 errors, 1 failures, 0 skipped" in capfd.readouterr().out
 
 
+def test_src_of_a_folder_above_is_no_workspace(scene: Scene) -> None:
+    """~/src is not the workspace of ~/project; it is that of ~/src/project."""
+    for name in ("project", "src/project"):
+        (scene.root / name).mkdir()
+    assert find_workspace(scene.root / "src" / "project") == find_workspace(scene.root) == scene.root
+    with pytest.raises(BuildError, match="not in a workspace"):
+        find_workspace(scene.root / "project")
+
+
 def test_install(scene: Scene) -> None:
     folder = scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
     scene.package(
