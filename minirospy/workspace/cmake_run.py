@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -54,12 +54,15 @@ class _Leave(Exception):
     """Raised by ``return()``, ``break()`` or ``continue()``."""
 
 
-def run_cmake(file: Path, variables: Mapping[str, str]) -> Iterator[Command]:
+def run_cmake(
+    file: Path, variables: Mapping[str, str], own: Collection[str] = frozenset()
+) -> Iterator[Command]:
     """Yield the commands that a CMakeLists.txt runs. ``variables`` are set beforehand; ``ENV{X}`` is an environment variable.
 
+    ``own``: commands that are yielded even if the file defines a macro of that name.
     Raise BuildError if the file does not exist, a bracket is not closed, or a condition or pattern does not parse.
     """
-    return _Run(file.parent, dict(variables), {}, 0).file(file)
+    return _Run(file.parent, dict(variables), {}, 0, own).file(file)
 
 
 def _items(text: str) -> list[str]:
@@ -90,15 +93,23 @@ class _Run:
     """Runs the commands of one folder.
 
     ``_known``: the variables of the current scope; ``_raised``: those that ``PARENT_SCOPE`` sets in the enclosing scope;
-    ``_macros``: the defined macros and functions.
+    ``_macros``: the defined macros and functions; ``_own``: names that these cannot take.
     """
 
-    def __init__(self, folder: Path, known: dict[str, str], macros: dict[str, _Macro], depth: int) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        known: dict[str, str],
+        macros: dict[str, _Macro],
+        depth: int,
+        own: Collection[str],
+    ) -> None:
         self._folder = folder
         self._known = known
         self._raised: dict[str, str] = {}
         self._macros = macros
         self._depth = depth
+        self._own = own
 
         self._readers: dict[str, Callable[[Statement, list[str], Path], Iterator[Command]]] = {
             "if": self._if,
@@ -242,7 +253,7 @@ class _Run:
         raise _Leave(statement.name)
 
     def _define(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
-        if arguments:
+        if arguments and arguments[0].lower() not in self._own:
             has_scope = statement.name == "function"
             self._macros[arguments[0].lower()] = _Macro(has_scope, arguments[1:], statement.body, file)
         yield from ()
@@ -303,7 +314,7 @@ class _Run:
                     f"add_subdirectory({name}): {folder / 'CMakeLists.txt'} does not exist",
                 )
             places = dict.fromkeys(("CMAKE_CURRENT_SOURCE_DIR", "CMAKE_CURRENT_LIST_DIR"), folder.as_posix())
-            below = _Run(folder, {**self._known, **places}, self._macros, self._depth)
+            below = _Run(folder, {**self._known, **places}, self._macros, self._depth, self._own)
             yield from below.file(folder / "CMakeLists.txt")
             self._known.update(below._raised)
 

@@ -11,7 +11,7 @@ import fnmatch
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -160,7 +160,8 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
         raise BuildError(str(file), 0, f"package [{manifest.name}] has no CMakeLists.txt")
 
     try:
-        for command in run_cmake(file, {**_variables(folder, manifest.name), **(variables or {})}):
+        known = {**_variables(folder, manifest.name), **(variables or {})}
+        for command in run_cmake(file, known, collector.commands):
             collector.read(command)
     except RecursionError:
         raise BuildError(str(file), 1, "is nested too deeply") from None
@@ -203,6 +204,11 @@ class _Collector:
             "set_target_properties": self._target_properties,
             **dict.fromkeys(_TESTS, self._test),
         }
+
+    @property
+    def commands(self) -> Collection[str]:
+        """Return the names of the commands that have an effect."""
+        return self._readers.keys()
 
     def read(self, command: Command) -> None:
         """Record a command's effect on the plan. Raise BuildError if the command is invalid."""

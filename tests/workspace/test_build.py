@@ -899,6 +899,22 @@ def test_src_of_a_folder_above_is_no_workspace(scene: Scene) -> None:
         find_workspace(scene.root / "project")
 
 
+def test_a_macro_of_a_package_does_not_replace_catkins(scene: Scene) -> None:
+    """As dynamic_reconfigure in a workspace: its macro would run CMake's add_custom_command."""
+    scene.package(
+        "p",
+        "include(cmake/own.cmake)\nfind_package(catkin REQUIRED COMPONENTS message_generation)\n"
+        "add_message_files(FILES A.msg)\nall_of_them()",
+        "message_generation",
+        {
+            "msg/A.msg": "int8 a\n",
+            "cmake/own.cmake": "macro(generate_messages)\n add_custom_command(OUTPUT x COMMAND y)\nendmacro()\n"
+            "macro(all_of_them)\n generate_messages()\nendmacro()\n",
+        },
+    )
+    assert scene.build()["p"].made == "1 message"
+
+
 def test_install(scene: Scene) -> None:
     folder = scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
     scene.package(
