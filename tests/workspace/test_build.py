@@ -915,6 +915,55 @@ def test_a_macro_of_a_package_does_not_replace_catkins(scene: Scene) -> None:
     assert scene.build()["p"].made == "1 message"
 
 
+def test_files_that_cmake_makes_are_not_installed(scene: Scene) -> None:
+    scene.package(
+        "p",
+        "configure_file(a.in ${CATKIN_DEVEL_PREFIX}/a)\ninstall(FILES ${CATKIN_DEVEL_PREFIX}/a DESTINATION x)\n"
+        "install(FILES $<TARGET_FILE:p> ${PROJECT_BINARY_DIR}/b DESTINATION x)",
+    )
+    assert catkin_make(["-C", str(scene.root), "install"]) == 0
+
+
+def test_downloads(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    source = scene.root / "data.txt"
+    source.write_text("some data")
+    md5 = "1e50210a0202497fb79bc38b6ade6c34"
+    url = source.as_uri()
+    scene.package(
+        "p",
+        f"catkin_download(p_data {url} FILENAME a.txt MD5 {md5})\n"
+        f"catkin_download_test_data(p_test {url} DESTINATION ${{CATKIN_DEVEL_PREFIX}}/share/p MD5 {md5})\n"
+        f"catkin_download(p_none {url}.none)",
+    )
+    made, tested = scene.root / "build" / "p" / "a.txt", scene.devel / "share" / "p" / "data.txt"
+    assert catkin_make(["-C", str(scene.root)]) == 0
+    said = capsys.readouterr().out
+    assert f"Downloading {url} to {made}... done.\n" in said
+    assert f"Downloading {url}.none to {made.with_name('data.txt.none')}... failed (" in said
+    assert made.read_text() == "some data"
+    assert not tested.exists()
+
+    made.write_text("changed")
+    assert catkin_make(["-C", str(scene.root), "run_tests"]) == 0
+    assert (made.read_text(), tested.read_text()) == ("some data", "some data")
+
+    capsys.readouterr()
+    assert catkin_make(["-C", str(scene.root)]) == 0
+    assert f"to {made}..." not in capsys.readouterr().out
+
+    source.write_text("other data")
+    made.unlink()
+    assert catkin_make(["-C", str(scene.root)]) == 1
+    assert f"{url} has another MD5 sum than {md5}" in capsys.readouterr().err
+
+
+def test_download_that_is_required(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = scene.package("p", f"catkin_download(p_data {scene.root.as_uri()}/none REQUIRED)")
+    assert catkin_make(["-C", str(scene.root)]) == 1
+    line = f"{folder / 'CMakeLists.txt'}:3: cannot download {scene.root.as_uri()}/none: "
+    assert line in capsys.readouterr().err
+
+
 def test_install(scene: Scene) -> None:
     folder = scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
     scene.package(
