@@ -25,6 +25,7 @@ from minirospy.base.errors import (
     ServiceException,
     WireError,
 )
+from minirospy.base.numpy_names import add_numpy_note
 from minirospy.base.times import Duration
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import Session, current_session
@@ -162,6 +163,7 @@ class Service(Generic[_S_co]):
             raise ServiceException(f"error processing request: {error}") from error
 
     def _report(self, error: Exception) -> None:
+        add_numpy_note(error)
         try:
             self.error_handler(error, type(error), error, error.__traceback__)
         except Exception:  # noqa: BLE001 - the user's too; rospy ends the connection, and the client never sees why
