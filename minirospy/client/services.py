@@ -26,6 +26,7 @@ from minirospy.base.errors import (
     TransportException,
     WireError,
 )
+from minirospy.base.numpy_names import add_numpy_note
 from minirospy.base.times import Duration
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import Session, current_session
@@ -204,6 +205,7 @@ class Service(Generic[_S_co]):
         transport.write_data(serialize_failure(ServiceException(err_msg)))
 
     def _report(self, error: Exception) -> None:
+        add_numpy_note(error)
         try:
             self.error_handler(error, type(error), error, error.__traceback__)
         except Exception:  # noqa: BLE001 - the user's too; rospy ends the connection, and the client never sees why

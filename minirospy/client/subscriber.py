@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from minirospy.base.clock import SignalSafeEvent, wait_for_event
 from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
+from minirospy.base.numpy_names import add_numpy_note
 from minirospy.client.connection import Connection, connection_to_publisher
 from minirospy.client.session import Session, current_session
 from minirospy.client.topic import SharedTopic, Topic, register_with_master, unregister_from_master
@@ -367,6 +368,7 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
         else:
             callback.function(message, callback.args)
     except BaseException as error:
+        add_numpy_note(error)
         # As in rospy, sys.exit() has no effect in a link's thread, but exits the program inside the Subscriber()
         # call.
         if is_callers_thread and not isinstance(error, Exception):

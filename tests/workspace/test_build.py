@@ -907,6 +907,80 @@ def test_tests_are_run(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
     assert "Summary: 1 tests, 0 errors, 1 failures, 0 skipped" in capfd.readouterr().out
 
 
+def test_src_of_a_folder_above_is_no_workspace(scene: Scene) -> None:
+    """~/src is not the workspace of ~/project; it is that of ~/src/project."""
+    for name in ("project", "src/project"):
+        (scene.root / name).mkdir()
+    assert find_workspace(scene.root / "src" / "project") == find_workspace(scene.root) == scene.root
+    with pytest.raises(BuildError, match="not in a workspace"):
+        find_workspace(scene.root / "project")
+
+
+def test_a_macro_of_a_package_does_not_replace_catkins(scene: Scene) -> None:
+    """As dynamic_reconfigure in a workspace: its macro would run CMake's add_custom_command."""
+    scene.package(
+        "p",
+        "include(cmake/own.cmake)\nfind_package(catkin REQUIRED COMPONENTS message_generation)\n"
+        "add_message_files(FILES A.msg)\nall_of_them()",
+        "message_generation",
+        {
+            "msg/A.msg": "int8 a\n",
+            "cmake/own.cmake": "macro(generate_messages)\n add_custom_command(OUTPUT x COMMAND y)\nendmacro()\n"
+            "macro(all_of_them)\n generate_messages()\nendmacro()\n",
+        },
+    )
+    assert scene.build()["p"].made == "1 message"
+
+
+def test_files_that_cmake_makes_are_not_installed(scene: Scene) -> None:
+    scene.package(
+        "p",
+        "configure_file(a.in ${CATKIN_DEVEL_PREFIX}/a)\ninstall(FILES ${CATKIN_DEVEL_PREFIX}/a DESTINATION x)\n"
+        "install(FILES $<TARGET_FILE:p> ${PROJECT_BINARY_DIR}/b DESTINATION x)",
+    )
+    assert catkin_make(["-C", str(scene.root), "install"]) == 0
+
+
+def test_downloads(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    source = scene.root / "data.txt"
+    source.write_text("some data")
+    md5 = "1e50210a0202497fb79bc38b6ade6c34"
+    url = source.as_uri()
+    scene.package(
+        "p",
+        f"catkin_download(p_data {url} FILENAME a.txt MD5 {md5})\n"
+        f"catkin_download_test_data(p_test {url} DESTINATION ${{CATKIN_DEVEL_PREFIX}}/share/p MD5 {md5})\n"
+        f"catkin_download(p_none {url}.none)",
+    )
+    made, tested = scene.root / "build" / "p" / "a.txt", scene.devel / "share" / "p" / "data.txt"
+    assert catkin_make(["-C", str(scene.root)]) == 0
+    said = capsys.readouterr().out
+    assert f"Downloading {url} to {made}... done.\n" in said
+    assert f"Downloading {url}.none to {made.with_name('data.txt.none')}... failed (" in said
+    assert made.read_text() == "some data"
+    assert not tested.exists()
+
+    made.write_text("changed")
+    assert catkin_make(["-C", str(scene.root), "run_tests"]) == 0
+    assert (made.read_text(), tested.read_text()) == ("some data", "some data")
+
+    capsys.readouterr()
+    assert catkin_make(["-C", str(scene.root)]) == 0
+    assert f"to {made}..." not in capsys.readouterr().out
+
+    source.write_text("other data")
+    made.unlink()
+    assert catkin_make(["-C", str(scene.root)]) == 1
+    assert f"{url} has another MD5 sum than {md5}" in capsys.readouterr().err
+
+
+def test_download_that_is_required(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = scene.package("p", f"catkin_download(p_data {scene.root.as_uri()}/none REQUIRED)")
+    assert catkin_make(["-C", str(scene.root)]) == 1
+    line = f"{folder / 'CMakeLists.txt'}:3: cannot download {scene.root.as_uri()}/none: "
+    assert line in capsys.readouterr().err
+
+
 def test_install(scene: Scene) -> None:
     folder = scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
     scene.package(
