@@ -155,7 +155,7 @@ def test_without_a_master() -> None:
         (lambda: rosparam.get_param("/a"), rosparam.RosParamIOException),
     ]
     for ask, error in asked:
-        with pytest.raises(error, match="^Unable to communicate with master!$") as raised:
+        with pytest.raises(error, match=r"^Unable to communicate with master!$") as raised:
             ask()
         assert "no ROS master answers at http://localhost:1" in str(raised.value.__cause__)
 
