@@ -195,14 +195,16 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
         # Treat the step as the name of a field that no message has.
         steps = tuple(Step(each, None) for each in fields)
 
+    def report(error: NotFoundError | IndexError) -> None:
+        why = f"no field named {error.name} in" if isinstance(error, NotFoundError) else f"{error.__cause__}:"
+        print(why, pattern, file=sys.stderr)
+
     def value(message: Message) -> object:
         try:
-            return field_value(message, steps)
-        except NotFoundError as error:
-            print(f"no field named {error.name} in {pattern}", file=sys.stderr)
-        except IndexError:
-            print(f"list index out of range: {pattern}", file=sys.stderr)
-        return None
+            return field_value(message, steps, report)
+        except (NotFoundError, IndexError) as error:
+            report(error)
+            return None
 
     return value if steps else None
 
