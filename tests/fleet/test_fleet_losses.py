@@ -149,12 +149,11 @@ def test_a_router_that_is_lost_and_comes_back(fleet: Fleet) -> None:
         fleet.until_shown(control, "/robot1/chat")
         fleet.run(strings.wait_for_subscribers(1, SECONDS))
 
-        async def publish() -> None:
-            while not found:
-                await strings.publish("again")
-                await asyncio.sleep(0.05)
+        async def is_received() -> bool:
+            await strings.publish("again")
+            return bool(found)
 
-        fleet.run(publish())
+        fleet.until(is_received)
     finally:
         fleet.run(router.close())
 
