@@ -615,13 +615,15 @@ def test_a_second_start_that_cannot_listen_does_not_end_the_first(
     endpoint = f"127.0.0.1:{free_port()}"
     running = start(*words, "--listen", endpoint)
     until_line(running, "(gateway ")
-    for wrong in (endpoint, "192.0.2.1:7447", "no-such-host.invalid"):
-        code, text = ended(start(*words, "--listen", wrong))
+    # A gateway that waits for a router that does not run has not taken the name.
+    waiting = start(*words, "--connect", f"127.0.0.1:{free_port()}")
+    wrong = [
+        start(*words, "--listen", listen) for listen in (endpoint, "192.0.2.1:7447", "no-such-host.invalid")
+    ]
+    for code, text in map(ended, wrong):
         assert code == 1
         assert "the fleet's network cannot be opened" in text
         assert "Traceback" not in text
-    # A gateway that waits for a router that does not run has not taken the name.
-    waiting = start(*words, "--connect", f"127.0.0.1:{free_port()}")
     until_line(waiting, "nothing of the fleet answers")
     assert running.poll() is None
 
