@@ -30,6 +30,7 @@ from typing import Any, NamedTuple
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.fuzz import CUT, Faults, mutated
 from tests.fuzz_readers import peak_megabytes
+from tests.waiting import until
 
 FINDING = Path("fuzz-bridge-finding.bin")
 INPUTS_PER_BRIDGE = 2000
@@ -227,10 +228,7 @@ class Target:
             graph = [*bridge.graph.publishers, *bridge.graph.topics]
             return [*connections, *rosbridge, *bridge.video.feeds, *graph]
 
-        end = time.monotonic() + 60
-        while left():
-            assert time.monotonic() < end, left()
-            await asyncio.sleep(0.001)
+        await until(lambda: not left(), pause=0.001)
         assert len(bridge.foxglove.sessions) == 1
         assert not self._faults.found, self._faults.found.pop()
 
@@ -265,8 +263,7 @@ class Target:
         await node.serve("/set", SetBool, lambda request: (request.data, "set"))
         # Keep a client connected, so that the next one is offered channels immediately.
         bridge.foxglove.open(Steady())  # type: ignore[arg-type]
-        while not bridge.foxglove.channels.by_id:
-            await asyncio.sleep(0.01)
+        await until(lambda: bridge.foxglove.channels.by_id)
         self._parts = (master, node, bridge)
 
     async def _end(self) -> None:

@@ -37,6 +37,7 @@ from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, Go
 from minirospy.runtime.transport.loop import LoopThread
 from tests.interop.conftest import OUR_BIN, running_master
 from tests.interop.install_ros2 import PYTHON, STAMP
+from tests.waiting import until
 
 _T = TypeVar("_T")
 HERE = Path(__file__).parent
@@ -220,11 +221,10 @@ class Scene:
     def until(self, condition: Callable[[Snapshot], bool]) -> None:
         """Wait until the ROS 1 graph meets a condition."""
 
-        async def wait() -> None:
-            while not condition(await fetch(self.node.call_master)):
-                await asyncio.sleep(0.05)
+        async def holds() -> bool:
+            return condition(await fetch(self.node.call_master))
 
-        self.run(asyncio.wait_for(wait(), LIMIT))
+        self.run(until(holds, LIMIT, pause=0.05))
 
 
 def reserved_domain(parts: contextlib.ExitStack) -> str:
@@ -779,9 +779,8 @@ def test_a_goal_of_ros1_is_aborted_when_its_server_in_ros2_ends(scene: Scene) ->
             client = ActionClient(scene.node, "/leaving", FibonacciAction)
             await client.wait_for_server()
             goal = client.send(FibonacciGoal(order=1))
-            while goal.state is not GoalState.ACTIVE:
-                assert goal.state not in TERMINAL, goal.text
-                await asyncio.sleep(0.01)
+            await until(lambda: goal.state is GoalState.ACTIVE or goal.state in TERMINAL)
+            assert goal.state is GoalState.ACTIVE, goal.text
             return client, goal
 
         client, goal = scene.run(start())

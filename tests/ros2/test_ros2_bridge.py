@@ -554,7 +554,7 @@ def test_messages_from_ros2_are_not_sent_back() -> None:
 
 @pytest.mark.usefixtures("master")
 def test_publishers_that_do_not_answer_keep_no_topic_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros2.bridge.QUERY_SECONDS", 1.0)
+    monkeypatch.setattr("minirospy.ros2.bridge.QUERY_SECONDS", 0.1)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         topics = [f"/dead{number}" for number in range(40)]

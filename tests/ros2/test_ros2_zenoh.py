@@ -478,7 +478,8 @@ def test_a_domain_has_no_zeros_in_front(endpoint: str, monkeypatch: pytest.Monke
     assert node.domain == "7"
 
 
-def test_without_a_router_one_line_says_what_to_start() -> None:
+def test_without_a_router_one_line_says_what_to_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.zenoh.library.CONNECT_MS", 50)
     where = f"tcp/127.0.0.1:{free_port()}"
     with pytest.raises(BridgeError) as caught:
         ZenohNode("bridge", NetworkOptions((where,)))

@@ -7,10 +7,10 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
+from tests.waiting import wait_until
 from tests.windows.windows import Windows
 
 WINDOWS = Windows()
@@ -111,11 +111,8 @@ Start = Callable[..., Run]
 
 
 def no_process_left() -> None:
-    """Wait until no Windows Python is running."""
-    end = time.monotonic() + SECONDS
-    while left := WINDOWS.processes():
-        assert time.monotonic() < end, [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in left]
-        time.sleep(0.2)
+    """Wait until no Windows Python runs any more."""
+    wait_until(lambda: not WINDOWS.processes(), SECONDS, "Windows processes run", pause=0.2)
 
 
 def command(name: str) -> str:

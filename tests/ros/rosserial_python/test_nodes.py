@@ -80,22 +80,20 @@ def test_devices_connect_by_tcp_one_after_the_other(start: Start, fork: str) -> 
     port = free_port()
     process = start("rosserial_python", "serial_node.py", "tcp", str(port), f"_fork_server:={fork}")
 
-    async def connect() -> socket.socket:
-        while True:
-            try:
-                connection = socket.create_connection(("127.0.0.1", port), SECONDS)
-            except OSError:
-                await asyncio.sleep(0.1)
-            else:
-                connection.settimeout(SECONDS)
-                return connection
+    def connected() -> socket.socket | None:
+        try:
+            return socket.create_connection(("127.0.0.1", port), SECONDS)
+        except OSError:
+            return None
 
     async def body() -> None:
         async with Node("test", rosout=False) as node:
             received = node.subscribe("chatter", String)
             words = node.advertise("words", String)
             for turn in ("first", "second"):
-                with await connect() as device:
+                device = await until(connected)
+                assert device
+                with device:
                     decoder = Decoder()
                     assert await asyncio.to_thread(packets, device, decoder, 1) == [(0, b"")]
                     device.sendall(describe(0, CHATTER, "chatter") + describe(1, WORDS, "words", 280))

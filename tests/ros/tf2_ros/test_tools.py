@@ -23,6 +23,7 @@ from minirospy.ros.tf2_ros.tools import echo, monitor, static_publisher, view
 from minirospy.ros.tf2_ros.tools.angles import euler_of_matrix, rpy_of_matrix
 from minirospy.ros.tf2_ros.tools.monitor import Delays
 from tests.ros.robot_state_publisher.conftest import SECONDS, Start, python
+from tests.waiting import until
 
 STATIC = ("tf2_ros", "static_transform_publisher")
 OLD_STATIC = ("tf", "static_transform_publisher")
@@ -211,8 +212,11 @@ def test_frames_of_a_node_are_drawn(start: Start, tmp_path: Path, monkeypatch: p
     async def listed() -> None:
         async with Node("waits", rosout=False) as node:
             await node.wait_for_service("/tf_buffer/tf2_frames")
-            while "c:" not in (await node.call("/tf_buffer/tf2_frames", FrameGraph)).frame_yaml:
-                await asyncio.sleep(0.02)
+
+            async def has_frame() -> bool:
+                return "c:" in (await node.call("/tf_buffer/tf2_frames", FrameGraph)).frame_yaml
+
+            await until(has_frame)
 
     asyncio.run(asyncio.wait_for(listed(), SECONDS))
     program = start("tf", "view_frames", "--node=/tf_buffer")
