@@ -109,7 +109,7 @@ def test_environment_without_pip_is_one_of_uv(prefix: Path, monkeypatch: pytest.
 def test_path_of_windows_is_a_command_in_cmd_and_in_powershell(
     prefix: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # A PowerShell line that starts with a quote is an expression.
+    # In PowerShell, a line that starts with a quote is an expression.
     monkeypatch.setattr(installation, "IS_WINDOWS", True)
     monkeypatch.setattr(sys, "executable", r"C:\Program Files\Python (x86)\python.exe")
     expected = r'C:\"Program Files"\"Python (x86)"\python.exe -m pip install "minirospy[web]"'

@@ -404,7 +404,7 @@ class Importer:
         return False
 
     def _trim_soon(self, removed: int) -> None:
-        """Return the memory of removed names to the system after a delay, because links linger."""
+        """Return the memory of removed names to the system after a delay, because links are closed late."""
         self._removed += removed
         if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
             loop = asyncio.get_running_loop()

@@ -620,7 +620,7 @@ def test_a_second_start_that_cannot_listen_or_waits_does_not_end_the_first(
     endpoint = f"127.0.0.1:{free_port()}"
     running = start(*words, "--listen", endpoint)
     until_line(running, "(gateway ")
-    # A gateway that waits for a router that does not run has not taken the name.
+    # A gateway that still waits for its router has not claimed the name.
     router = f"127.0.0.1:{free_port()}"
     waiting = start(*words, "--connect", router)
     wrong = [

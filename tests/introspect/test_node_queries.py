@@ -20,7 +20,7 @@ LIMIT = 60.0
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait for silent nodes. A test of a limit sets it after this."""
+    """Raise the time limit for silent nodes. A test of the limit sets it after this fixture."""
     for name in ("QUERY_SECONDS", "AGAIN_SECONDS", "REFUSED_SECONDS"):
         monkeypatch.setattr(node_queries, name, LIMIT)
 

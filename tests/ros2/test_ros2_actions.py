@@ -135,7 +135,7 @@ def test_rules_name_actions_and_their_fields() -> None:
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Send no request before the server is reachable."""
+    """Raise the limits, so that no request is sent before the server can be reached."""
     monkeypatch.setattr("minirospy.ros2.reach.MAX_SECONDS", LIMIT)
 
 
@@ -438,7 +438,7 @@ def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
 
 
 def test_server_of_rclpy_is_destroyed_once_results_are_sent(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sending a result takes several rounds of the executor: destroying the server earlier leaves its client waiting."""
+    """Sending a result takes several iterations of the executor. If the server is destroyed earlier, its client hangs."""
     monkeypatch.setattr("minirospy.ros2.rclpy_actions.CLOSE_SECONDS", LIMIT)
     order: list[str] = []
     tasks: queue.Queue[Callable[[], object] | None] = queue.Queue()

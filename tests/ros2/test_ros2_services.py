@@ -69,7 +69,7 @@ def test_renamed_service_types_find_their_partner() -> None:
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Send no request before the server is reachable."""
+    """Raise the limits, so that no request is sent before the server can be reached."""
     monkeypatch.setattr("minirospy.ros2.reach.MAX_SECONDS", LIMIT)
 
 

@@ -55,7 +55,7 @@ SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait longer than a machine may stall."""
+    """Raise the time limits above a machine's stalls."""
     for module, name in (("zenoh_actions", "CLOSE_SECONDS"), ("zenoh_parameters", "ANSWER_SECONDS")):
         monkeypatch.setattr(f"minirospy.ros2.{module}.{name}", LIMIT)
 

@@ -111,7 +111,7 @@ Start = Callable[..., Run]
 
 
 def no_process_left() -> None:
-    """Wait until no Windows Python runs any more."""
+    """Wait until no Windows Python is running."""
     wait_until(lambda: not WINDOWS.processes(), SECONDS, "Windows processes run", pause=0.2)
 
 

@@ -66,7 +66,7 @@ def test_long_text_is_written_in_steps() -> None:
     node._file = SimpleNamespace(text=lines.append)
     text = "\x1b[1m\n\t" * 10_000
     steps = node.on_message(body_of(text, "/a\nb"), {})
-    # Each control character in a string takes some 0.5 us.
+    # Escaping each control character in a string takes some 0.5 us.
     assert sum(1 for _ in steps) >= len(text) // rosout.STEP_LETTERS
     assert lines == [
         f"0.000000000 INFO /a\\nb [f.py:7(g)] [topics: ] {text.replace(chr(27), chr(92) + 'x1b')}"

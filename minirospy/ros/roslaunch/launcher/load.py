@@ -375,7 +375,7 @@ class _File:
         return param_value(tag)
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
-        """Store a node's parameter as private to the node, even if its name starts with a slash or tilde."""
+        """Store a parameter set inside a node as private to the node, even if its name starts with a slash or tilde."""
         self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", self._value(tag))
 
     def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:

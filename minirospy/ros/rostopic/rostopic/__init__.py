@@ -122,7 +122,8 @@ __all__ = [
 
 NAME = "rostopic"
 _Topic = tuple[str, str, list[str]]
-_TopicRow = tuple[str, str, list[str]]  # topic, type, nodes that publish (or subscribe to) it
+# topic, type, and the nodes that publish (or subscribe to) the topic
+_TopicRow = tuple[str, str, list[str]]
 
 
 class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
