@@ -46,8 +46,8 @@ _MAX_PING = 64  # maximum size in bytes of a reply to a ping, which normally has
 _CALL_SECONDS = 3600.0
 # seconds for a name's holder to reply after another gateway on the same machine has claimed the name
 _CHALLENGE_SECONDS = 2.0
-# number of removed names (some 4 MB) after which memory is returned, and the seconds to wait before that, as links
-# linger
+# number of removed names (some 4 MB) after which memory is returned, and the delay in seconds, because links are
+# closed late
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
 MAX_ROBOT_NAMES = 2_000  # maximum number of names, of _MAX_IMPORTED, that one robot may use
 # maximum number of a robot's names to close concurrently, because each needs a task and a call to the master
@@ -404,7 +404,7 @@ class Importer:
         return False
 
     def _trim_soon(self, removed: int) -> None:
-        """Return the memory of removed names to the system after a delay, because links linger."""
+        """Return the memory of removed names to the system after a delay, because links are closed late."""
         self._removed += removed
         if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
             loop = asyncio.get_running_loop()

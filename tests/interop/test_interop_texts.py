@@ -78,7 +78,7 @@ def test_language_is_the_chosen_one_else_the_first_of_the_browser_that_is_there(
 
 @pytest.mark.parametrize("module", ["form.js", "paths.js", "reconfigure.js", "ros1.js", "widgets.js"])
 def test_every_error_of_a_person_has_a_german_text(module: str) -> None:
-    """Errors for invalid user input; each is thrown as a TextError or through t()."""
+    """These errors are for invalid user input; each is thrown as a TextError or through t()."""
     text = (PAGE / "js" / module).read_text(encoding="utf-8")
     german = (PAGE / "js" / "german.js").read_text(encoding="utf-8")
     assert re.findall(r"new Error\((?!t\()", text) == []
