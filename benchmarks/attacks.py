@@ -369,7 +369,7 @@ def topic_subscribers(target: Target) -> None:
 
 
 def parameter_subscribers(target: Target) -> None:
-    """Subscribe 5,000 nodes that never answer to a parameter, and set large values."""
+    """Subscribe 5,000 nodes, which never respond, to a parameter, and set large values."""
     with socket.create_server(("127.0.0.1", 0), backlog=1) as dead:
         port = dead.getsockname()[1]
         calls = [

@@ -423,7 +423,7 @@ def measure(name: str, clients: int, seconds: float, environ: dict[str, str], to
         assert attackers.stdout
         for thread in (reader, writer, robot):
             thread.start()
-        # The attackers connect, then send; the measurement starts before.
+        # The attackers connect, then send; the measurement starts before they do.
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             last = time.monotonic()
