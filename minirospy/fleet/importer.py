@@ -46,8 +46,8 @@ _MAX_PING = 64  # maximum size in bytes of a reply to a ping, which normally has
 _CALL_SECONDS = 3600.0
 # seconds for a name's holder to reply after another gateway on the same machine has claimed the name
 _CHALLENGE_SECONDS = 2.0
-# number of removed names (some 4 MB) after which memory is returned, and the delay in seconds, because links are
-# closed late
+# number of removed names (some 4 MB) after which memory is returned, and the seconds to wait before that, as links
+# linger
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
 MAX_ROBOT_NAMES = 2_000  # maximum number of names, of _MAX_IMPORTED, that one robot may use
 # maximum number of a robot's names to close concurrently, because each needs a task and a call to the master
