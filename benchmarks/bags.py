@@ -164,7 +164,7 @@ def run(case: str, stack: str, path: Path, messages: int) -> list[float] | None:
 
 
 def command(case: str, stack: str, path: Path) -> list[float] | None:
-    """Return the same for a command, including the time to start it."""
+    """Return the same numbers as :func:`run` for a command, including the time to start it."""
     program = Path(sys.executable).with_name("rosbag") if stack == "minirospy" else Path("/usr/bin/rosbag")
     if not program.exists():
         return None

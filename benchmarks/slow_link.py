@@ -62,7 +62,7 @@ def pass_frames(taps, delay, jitter, loss):
             try:
                 os.write(tap, frame)
             except OSError:
-                pass  # that device is down, so the link is cut
+                pass  # that device is down, which means that the link is cut
 
 
 def main():

@@ -251,7 +251,7 @@ def test_wheel_works_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
         archive.extractall(site)
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     done = subprocess.run(
-        # -S: do not read the checkout's own path lines; the libraries are added by hand.
+        # -S: ignore the checkout's .pth files; the libraries are added explicitly.
         [sys.executable, "-S", "-c", USE, str(site)],
         env={**environment, "PYTHONPATH": _libraries(tmp_path)},
         cwd=tmp_path,
@@ -304,7 +304,7 @@ def test_archive_is_refused(wheel: Path, tmp_path: Path) -> None:
 
 def _run_wheel(folder: Path, path: list[str], *words: str) -> subprocess.CompletedProcess[str]:
     """Run `minirospy` with a path that no `.pth` file extends."""
-    # -S: do not read the checkout's own path lines; the libraries are added by hand.
+    # -S: ignore the checkout's .pth files; the libraries are added explicitly.
     return subprocess.run(
         [sys.executable, "-S", "-m", "minirospy", *words],
         env={**os.environ, "PYTHONPATH": os.pathsep.join([*path, _libraries(folder)])},

@@ -152,7 +152,7 @@ def test_metadata_without_the_addresses_is_named() -> None:
 
 
 def test_every_link_of_the_readme_leads_to_a_file() -> None:
-    """The links start with the address, as in the published description."""
+    """In the published description, relative links become addresses of the repository. Each must lead to a file."""
     files = f"{ADDRESS}/blob/HEAD/"
     text = readme_of_wheel((ROOT / "README.md").read_text(encoding="utf-8"), files)
     named = [link.partition(")")[0] for link in text.split(f"]({files}")[1:]]

@@ -460,7 +460,7 @@ class _Share:
 
 
 class Deferred:
-    """A Zenoh declaration that is declared in the background, and later undeclared."""
+    """A Zenoh entity that is declared in the background, and later undeclared."""
 
     def __init__(
         self, caller: concurrent.futures.Executor, declare: Callable[[], Declared], fault: type[Exception]

@@ -91,7 +91,7 @@ def test_bag_is_played_moved_through_and_published(
     page.wait("return document.querySelector(\".card[data-topic='/camera'] canvas\").width === 40")
     page.wait_text(".now", "0:00.000 / 0:19.900")
 
-    # Click on the timeline, and step by button and by key, and back.
+    # Click on the timeline, then step by button and by key, forward and back.
     page.click("canvas.bag-rows")
     number = int(
         page.wait(

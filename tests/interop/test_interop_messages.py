@@ -825,7 +825,7 @@ def test_values_from_yaml(real: Callable[[str], Peer], name: str, source: str) -
 
 
 def test_a_dictionary_without_a_list_around_it(real: Callable[[str], Peer]) -> None:
-    """Real genpy fails with KeyError: 0 if it has a single field, but minirospy accepts it."""
+    """For a message with a single field, real genpy fails with KeyError: 0, but minirospy accepts the dictionary."""
     with pytest.raises(RealError, match="KeyError"):
         real("ours").ask("fill", ("std_msgs/String", "{data: hello}", {}))
     message = message_class("std_msgs/String")()

@@ -334,7 +334,7 @@ def test_doctor_checks_the_return_path_from_the_master(network: Network) -> None
 
 
 def test_two_doctors_check_both_directions(network: Network) -> None:
-    """The master is on alpha, and beta listens. Check alpha's report without faults, without a name, and behind a firewall."""
+    """The master is on alpha, and beta listens. Check alpha's report with and without beta's name, and behind a firewall."""
     start_master(network)
     listener = network.start("beta", [str(OUR_BIN / "minirospy"), "doctor", "--listen"])
     listener.wait_for("listening: type `minirospy doctor` on the other machine")

@@ -437,7 +437,7 @@ STANDARD = (
 
 
 def describe_value(value: Any) -> dict[str, Any] | None:
-    """Return the parts of a value that are compared, or None if it is not rospy's own."""
+    """Return the parts of a value that are compared, or None if it is not from ROS."""
     if isinstance(value, (bool, int, float, str)):
         return {"home": "", "is": repr(value)}
     home = getattr(value, "__module__", None) or ""
