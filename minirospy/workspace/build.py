@@ -154,8 +154,8 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 class Report(NamedTuple):
     """The result of building a package.
 
-    ``made``: the generated parts, as a string; empty if nothing has changed. ``stand_ins``: the names of minirospy's
-    programs and modules that replace compiled ones, as a string.
+    ``made`` describes the generated parts; it is empty if nothing has changed. ``stand_ins`` lists the names of
+    minirospy's programs and modules that replace compiled ones.
     """
 
     plan: Plan
@@ -472,7 +472,10 @@ def _program(path: Path) -> str:
 
 
 def stand_in_files(plan: Plan, found: StandIns, prefix: Path) -> dict[Path, str]:
-    """Return the programs and modules that run minirospy's in place of compiled ones: file below ``prefix`` -> text."""
+    """Return the stubs that run minirospy's programs and modules in place of compiled ones.
+
+    The result is a dict from file below ``prefix`` to text.
+    """
     texts = {prefix / "lib" / plan.name / name: _program(path) for name, path in found.programs.items()}
     for name, path in found.modules.items():
         end = "/__init__.py" if path.name == "__init__.py" else ".py"

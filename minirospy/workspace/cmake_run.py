@@ -367,7 +367,7 @@ class _Run:
             self._known.update(dict.fromkeys((f"{name}_FOUND" for name in arguments), "1"))
 
     def _check(self, arguments: list[str]) -> None:
-        """Run ``check_include_files(header NAME)``: report the header as found, because nothing compiles with it."""
+        """Run ``check_include_files(header NAME)``: report the header as found, because nothing is compiled with it."""
         for name in arguments[1:2]:
             self._known[name] = "1"
 

@@ -109,7 +109,7 @@ class Registrations:
         """Unregister everything, and register nothing more. The first call is sent before anything else is done.
 
         Waits while the master continues to respond; does not wait if it refuses connections, and gives up if it sends no
-        response for ``SILENT_SECONDS``. ``announces``: whether to log a line when this takes long.
+        response for ``SILENT_SECONDS``. With ``announces``, a line is logged if this takes long.
         """
         self._closed = True
         if self.watching:
