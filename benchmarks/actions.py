@@ -1,4 +1,4 @@
-"""`python benchmarks/actions.py`: goals per second by send_goal_and_wait, with server and client as separate processes.
+"""`python benchmarks/actions.py`: goals per second with send_goal_and_wait, with server and client in separate processes.
 
 Measures each pairing of minirospy and real actionlib (if /usr/bin/python3 has one) with one minirospy master. Latencies are in
 microseconds, from the call of send_goal_and_wait to its return.
@@ -44,7 +44,7 @@ rospy.signal_shutdown("")
 
 
 def measure(server: str, client: str, uri: str, seconds: float) -> list[float]:
-    """Return goals per second, median and p99 in microseconds, and failures."""
+    """Return the goals per second, the median and the p99 latency in microseconds, and the number of failures."""
     environment = {**os.environ, "ROS_MASTER_URI": uri, "ROS_HOSTNAME": "localhost"}
     serving = subprocess.Popen(
         [server, "-c", SERVER], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

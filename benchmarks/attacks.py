@@ -1,4 +1,4 @@
-"""Attacks on a master, each a function that runs until its target's time is over."""
+"""Attacks on a master. Each is a function that runs until the target's time is over."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def post(body: bytes) -> bytes:
 
 
 def called(method: str, *args: Any) -> bytes:
-    """Return a whole request."""
+    """Return a complete request for a call."""
     return post(dumps(args, method).encode())
 
 
 def valued(value: bytes, key: str = "/attack") -> bytes:
-    """Return a setParam of a value that is already XML."""
+    """Return a setParam call with a value that is already XML."""
     return post(
         b"<?xml version='1.0'?><methodCall><methodName>setParam</methodName><params><param><value>/bad</value>"
         b"</param><param><value>%s</value></param><param><value>"
@@ -47,7 +47,7 @@ def valued(value: bytes, key: str = "/attack") -> bytes:
 
 
 def array(item: bytes, count: int) -> bytes:
-    """Return an array that repeats an item."""
+    """Return an array that contains an item ``count`` times."""
     return b"<array><data>" + item * count + b"</data></array>"
 
 
@@ -62,7 +62,7 @@ def multicall(method: str, params: list[Any], count: int) -> bytes:
 
 
 class Target:
-    """The attacked master, and the end of the attack."""
+    """The attacked master, and the time when the attack ends."""
 
     def __init__(self, port: int, end: float) -> None:
         self.port = port
@@ -97,7 +97,7 @@ class Target:
             time.sleep(pause)
 
     def hold(self, request: bytes, count: int) -> None:
-        """Send a request on many connections, and do not read."""
+        """Send a request on many connections, without reading the responses."""
         while not self.is_over:
             with contextlib.ExitStack() as stack:
                 for _ in range(count):
@@ -137,18 +137,18 @@ def _read_answer(sock: socket.socket, target: Target) -> None:
 
 
 def huge_array_multicall(target: Target) -> None:
-    """200 getParam of an array of 300,000 numbers in one multicall of 40 kB."""
+    """Send a 40 kB multicall with 200 getParam calls for an array of 300,000 numbers."""
     target.exchange(valued(array(b"<value><int>1</int></value>", 300_000), "/attack/array"))
     target.repeat(multicall("getParam", ["/bad", "/attack/array"], 200))
 
 
 def huge_string(target: Target) -> None:
-    """setParam of a string of 60 MiB."""
+    """Send setParam with a 60 MiB string."""
     target.repeat(valued(b"x" * HUGE, "/attack/string"))
 
 
 def wide_characters(target: Target) -> None:
-    """setParam of strings of 15 million characters of which one, the first or the last, needs four bytes."""
+    """Send setParam with strings of 15 million characters, of which the first or the last one needs four bytes."""
     wide, others = "\U0001f600".encode(), b"x" * (HUGE // 4)
     while not target.is_over:
         target.exchange(valued(wide + others, "/attack/wide"))
@@ -156,12 +156,12 @@ def wide_characters(target: Target) -> None:
 
 
 def huge_tag(target: Target) -> None:
-    """Send a tag name of 60 MiB."""
+    """Send a tag with a 60 MiB name."""
     target.repeat(post(b"<methodCall><" + b"x" * HUGE))
 
 
 def huge_comment(target: Target) -> None:
-    """Send an XML comment of 60 MiB, full of tag end markers."""
+    """Send a 60 MiB XML comment, full of tag end markers."""
     target.repeat(post(b"<methodCall><!-- " + b"> " * (HUGE // 2)))
 
 
@@ -180,12 +180,12 @@ def many_sets(target: Target) -> None:
 
 
 def many_elements(target: Target) -> None:
-    """setParam of an array of 900,000 elements."""
+    """Send setParam with an array of 900,000 elements."""
     target.repeat(valued(array(b"<value>a</value>", 900_000), "/attack/elements"))
 
 
 def many_structs(target: Target) -> None:
-    """setParam of an array of 300,000 structs, and getParam of it."""
+    """Send setParam with an array of 300,000 structs, and getParam for it."""
     item = b"<value><struct><member><name>a</name><value>b</value></member></struct></value>"
     target.exchange(valued(array(item, 150_000), "/attack/structs"))
     while not target.is_over:
@@ -194,12 +194,12 @@ def many_structs(target: Target) -> None:
 
 
 def huge_base64(target: Target) -> None:
-    """setParam of 60 MiB of base64."""
+    """Send setParam with 60 MiB of base64."""
     target.repeat(valued(b"<base64>" + b"QUJD" * (HUGE // 4) + b"</base64>", "/attack/base64"))
 
 
 def huge_chunk(target: Target) -> None:
-    """Send a body of 60 MiB in one chunk, and one with the next request right behind it."""
+    """Send a 60 MiB body in one chunk, and another one directly followed by the next request."""
     body = valued(b"x" * HUGE, "/attack/string").partition(b"\r\n\r\n")[2]
     chunked = b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n%x\r\n%s\r\n0\r\n\r\n" % (
         len(body),
@@ -218,12 +218,12 @@ def huge_number(target: Target) -> None:
 
 
 def deep(target: Target) -> None:
-    """Send a million arrays inside each other."""
+    """Send a million nested arrays."""
     target.repeat(valued(b"<array><data><value>" * 1_000_000))
 
 
 def whole_tree(target: Target) -> None:
-    """Send getParam of / from twenty clients, for a tree of 200,000 parameters that one client keeps changing."""
+    """Send getParam for / from twenty clients, with a tree of 200,000 parameters that one client keeps changing."""
     target.exchange(valued(array(b"<value><int>1</int></value>", 100_000), "/attack/array"))
     many = {f"p{number}": number for number in range(100_000)}
     target.exchange(called("setParam", "/bad", "/attack/tree", many))
@@ -234,7 +234,7 @@ def whole_tree(target: Target) -> None:
 
 
 def names_of_parameters(target: Target) -> None:
-    """Send getParamNames of 100,000 parameters from ten clients."""
+    """Send getParamNames from ten clients, with 100,000 parameters."""
     many = {f"p{number}": number for number in range(100_000)}
     target.exchange(called("setParam", "/bad", "/attack/tree", many))
     _side_by_side([lambda: target.repeat(called("getParamNames", "/bad"))] * 10)
@@ -247,7 +247,7 @@ def slow_readers(target: Target) -> None:
 
 
 def pipelines(target: Target) -> None:
-    """Send a thousand calls each in one go with 300 clients that do not read."""
+    """Send a thousand calls at once from each of 300 clients that do not read."""
     target.hold(called("getParamNames", "/bad") * 1000, 300)
 
 
@@ -272,7 +272,7 @@ def busy_connections(target: Target) -> None:
 
 
 def half_bodies(target: Target) -> None:
-    """Send 900 kB of a body of 60 MiB each with 1000 clients."""
+    """Send 900 kB of a 60 MiB body from each of 1000 clients."""
     request = b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n" % HUGE + b"x" * 900_000
     while not target.is_over:
         with contextlib.ExitStack() as stack:
@@ -292,7 +292,7 @@ def endless_head(target: Target) -> None:
 
 
 def small_chunks(target: Target) -> None:
-    """Send a body of ten million chunks of one byte."""
+    """Send a body of ten million one-byte chunks."""
     head = b"POST / HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n"
     target.repeat(head + b"1\r\nx\r\n" * 10_000_000)
 
@@ -303,7 +303,7 @@ def silent_connections(target: Target) -> None:
 
 
 def system_states(target: Target) -> None:
-    """Send getSystemState of a graph of 20,000 topics from ten clients, while another client changes it."""
+    """Send getSystemState from ten clients, with a graph of 20,000 topics that another client changes."""
     calls = [
         {
             "methodName": "registerPublisher",
@@ -338,7 +338,7 @@ def all_topics(target: Target) -> None:
 
 
 def new_addresses(target: Target) -> None:
-    """Register a node of 20,000 topics repeatedly from new addresses."""
+    """Register a node with 20,000 topics repeatedly, each time from a new address."""
     calls = [
         {"methodName": "registerPublisher", "params": ["/bad", f"/attack/n{n}", "a/B", "http://127.0.0.1:9/"]}
         for n in range(20_000)
@@ -353,7 +353,7 @@ def new_addresses(target: Target) -> None:
 
 
 def topic_subscribers(target: Target) -> None:
-    """Register 20,000 subscribers at a dead address, and a publisher that registers and unregisters."""
+    """Register 20,000 subscribers at a dead address, and a publisher that registers and unregisters repeatedly."""
     calls = [
         {
             "methodName": "registerSubscriber",
@@ -369,7 +369,7 @@ def topic_subscribers(target: Target) -> None:
 
 
 def parameter_subscribers(target: Target) -> None:
-    """Subscribe 5,000 nodes that never answer to a parameter, and set large values."""
+    """Subscribe 5,000 nodes, which never respond, to a parameter, and set large values."""
     with socket.create_server(("127.0.0.1", 0), backlog=1) as dead:
         port = dead.getsockname()[1]
         calls = [
@@ -386,7 +386,7 @@ def parameter_subscribers(target: Target) -> None:
 
 
 def long_names(target: Target) -> None:
-    """Register names of 10 MiB."""
+    """Register names with a length of 10 MiB."""
     number = 0
     while not target.is_over:
         number += 1
@@ -409,7 +409,7 @@ def many_registrations(target: Target) -> None:
 
 
 def many_values(target: Target) -> None:
-    """Set new strings of 8 MiB continuously."""
+    """Set new 8 MiB strings continuously."""
     number = 0
     while not target.is_over:
         number += 1
@@ -420,7 +420,7 @@ def many_values(target: Target) -> None:
 
 
 class FakePublisher:
-    """A Slave API and a TCPROS server for any number of registered nodes: connections are passed to ``serve``."""
+    """A Slave API and a TCPROS server for any number of registered nodes. Connections are passed to ``serve``."""
 
     def __init__(self, target: Target, type_: InterfaceType, serve: Callable[[socket.socket], None]) -> None:
         self._target = target
@@ -475,22 +475,22 @@ class FakePublisher:
 
 
 def log_lines(target: Target) -> None:
-    """Publish short lines from 20 publishers of /rosout as fast as they are read."""
+    """Publish short lines from 20 publishers to /rosout as fast as they are read."""
     _attack_rosout(target, _log("x" * 20) * 1000, 20)
 
 
 def long_log_lines(target: Target) -> None:
-    """Publish strings of 20 MiB of control characters from 5 publishers of /rosout, with 20 subscribers that do not read."""
+    """Publish 20 MiB strings of control characters from 5 publishers to /rosout, with 20 subscribers that do not read."""
     _attack_rosout(target, _log("\x1b" * (20 * MIB)), 5, readers=20)
 
 
 def unread_log_lines(target: Target) -> None:
-    """Publish strings of 200 kB from 5 publishers of /rosout, with 200 subscribers that do not read."""
+    """Publish 200 kB strings from 5 publishers to /rosout, with 200 subscribers that do not read."""
     _attack_rosout(target, _log("x" * 200_000), 5, readers=200)
 
 
 def half_log_lines(target: Target) -> None:
-    """Send only the start of a string of 60 MiB from 300 publishers of /rosout."""
+    """Send only the start of a 60 MiB string from 300 publishers to /rosout."""
     _attack_rosout(target, _log("x" * HUGE)[: 5 * MIB], 300, repeats=False)
 
 

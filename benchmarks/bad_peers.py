@@ -49,7 +49,7 @@ while not rospy.is_shutdown():
 
 
 class Row(NamedTuple):
-    """The cost of an attack."""
+    """The effects of an attack."""
 
     attack: str
     before: float
@@ -106,7 +106,7 @@ class Victim:
 
 
 Attack = Callable[[int, int], "Iterator[None]"]
-"""(port, number of peers) -> the attack, a generator; the well-behaved client makes its calls between its yields."""
+"""A function of (port, number of peers) that yields while the attack runs; the well-behaved client calls between its yields."""
 
 
 def silent(port: int, peers: int) -> Iterator[None]:
@@ -115,7 +115,7 @@ def silent(port: int, peers: int) -> Iterator[None]:
 
 
 def garbage(port: int, peers: int) -> Iterator[None]:
-    """Connect, and send 128 KiB of arbitrary data."""
+    """Connect, and send 128 KiB of random data."""
     yield from _hold(port, peers, random.Random(1).randbytes(131072))
 
 
@@ -125,23 +125,23 @@ def half_header(port: int, peers: int) -> Iterator[None]:
 
 
 def half_request(port: int, peers: int) -> Iterator[None]:
-    """Connect, and send half of an HTTP request with a body of 10 MiB."""
+    """Connect, and send half of an HTTP request with a 10 MiB body."""
     yield from _hold(port, peers, b"POST / HTTP/1.1\r\nContent-Length: 10485760\r\n\r\n" + bytes(10000))
 
 
 def huge_length(port: int, peers: int) -> Iterator[None]:
-    """Send the length of a connection header: 2 GiB."""
+    """Send 2 GiB as the length of a connection header."""
     yield from _hold(port, peers, b"\xff\xff\xff\x7f" + bytes(10000))
 
 
 def huge_request(port: int, peers: int) -> Iterator[None]:
-    """Do a valid handshake for a service, then send a request's length, 1 GiB, and little of its data."""
+    """Do a valid handshake for a service, then send 1 GiB as the request's length, and little of its data."""
     header = _header(callerid="/bad", service="/flag", md5sum="*", persistent="1")
     yield from _hold(port, min(peers, 150), header + struct.pack("<I", 2**30 - 1) + bytes(10000))
 
 
 def slow_subscribers(port: int, peers: int) -> Iterator[None]:
-    """Subscribe to a topic of 20 MB a second, and do not read."""
+    """Subscribe to a topic with 20 MB per second, and do not read."""
     yield from _hold(
         port, min(peers, 100), _header(callerid="/bad", topic="/big", md5sum="*", type="*"), seconds=2.0
     )
@@ -159,7 +159,7 @@ XMLRPC = (silent, garbage, half_request, slow_readers)
 
 
 def bad_publisher(master: str, frames: bytes) -> Callable[[int, int], Iterator[None]]:
-    """Return an attack by a publisher of /scan that sends ``frames`` repeatedly to each subscriber."""
+    """Return an attack in which a publisher of /scan sends ``frames`` repeatedly to each subscriber."""
 
     def bad_frames(_: int, __: int) -> Iterator[None]:
         from xmlrpc.server import SimpleXMLRPCServer
@@ -195,7 +195,7 @@ def _pour(sock: socket.socket, frames: bytes, end: float) -> None:
 
 
 def _hold(port: int, peers: int, data: bytes, seconds: float = 0.5) -> Iterator[None]:
-    """Open connections that send ``data`` and stay open."""
+    """Open connections, send ``data`` on them, and keep them open."""
     with contextlib.ExitStack() as stack:
         for number in range(peers):
             with contextlib.suppress(OSError):

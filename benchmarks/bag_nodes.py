@@ -89,7 +89,7 @@ def record(stack: str, size: int, count: int, folder: Path) -> Measured:
     start = time.perf_counter()
     for _ in range(count):
         publication.publish(frame)
-    # Wait for messages in the sockets; their number cannot be awaited, since a recorder may have lost some.
+    # Wait for messages in the sockets. A condition is not possible, because a recorder may have lost some.
     time.sleep(_SETTLE_SECONDS)
     process.send_signal(signal.SIGINT)
     _, status, usage = os.wait4(process.pid, 0)
@@ -115,7 +115,7 @@ def record(stack: str, size: int, count: int, folder: Path) -> Measured:
 
 
 class Stream(NamedTuple):
-    """Messages of a bag on one topic: messages per second, and their size."""
+    """Messages on one topic of a bag: their rate per second, and their size."""
 
     hz: float
     size: int
@@ -130,7 +130,7 @@ PLAYED = {
 
 
 def make_bag(path: Path, streams: list[Stream], seconds: float) -> list[int]:
-    """Write a bag of numbered messages at irregular times; return those times. Stream N is /bench/N."""
+    """Write a bag of numbered messages at irregular times; return the times. Stream N is on the topic /bench/N."""
     chance = random.Random(3)
     due = []
     for topic, stream in enumerate(streams):
@@ -199,7 +199,7 @@ def receive(socks: list[socket.socket]) -> dict[int, int]:
                 data += memoryview(space)[:count]
                 while len(data) >= 4 and len(data) >= (end := 4 + int.from_bytes(data[:4], "little")):
                     if not is_header[key.data]:
-                        # The number follows the sizes of the message and of its string.
+                        # The number is after the sizes of the message and of its string.
                         arrived[int(data[8:16])] = now
                     is_header[key.data] = False
                     del data[:end]

@@ -117,11 +117,11 @@ CASES = {
     "start": ("ms", ("minirospy", "Debian's rosbag")),
     "filter": ("ms", ("minirospy", "Debian's rosbag")),
 }
-"""Case -> its unit, and the stacks that run it."""
+"""The unit of each case, and the stacks that run it."""
 
 
 def make_bag(path: Path, messages: int, size: int, compression: str) -> None:
-    """Write a bag of strings on ten topics, each of ``size`` bytes."""
+    """Write a bag of strings on ten topics, each with ``size`` bytes."""
     from minirospy.core.bag.writer import BagWriter
 
     definition = {
@@ -142,7 +142,7 @@ def make_bag(path: Path, messages: int, size: int, compression: str) -> None:
 
 
 def run(case: str, stack: str, path: Path, messages: int) -> list[float] | None:
-    """Return the number of messages, CPU seconds, seconds and MB of one process; None if the stack is missing."""
+    """Return the number of messages, CPU seconds, seconds and MB of one process, or None if the stack is missing."""
     if case in ("info", "info_mcap", "start", "filter"):
         return command(case, stack, path)
     python, program = {
@@ -164,7 +164,7 @@ def run(case: str, stack: str, path: Path, messages: int) -> list[float] | None:
 
 
 def command(case: str, stack: str, path: Path) -> list[float] | None:
-    """Return the same for a command, including its start."""
+    """Return the same for a command, including the time to start it."""
     program = Path(sys.executable).with_name("rosbag") if stack == "minirospy" else Path("/usr/bin/rosbag")
     if not program.exists():
         return None

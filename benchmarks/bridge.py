@@ -113,7 +113,7 @@ class Reader:
 
 
 def clients(port: int, prefix: str, count: int, seconds: float, topics: int, stuck: int, lives: int) -> None:
-    """Role: run ``count`` clients for this long; print the messages of the second half."""
+    """Role: run ``count`` clients for this long; print the number of messages in the second half."""
     selector = selectors.DefaultSelector()
     readers = []
 
@@ -134,7 +134,7 @@ def clients(port: int, prefix: str, count: int, seconds: float, topics: int, stu
             if not key.data.read():
                 selector.unregister(key.data.sock)
         for reader in [each for each in readers if lives and each.messages >= lives]:
-            # The client disconnects, and another one connects.
+            # This client disconnects, and another one connects.
             selector.unregister(reader.sock)
             reader.sock.close()
             gone.append(reader.messages)
@@ -236,7 +236,7 @@ async def relay(port: int) -> None:
 
 
 async def direct(seconds: float) -> None:
-    """Role: run a ROS subscriber of the delay's topic; print its median and 99th percentile in milliseconds."""
+    """Role: run a ROS subscriber to the topic for delays; print their median and 99th percentile in milliseconds."""
     from minirospy import Node
 
     delays: list[int] = []
@@ -356,7 +356,7 @@ def stuck(server: str, seconds: float) -> dict[str, float]:
 
 
 def soak(server: str, seconds: float) -> dict[str, float]:
-    """Send messages of 20 kB, as many as possible; an hour of images at 30 Hz has 540,000 for five clients."""
+    """Send as many 20 kB messages as possible; an hour of images at 30 Hz has 540,000 for five clients."""
     with Run(server) as run:
         run.start(Run.role("publish", kind="flood", rate=1e6, size=20_000, topics=1))
         child = run.clients(seconds=seconds, count=5, lives=2000)

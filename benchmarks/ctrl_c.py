@@ -100,7 +100,7 @@ while not rospy.is_shutdown():
 
 
 def trial(command: list[str], uri: str, folder: str, marks: int) -> tuple[float, str]:
-    """Run a program and send SIGINT at a random moment; return the time until it exited, and the fault."""
+    """Run a program and send SIGINT at a random moment; return the time until it has exited, and the fault."""
     process = subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
@@ -120,7 +120,7 @@ def trial(command: list[str], uri: str, folder: str, marks: int) -> tuple[float,
         line = process.stdout.readline()
         assert line, process.communicate()
         marks -= line.startswith("ready")
-    # Sleep, since the moment must be random.
+    # Sleep, because the moment must be random.
     time.sleep(random.random())
     process.send_signal(signal.SIGINT)
     start = time.monotonic()

@@ -112,7 +112,7 @@ new Promise(resolve => {
 
 @contextlib.contextmanager
 def graph() -> Iterator[tuple[psutil.Process, int]]:
-    """Run a master and a dashboard; return the dashboard's process and port."""
+    """Run a master and a dashboard; yield the dashboard's process and port."""
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{free_port()}"
     os.environ["ROS_HOSTNAME"] = "localhost"
     with tempfile.TemporaryDirectory() as home, contextlib.ExitStack() as stack:
@@ -253,7 +253,7 @@ def measure_clients(seconds: float, rate: float) -> None:
 
 
 def measure_soak(hours: float, rate: float, count_of_clients: int, count_of_pages: int) -> None:
-    """Print memory over a long run with clients and pages; ``hours`` of 50 topics at 10 Hz."""
+    """Print the memory over a long run with clients and pages. The run is as long as ``hours`` of 50 topics at 10 Hz."""
     from tests.interop.browser import Page
 
     opened = "&".join(f"open=%2Fmany%2Ft{index}" for index in range(50))
@@ -308,7 +308,7 @@ def measure_soak(hours: float, rate: float, count_of_clients: int, count_of_page
 
 
 def memory_of(process: psutil.Process) -> float:
-    """Return a process's private memory, in MB; 0 if it has exited."""
+    """Return a process's private memory in MB, or 0 if it has exited."""
     with contextlib.suppress(psutil.NoSuchProcess):
         full = process.memory_full_info()
         return float(getattr(full, "uss", full.rss)) / 1e6

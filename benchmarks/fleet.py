@@ -26,9 +26,9 @@ PROCESSES = 4
 TOPICS = 7
 SETTLE_SECONDS, QUIET_SECONDS = 8.0, 60.0
 CUT_SECONDS = 15.0
-# Of the link in each direction: milliseconds, milliseconds, percent of the frames.
+# Properties of the link in each direction: milliseconds, milliseconds, and percent of the frames.
 DELAY, JITTER, LOSS = 20, 5, 1
-MAX_SECONDS = 300  # limit for detecting a cut, and for the recovery from it
+MAX_SECONDS = 300  # maximum seconds for detecting a cut, and for recovering from it
 PORT = 27447
 MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 
@@ -38,8 +38,8 @@ MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
 
 async def robots(endpoint, first, count):
     """Simulate ``count`` robots until stdin is closed."""
-    # A Zenoh thread waits 10 s when it closes a dead link. A real robot has one link: here each link has a thread,
-    # too.
+    # When it closes a dead link, a Zenoh thread waits for 10 s. A real robot has one link, so here each link also has
+    # a thread.
     pools = ", ".join(f"{pool}: (worker_threads: {count})" for pool in ("rx", "tx", "net", "acc", "app"))
     os.environ.setdefault("ZENOH_RUNTIME", f"({pools})")
     from minirospy.fleet.keys import ROOT, Claim, ServiceToken, TopicToken, claim_key, service_key, topic_key
@@ -56,7 +56,7 @@ async def robots(endpoint, first, count):
         def ignore(*_):
             pass
 
-        # Keep references: a subscription without one is undeclared.
+        # Keep references, because a subscription without one is undeclared.
         kept = [network.subscribe(f"{ROOT}/in/{ends}/**", ignore)]
         answered = ("ping/{0}", "status/{0}", "definition/{0}/*/*", "call/{1}/**", "param/{1}")
         kept += [network.answer(f"{ROOT}/{key.format(gateway, ends)}", pong) for key in answered]
@@ -91,7 +91,7 @@ async def robots(endpoint, first, count):
 
 
 async def control(endpoint, expected):
-    """Show the fleet; print how long it takes, and, for each line on stdin, how long until all is shown again."""
+    """Show the fleet; print how long it takes, and for each line on stdin, how long until all robots are shown again."""
     from minirospy import Node
     from minirospy.base.errors import MasterUnreachableError
     from minirospy.fleet.gateway import Gateway, GatewayOptions
@@ -104,12 +104,12 @@ async def control(endpoint, expected):
     names = expected * (TOPICS + 1)
 
     async def shown(count):
-        """Return when the master has names of ``count`` robots."""
+        """Return once the master has the names of ``count`` robots."""
         while True:
             try:
                 state = await node._node.master("getSystemState")
             except MasterUnreachableError:
-                # Poll rarely: this process shares the cores with a thousand robots that reconnect.
+                # Poll rarely, because this process shares the cores with a thousand robots that reconnect.
                 await asyncio.sleep(1.0)
                 continue
             every = {name for table in state for name, _ in table}
@@ -136,7 +136,7 @@ async def control(endpoint, expected):
 
 
 class Network:
-    """Two network namespaces and the link between them; without root, loopback."""
+    """Two network namespaces and the link between them, or loopback without root."""
 
     def __init__(self):
         self.is_isolated = sys.platform == "linux" and os.geteuid() == 0
@@ -202,7 +202,7 @@ class Network:
 
 
 def request(process, line):
-    """Return a process's answer to a line: seconds, or that the limit was exceeded."""
+    """Return a process's response to a line: seconds, or that the limit was exceeded."""
     process.stdin.write(f"{line}\n")
     process.stdin.flush()
     limit = threading.Timer(MAX_SECONDS, process.kill)
@@ -215,7 +215,7 @@ def request(process, line):
 
 
 def measure(network, count, *, cuts):
-    """Return the results for ``count`` robots; ``cuts``: also those of a link that is cut."""
+    """Return the results for ``count`` robots; with ``cuts``, also those for a link that is cut."""
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     running = []
 
@@ -244,7 +244,7 @@ def measure(network, count, *, cuts):
         results["discovery, s"] = round(json.loads(room.stdout.readline()), 2)
         results["names"] = count * (TOPICS + 1)
         if network.is_isolated:
-            time.sleep(SETTLE_SECONDS)  # clocks are synchronized once
+            time.sleep(SETTLE_SECONDS)  # clocks are synchronized once in this time
             before, since = network.count(), time.monotonic()
             time.sleep(QUIET_SECONDS)
             passed = (network.count() - before) / (time.monotonic() - since)

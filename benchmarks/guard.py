@@ -21,11 +21,12 @@ import psutil
 
 SECONDS = 0.7
 IMAGE = 921_600
-TRIES = 4  # runs before a ratio over its limit counts: noise of the machine passes, a slowdown stays
+# number of runs before a ratio over its limit counts, because noise disappears but a slowdown stays
+TRIES = 4
 
 
 class Limit(NamedTuple):
-    """The limit of one ``case``: a multiple of the cost of one ``yardstick``."""
+    """The limit for a ``case``, as a multiple of the cost of a ``yardstick``."""
 
     case: str
     yardstick: str
@@ -43,14 +44,14 @@ LIMITS = [
 
 
 class Meter:
-    """Measures CPU microseconds per step, of this process and of the other participating processes."""
+    """Measures CPU microseconds per step, in this process and in the other participating processes."""
 
     def __init__(self) -> None:
         self.others: list[psutil.Process] = []
         self.costs: dict[str, float] = {}
 
     def measure(self, name: str, step: Callable[[], int]) -> None:
-        """Call ``step`` for a while; it returns how many operations it has done."""
+        """Call ``step`` for a while; it returns the number of operations that it has done."""
         step()
         start, count, end = self._spent(), 0, time.monotonic() + SECONDS
         while time.monotonic() < end:
@@ -95,7 +96,7 @@ def measure_yardsticks(meter: Meter) -> None:
 
 
 def echo(port: str) -> None:
-    """Answer each block, whose first 4 bytes are its size, with 12 bytes."""
+    """Respond to each block, whose first 4 bytes are its size, with 12 bytes."""
     with socket.create_connection(("127.0.0.1", int(port))) as sock:
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         buffer = memoryview(bytearray(IMAGE))
@@ -118,7 +119,7 @@ def peer() -> None:
     rospy.Subscriber("/requests", UInt64, answers.publish, tcp_nodelay=True)
     rospy.Subscriber("/stream", UInt64, lambda message: answers.publish(message) if message.data else None)
     rospy.Subscriber("/images", Image, lambda message: answers.publish(len(message.data)))
-    # The peer waits for the service: by then it receives the messages published here.
+    # The peer waits for the service, and by then receives the messages published here.
     answers.wait_for_subscribers(1, 10)
     rospy.Service("/service", SetBool, lambda request: (request.data, ""))
     rospy.spin()
@@ -237,9 +238,9 @@ def report(costs: dict[str, float]) -> list[str]:
 
 
 def main() -> int:
-    """Measure, again if a ratio is over its limit, and return the exit status."""
+    """Measure, and repeat if a ratio is over its limit; return the exit status."""
     for _ in range(TRIES):
-        # A new process each time: a node cannot be started twice in one.
+        # Use a new process each time, because a process cannot start a node twice.
         result = subprocess.run([sys.executable, __file__, "once"], check=False)
         if result.returncode == 0:
             return 0

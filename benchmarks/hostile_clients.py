@@ -2,14 +2,12 @@
 
     python benchmarks/hostile_clients.py [--clients 8 64 250] [--seconds N] [--writers] [ATTACK ...]
 
-Each row is a new server under attack by this number of clients, which have the read-only token (``--writers``: none, which on
-loopback gives the right to write). Meanwhile a reader, and a writer with the read-write token, send a request every 50 ms and
-wait for its response. A page drives a robot, a subscriber with plain sockets, at 20 Hz, and at the end falls silent.
-Columns: the
-longest wait of the reader and of the writer, the longest gap between two velocities at the robot, the time from the last
-command
-to the zero velocity (0.5 s are intended), all in milliseconds, and the server's peak memory (RSS) in MiB. Each attack stops by
-itself; everything is on loopback.
+Each row is a new server under attack by this number of clients, which have the read-only token (``--writers``: none,
+which on loopback gives the right to write). Meanwhile a reader, and a writer with the read-write token, send a request
+every 50 ms and wait for its response. A page drives a robot, which is a subscriber with plain sockets, at 20 Hz, and at
+the end sends nothing more. Columns: the longest wait of the reader and of the writer, the longest gap between two
+velocities at the robot, the time from the last command to the zero velocity (0.5 s are intended), all in milliseconds,
+and the server's peak memory (RSS) in MiB. Each attack stops by itself; everything is on loopback.
 """
 
 from __future__ import annotations
@@ -37,7 +35,8 @@ BIN = Path(sys.executable).parent
 READ_TOKEN, WRITE_TOKEN = "read-token-0", "write-token-0"
 TOPIC = "/cmd_vel"
 REQUEST = b'{"op":"subscribe","subscriptions":[{"id":1,"channelId":999999}]}'
-PERIOD = 0.05  # seconds between two requests of a well-behaved client, and two commands of the page
+# seconds between two requests of a well-behaved client, and between two commands from the page
+PERIOD = 0.05
 PATIENCE = 30.0  # seconds that a well-behaved client waits for a response
 CHUNK = 256 * 1024
 MASK = bytes(4)
@@ -55,7 +54,7 @@ def frame(opcode: int, data: bytes, *, is_final: bool = True) -> bytes:
 
 
 class Attack(NamedTuple):
-    """``endpoint``: the port; ``first`` is sent once, then ``again`` until the end; ``reads``: whether responses are read."""
+    """An attack on the port ``endpoint``: ``first`` is sent once, then ``again`` until the end. ``reads``: read the responses."""
 
     endpoint: str
     first: bytes
@@ -114,7 +113,7 @@ def attacks() -> dict[str, Attack]:
 
 
 def connect(port: int, token: str, protocol: str) -> socket.socket:
-    """Return a connection after the handshake. Raise OSError."""
+    """Return a connection after the handshake. Raise OSError if the server refuses it."""
     sock = socket.create_connection(("127.0.0.1", port), PATIENCE)
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     line = f"Sec-WebSocket-Protocol: {protocol}\r\n" if protocol else ""
@@ -139,7 +138,7 @@ def connect(port: int, token: str, protocol: str) -> socket.socket:
 def attack_for(name: str, ports: dict[str, int], count: int, seconds: float, token: str) -> None:
     """Role: attack with ``count`` clients; print a line once they are connected."""
     if hasattr(os, "SCHED_OTHER"):
-        # Only the measured processes should have the priority of `chrt -r 20 python benchmarks/...`.
+        # Only the measured processes should have the priority set with `chrt -r 20 python benchmarks/...`.
         with contextlib.suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     attack = attacks()[name]
@@ -186,7 +185,7 @@ def _send_all(attack: Attack, socks: list[socket.socket], end: float) -> None:
 
 
 def _flood(port: int, request: bytes, count: int, end: float) -> None:
-    """Open connections one after another, ``count`` at a time."""
+    """Open connections one after another, up to ``count`` at a time."""
     socks: list[socket.socket] = []
     while time.monotonic() < end:
         with contextlib.suppress(OSError):
@@ -210,13 +209,13 @@ async def serve() -> None:
     from minirospy.web.bridge import BridgeOptions
     from minirospy.web.dashboard.dashboard import Dashboard
 
-    return_large_blocks(4 * 1024 * 1024)  # as `minirospy bridge` does
+    return_large_blocks(4 * 1024 * 1024)  # as in `minirospy bridge`
     access = Access(read_token=READ_TOKEN, write_token=WRITE_TOKEN)
     options = BridgeOptions(foxglove_port=0, rosbridge_port=0, access=access)
     async with Node("bench_dashboard", rosout=False) as node:
         dashboard = Dashboard(node, options)
         await dashboard.start()
-        with contextlib.suppress(ImportError):  # older trees
+        with contextlib.suppress(ImportError):  # for older versions of the code
             from minirospy.web.serve import prefer_the_loop
 
             prefer_the_loop()
@@ -243,7 +242,10 @@ async def _publish_big(node: Any) -> None:
 
 
 class Asker(threading.Thread):
-    """A well-behaved client: the longest wait for a response. ``lost``: why it gets no more responses."""
+    """A well-behaved client, which measures its longest wait for a response.
+
+    ``lost`` is the reason why it gets no more responses.
+    """
 
     def __init__(self, port: int, token: str) -> None:
         super().__init__(daemon=True)
@@ -293,7 +295,7 @@ class Asker(threading.Thread):
 
 
 class Robot(threading.Thread):
-    """A subscriber of the velocities: the longest gap between two while it is driven, and the time of a zero velocity."""
+    """A subscriber to velocities. It measures the longest gap while it is driven, and the time of a zero velocity."""
 
     def __init__(self, uri: str) -> None:
         super().__init__(daemon=True)
@@ -320,7 +322,7 @@ class Robot(threading.Thread):
                 moves = any(self._exactly(struct.unpack("<I", self._exactly(4))[0]))
                 now = time.monotonic()
                 if moves:
-                    # A gap starts and ends with a velocity: a zero of the guard in between is part of it.
+                    # A gap starts and ends with a velocity, and includes a zero velocity from the guard in between.
                     if last:
                         self.longest = max(self.longest, now - last)
                     last = now
@@ -349,7 +351,7 @@ class Robot(threading.Thread):
 
 
 class Row(NamedTuple):
-    """The cost of an attack; times in milliseconds."""
+    """The effects of an attack; times are in milliseconds."""
 
     attack: str
     clients: int
@@ -392,7 +394,7 @@ def role(kind: str, **options: object) -> list[str]:
 
 
 def measure(name: str, clients: int, seconds: float, environ: dict[str, str], token: str) -> Row:
-    """Attack a new server; return the cost."""
+    """Attack a new server; return the effects."""
     with contextlib.ExitStack() as stack:
         server = stack.enter_context(started(role("serve"), environ))
         assert server.stdout
@@ -421,13 +423,13 @@ def measure(name: str, clients: int, seconds: float, environ: dict[str, str], to
         assert attackers.stdout
         for thread in (reader, writer, robot):
             thread.start()
-        # The attackers connect, then send; the measurement starts before.
+        # The attackers connect, then send; the measurement starts before they do.
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             last = time.monotonic()
             driver.sendall(forward)
             time.sleep(PERIOD)
-        # The page holds its velocity and sends nothing more, as if it hung.
+        # The page stops sending while it drives, as if it hung.
         stopped = robot.is_moving.wait(PATIENCE) and robot.has_stopped.wait(PATIENCE)
         stop = time.monotonic() - last if stopped else PATIENCE
         for asker in (reader, writer):
@@ -480,7 +482,7 @@ def _until(make: Callable[[], Robot]) -> Robot:
 
 @contextlib.contextmanager
 def master() -> Iterator[dict[str, str]]:
-    """Run a master; yield the environment of its nodes."""
+    """Run a master; yield the environment for its nodes."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     environ = {

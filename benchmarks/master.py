@@ -45,7 +45,7 @@ REPLY = b"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\nContent-Length: %d\r\n\r\
 
 
 class Dummy:
-    """A Slave API that answers every call with success, and counts the calls."""
+    """A Slave API that responds to every call with success, and counts the calls."""
 
     def __init__(self) -> None:
         self.calls = 0
@@ -96,7 +96,7 @@ class Client:
 
 
 def measure(command: list[str], sizes: list[int], dummy: Dummy) -> dict[str, float]:
-    """Return the measurements of one master."""
+    """Return the measurements for one master."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     with tempfile.TemporaryDirectory() as home:
@@ -144,7 +144,7 @@ def _measured(program: psutil.Process, port: int, sizes: list[int], dummy: Dummy
         figures[f"registrations_per_s_{size}"] = count / seconds
         figures[f"kB_per_node_{size}"] = (program.memory_info().rss - first_rss) / size / 1024
         client, used = Client(port), cpu()
-        # Many calls, because the system counts CPU time in ticks of 10 ms.
+        # Make many calls, because the system counts CPU time in ticks of 10 ms.
         times = [_timed(client.call, "getSystemState", "/bench") for _ in range(200)]
         figures[f"getSystemState_ms_{size}"] = statistics.median(times) * 1e3
         figures[f"getSystemState_cpu_ms_{size}"] = (cpu() - used) / len(times) * 1e3
@@ -169,7 +169,7 @@ def _measured(program: psutil.Process, port: int, sizes: list[int], dummy: Dummy
 
 
 def _dead_subscribers(port: int) -> dict[str, float]:
-    """Return the delay until a live subscriber is notified, among fifty that never answer."""
+    """Return the delay until a live subscriber is notified, among fifty subscribers that never respond."""
     with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
         dead = f"http://127.0.0.1:{silent.getsockname()[1]}/"
         notified, live = threading.Event(), Dummy()

@@ -4,10 +4,10 @@
     python benchmarks/master_attack.py --mixed 600        # all of them together while nodes register
     python benchmarks/master_attack.py --only "huge tag"
 
-A client in a separate process calls getPid fifty times a second, each time by a new connection. Its delays include
-those of the machine itself, so the same calls go to a server that is not attacked (column "control"). Column "own" is the
-delay without the time that the master or the client waited for a processor meanwhile (on Linux). Two more columns are the
-CPU time of the longest callback and of the longest iteration of the master's loop, which runs everything that is due
+A client in a separate process calls getPid fifty times a second, each time on a new connection. Its delays include those
+of the machine itself, so the same calls go to a server that is not attacked (column "control"). Column "own" is the delay
+without the time that the master or the client waited for a processor meanwhile (on Linux). Two more columns are the CPU
+time of the longest callback and of the longest iteration of the master's loop, which runs everything that is due
 (``benchmarks/master_turns.py``). Memory is the master's resident memory. The exit status is 1 if a call of the
 well-behaved client failed or a registration was refused.
 """
@@ -35,11 +35,11 @@ import psutil
 from attacks import ATTACKS, MIB, Target, called, silent_connections
 
 PERIOD = 0.02
-LONG = 0.5  # seconds; the cause of a longer call is printed
+LONG = 0.5  # seconds; if a call takes longer, its cause is printed
 
 
 def waited(thread: str) -> tuple[float, float]:
-    """Return the seconds that a thread has run, and that it has waited for a processor (on Linux; else 0).
+    """Return for how many seconds a thread has run, and waited for a processor (on Linux; else 0).
 
     ``thread`` is ``PID`` for the main thread of a process, ``PID/task/TID`` for another one.
     """
@@ -50,7 +50,7 @@ def waited(thread: str) -> tuple[float, float]:
 
 
 def retransmissions(sock: socket.socket) -> int:
-    """Return the number of segments that the kernel retransmitted on a connection: tcpi_total_retrans of Linux; else 0."""
+    """Return the number of segments that the kernel has retransmitted on a connection (Linux's tcpi_total_retrans; else 0)."""
     if sys.platform != "linux":
         return 0
     return int.from_bytes(sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 104)[100:104], sys.byteorder)
@@ -60,10 +60,10 @@ def retransmissions(sock: socket.socket) -> int:
 
 
 def run_client(port: int, server: str) -> None:
-    """Call getPid continuously; print for each call its start, its delay, whether it was answered, and the machine's part.
+    """Call getPid continuously; print each call's start, its delay, whether it was answered, and the machine's share.
 
-    That part is the longer of the times that the thread ``server`` and this one waited for a processor meanwhile, on Linux.
-    The reason of a failed call is printed to stderr.
+    On Linux, that share is the longer of the times for which the thread ``server`` and this one waited for a processor.
+    The reason why a call failed is printed to stderr.
     """
     request, threads = called("getPid", "/good"), (server, str(os.getpid()))
     while True:
@@ -96,7 +96,7 @@ def run_client(port: int, server: str) -> None:
 
 
 def run_control() -> None:
-    """Answer as a master does, on a port that is printed."""
+    """Respond as a master does, on a port that is printed."""
     answer = b"HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n"
     with socket.create_server(("127.0.0.1", 0)) as server:
         print(server.getsockname()[1], flush=True)
@@ -122,7 +122,7 @@ def run_nodes(port: int, count: int) -> None:
 
 
 def _run_round(port: int, uris: list[str]) -> tuple[float, bool]:
-    """Return the seconds of the slowest node, and whether all of their calls were answered."""
+    """Return the seconds of the slowest node, and whether all calls were answered."""
     from minirospy.base.errors import MinirospyError
     from minirospy.runtime.rpc.master_proxy import MasterProxy
 
@@ -187,7 +187,7 @@ def run_attack(name: str, port: int, seconds: float) -> None:
 def lower_priority() -> None:
     """Run attackers at the ordinary priority, even if the benchmark was started with a higher one.
 
-    Attackers on a network have their own processors; these would take those of the master and the well-behaved client.
+    Real attackers have their own processors, whereas these would use those of the master and the well-behaved client.
     """
     if sys.platform != "win32":
         with contextlib.suppress(OSError):
@@ -201,7 +201,7 @@ def lower_priority() -> None:
 
 
 class Watch:
-    """A program that prints a line for each call, and the statistics of the calls."""
+    """A program that prints a line for each call, and statistics about the calls."""
 
     def __init__(self, *args: str, program: str = __file__, environ: Mapping[str, str] | None = None) -> None:
         self.calls: list[tuple[float, float, bool, float]] = []
@@ -228,19 +228,19 @@ class Watch:
             self.calls.append((float(start), float(wait), answered == "1", float(machine)))
 
     def since(self, begin: float) -> tuple[float, float, float, int, int]:
-        """Return the median, the 99th percentile, the worst wait, the calls and the failures since ``begin``."""
+        """Return the median, 99th percentile and maximum of the delays, and the numbers of calls and failures since ``begin``."""
         calls = [call for call in self.calls if call[0] >= begin]
         waits = sorted(wait for _, wait, _, _ in calls) or [float("nan")]
         failed = sum(not answered for _, _, answered, _ in calls)
         return waits[len(waits) // 2], waits[len(waits) * 99 // 100], waits[-1], len(calls), failed
 
     def own(self, begin: float) -> float:
-        """Return the longest delay since ``begin`` without the machine's part: the server's own delay."""
+        """Return the longest delay since ``begin`` without the machine's share, which is the delay caused by the server."""
         return max((wait - machine for start, wait, _, machine in self.calls if start >= begin), default=0.0)
 
 
 class Row(NamedTuple):
-    """The cost of an attack."""
+    """The effects of an attack."""
 
     attack: str
     median: float
@@ -272,7 +272,7 @@ def environ_of(folder: str, port: int) -> dict[str, str]:
 
 @contextlib.contextmanager
 def started_master(folder: str, python: list[str]) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
-    """Run a master with its journal, at a free port."""
+    """Run a master with its journal on a free port."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     environ = environ_of(folder, port)
@@ -324,7 +324,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
         median, p99, worst, calls, failed = good.since(begin)
         last, wait, _, _ = good.calls[-1]
         if last < end:
-            # The current call has no response yet.
+            # There is no response to the current call yet.
             worst, failed = max(worst, time.monotonic() - last - wait), failed + 1
 
         said = ""
@@ -346,7 +346,7 @@ def measure(names: list[str], seconds: float, nodes: int, label: str) -> tuple[R
 
 
 def watch_clients(stack: contextlib.ExitStack, port: int, thread: str) -> tuple[Watch, Watch]:
-    """Return the well-behaved client of the server at ``port``, whose loop runs in ``thread``, and that of the control."""
+    """Return the well-behaved client of the server at ``port``, whose loop runs in ``thread``, and the client of the control."""
     control = subprocess.Popen([sys.executable, __file__, "control"], stdout=subprocess.PIPE, text=True)
     stack.callback(control.wait)
     stack.callback(control.kill)
@@ -361,7 +361,7 @@ def watch_clients(stack: contextlib.ExitStack, port: int, thread: str) -> tuple[
 def watch_memory(
     pid: int, parts: Sequence[subprocess.Popen[bytes]], good: Watch, latest: float
 ) -> tuple[float, float, float]:
-    """Wait for the end of the attacks, then for the client's call; return the peak memory, the last, the end."""
+    """Wait for the end of the attacks and for the client's pending call; return the peak memory, the last value, and the end."""
     memory, peak = psutil.Process(pid), 0.0
     while any(part.poll() is None for part in parts) and time.monotonic() < latest:
         peak = max(peak, memory.memory_info().rss / MIB)
@@ -388,7 +388,7 @@ def _describe_nodes(fleet: Watch, nodes: int) -> tuple[str, int]:
 
 @contextlib.contextmanager
 def _mix(names: list[str], port: int, seconds: float, number: int) -> Iterator[subprocess.Popen[bytes]]:
-    """Run attacks one after the other in random order; several such programs run in parallel."""
+    """Run a program that makes attacks in random order, one after the other; several of these run in parallel."""
     process = subprocess.Popen(
         [sys.executable, __file__, "mix", str(port), str(seconds), str(number), json.dumps(names)]
     )
@@ -400,7 +400,7 @@ def _mix(names: list[str], port: int, seconds: float, number: int) -> Iterator[s
 
 
 def run_mix(port: int, seconds: float, seed: int, names: list[str]) -> None:
-    """Attack in random order, ten seconds each; the first of these programs keeps 5,000 connections open all the time."""
+    """Attack in random order for ten seconds each. The first of these programs also keeps 5,000 connections open all the time."""
     lower_priority()
     generator, end = random.Random(seed), time.monotonic() + seconds
     if seed == 0:

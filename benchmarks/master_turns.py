@@ -2,8 +2,9 @@
 
     python benchmarks/master_turns.py FILE [options of minirospy master]
 
-For ``benchmarks/master_attack.py``: a turn's duration is a client's delay by the master itself, independent of the
-machine's load. A turn is one callback of the loop. Lines of "loop" are iterations, with all callbacks that were due.
+This is for ``benchmarks/master_attack.py``: a turn's duration is the delay that the master itself causes, independent of
+the machine's load. A turn is one callback of the loop. Lines with "loop" are iterations, with all callbacks that were
+due.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from typing import Any
 
 from minirospy.ros.rosmaster.commands.master import main
 
-LONG = 0.002  # seconds; shorter turns are not written
+LONG = 0.002  # seconds; shorter turns are not recorded
 
 
 def record_turns(path: str) -> None:
-    """Write the long turns and iterations of the event loop of this process from here on."""
+    """Record, from now on, the long turns and iterations of this process's event loop."""
     run, file = events.Handle._run, open(path, "w", buffering=1, encoding="ascii")  # noqa: SIM115 - until the end
     select, since = selectors.DefaultSelector.select, time.thread_time()
 

@@ -1,6 +1,6 @@
 """`python benchmarks/messages.py`: serialization of messages, compared with real genpy if /usr/bin/python3 has it.
 
-Also the compiler: definitions to Python modules, and the time to import them.
+It also measures the compiler from definitions to Python modules, and the time to import these.
 """
 
 import io
@@ -13,7 +13,7 @@ REAL = "/usr/bin/python3"
 
 
 def samples():
-    """Return name -> message, as robots send them."""
+    """Return messages by name, such as robots send them."""
     from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
     from geometry_msgs.msg import Pose, PoseArray, TransformStamped
     from sensor_msgs.msg import Image, JointState, LaserScan
@@ -45,7 +45,7 @@ def samples():
 
 
 def seconds(step):
-    """Return the time that one step takes: the best of five batches."""
+    """Return the time for one step: the best of five batches."""
     count = 1
     while True:
         start = time.perf_counter()
@@ -82,7 +82,7 @@ def worker():
 
 
 def compiler():
-    """Return milliseconds to compile all of msgs/ in memory, and to import a package of messages in a fresh process."""
+    """Return the milliseconds to compile all of msgs/ in memory, and to import a package of messages in a new process."""
     from pathlib import Path
 
     from minirospy.core.idl.load import Catalogue, compile_package

@@ -46,7 +46,7 @@ PUBLISH_PERIOD = 0.01
 
 
 def run_node(turns: str, thread: str) -> None:
-    """Publish continuously, print a line for each call; write the event loop thread's system id to a file."""
+    """Publish continuously, print a line for each call, and write the system id of the event loop's thread to a file."""
     import rospy
     from master_turns import record_turns
     from std_msgs.msg import String
@@ -70,13 +70,13 @@ def run_node(turns: str, thread: str) -> None:
 
 
 def publisher_update(target: Target) -> None:
-    """Send a publisherUpdate of 200,000 publishers."""
+    """Send a publisherUpdate with 200,000 publishers."""
     uris = [f"http://127.0.0.1:9/{number}" for number in range(200_000)]
     target.repeat(called("publisherUpdate", "/bad", "/in", uris))
 
 
 def publisher_updates(target: Target) -> None:
-    """Send a publisherUpdate of 20,000 publishers, the maximum, and 20,000 updates in a multicall."""
+    """Send a publisherUpdate with 20,000 publishers, which is the maximum, and 20,000 updates in a multicall."""
     uris = [f"http://127.0.0.1:9/{number}" for number in range(20_000)]
     update = called("publisherUpdate", "/bad", "/in", uris)
     updates = multicall("publisherUpdate", ["/bad", "/in", ["http://127.0.0.1:9/"]], 20_000)
@@ -86,12 +86,12 @@ def publisher_updates(target: Target) -> None:
 
 
 def param_update(target: Target) -> None:
-    """Send a paramUpdate with a string of 60 MiB."""
+    """Send a paramUpdate with a 60 MiB string."""
     target.repeat(called("paramUpdate", "/bad", "/attack", "x" * HUGE))
 
 
 def half_headers(target: Target) -> None:
-    """Send most of a connection header of 4 MiB from 400 peers to the port of the node's topics."""
+    """Send most of a 4 MiB connection header from 400 peers to the port for the node's topics."""
     with ServerProxy(f"http://127.0.0.1:{target.port}") as node:
         _, _, (_, _, port) = node.requestTopic("/bad", "/out", [["TCPROS"]])  # type: ignore[misc]
     length = 4 * MIB
@@ -119,7 +119,7 @@ ATTACKS: tuple[Callable[[Target], None], ...] = (
 
 
 class Row(NamedTuple):
-    """The cost of an attack."""
+    """The effects of an attack."""
 
     attack: str
     median: float

@@ -29,10 +29,10 @@ class Measurement(NamedTuple):
     unit: str
     code: str
     ours: str = ""
-    """The program for minirospy, if that offers a better way."""
+    """The program for minirospy, if minirospy offers a faster method."""
     needs_master: bool = False
     peer: str = ""
-    """The interpreter for both programs, if only the programs that they start differ; otherwise each stack uses its own."""
+    """The interpreter for both programs, if only the programs that they start differ; otherwise, each stack uses its own."""
 
 
 SYNCHRONIZER = """
@@ -67,7 +67,7 @@ print((time.perf_counter() - start) / len(arrivals) * 1e6)
 
 
 def synchronizer(queue: int, slop: float, delay: int) -> Measurement:
-    """Return the cost of a message: ``slop`` in seconds, ``delay`` of each topic after the previous one in nanoseconds."""
+    """Return the cost of a message; ``slop`` is in seconds, ``delay`` in nanoseconds between one topic and the next."""
     code = SYNCHRONIZER
     for name, value in (("queue", queue), ("slop", slop), ("delay", delay)):
         code = code.replace("{" + name + "}", str(value))
@@ -98,7 +98,7 @@ print(min(times) * 1e3)
 
 
 def cloud(body: str, instead: str = "") -> Measurement:
-    """Return the time of a line of code; ``instead``: minirospy's alternative for which real ROS has only the line."""
+    """Return the time for a line of code; ``instead`` is minirospy's alternative, which real ROS does not have."""
     return Measurement(
         "ms a 640x480 cloud", CLOUD.replace("BODY", body), CLOUD.replace("BODY", instead or body)
     )
@@ -193,7 +193,7 @@ print(cpu * 1e3 if WHAT == "cpu" else times[len(times) // 2] * 1e3)
 
 
 def pass_on(what: str, peer: str, *words: str) -> Measurement:
-    """Return the cost of an image through a program of topic_tools, minirospy's or Debian's, between the same endpoints."""
+    """Return the cost of an image through a program in topic_tools, minirospy's or Debian's, between the same endpoints."""
     scripts = Path(__file__).resolve().parents[1] / "msgs" / "topic_tools" / "scripts"
     code = PASS_ON.replace("WHAT", repr(what))
     real = code.replace("COMMAND", repr([f"/usr/lib/topic_tools/{words[0]}", *words[1:]]))

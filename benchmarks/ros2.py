@@ -72,7 +72,7 @@ def bridge(parts: contextlib.ExitStack) -> None:
 
 
 def measure(route: str, topic: str, type_: str, rate: float, seconds: str) -> str:
-    """Return the line of a route: the receiver prints when it is connected, then the sender starts at full rate."""
+    """Return the results for a route. The receiver reports when it is connected, then the sender starts at full rate."""
     sender, receiver = route.split()
     words = [topic, type_, str(rate), seconds]
 
@@ -117,7 +117,7 @@ def sent_at(side: int, type_: str, data: bytes | memoryview) -> int:
 
 
 class Clock:
-    """The send times: 20 times a second until the line `go` arrives, then at the rate."""
+    """The times for sending: 20 times a second until the line `go` arrives, then at the given rate."""
 
     def __init__(self, rate: float, seconds: float) -> None:
         self._rate = rate
@@ -142,7 +142,7 @@ class Clock:
 
 
 class Log:
-    """The received messages: the send time and the latency of each."""
+    """The received messages, each with its send time and latency."""
 
     def __init__(self, side: int, type_: str) -> None:
         self._side, self._type = side, type_

@@ -22,7 +22,7 @@ from bridge import BIN, Run, free_port
 
 
 class Client(threading.Thread):
-    """A client of the image, which counts messages and does not parse them."""
+    """A client that subscribes to the image, and counts messages without parsing them."""
 
     def __init__(self, port: int, compression: str) -> None:
         super().__init__(daemon=True)
@@ -42,7 +42,7 @@ class Client(threading.Thread):
 
 
 def clients(port: int, compression: str, seconds: float) -> None:
-    """Role: run five clients; print the slowest one's rate, and the total received data in MB/s."""
+    """Role: run five clients; print the slowest one's rate, and the total data received in MB/s."""
     readers = [Client(port, compression) for _ in range(5)]
     for reader in readers:
         reader.start()
@@ -60,7 +60,7 @@ def clients(port: int, compression: str, seconds: float) -> None:
 
 
 def measure(command: list[str], port: int, environ: dict[str, str], compression: str, seconds: float) -> str:
-    """Return the cost of a server."""
+    """Return the cost for a server."""
     server = subprocess.Popen(command, env=environ, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         while True:

@@ -33,7 +33,7 @@ Figures = dict[str, float]
 
 
 class Peers:
-    """A master and the workers of one measurement, which are stopped at the end of the block."""
+    """A master and the workers for a measurement, which are stopped at the end of the block."""
 
     def __init__(self, stack: str) -> None:
         self._python, master = STACKS[stack]
@@ -105,7 +105,7 @@ class Worker(NamedTuple):
 
 
 def cost(workers: list[Worker]) -> float:
-    """Return the CPU seconds of workers, and stop them."""
+    """Return the CPU seconds that workers have used, and stop them."""
     for worker in workers:
         worker.tell("stop")
     return float(sum(worker.said()["cpu"] for worker in workers))
@@ -131,7 +131,7 @@ def measure_round_trip(stack: str) -> Figures:
 
 
 def stream(kind: str, *, hz: float = 0.0, listeners: int = 1) -> Callable[[str], Figures]:
-    """Return a measurement of one kind of message, with this number of listeners."""
+    """Return a measurement with one kind of message and this number of listeners."""
     name = f"{kind} to {listeners}" if listeners > 1 else kind
 
     def measure(stack: str) -> Figures:
@@ -228,7 +228,7 @@ def table(medians: dict[str, dict[str, float]]) -> str:
 
 
 def plot(medians: dict[str, dict[str, float]]) -> str:
-    """Return the ratios as bars, in SVG: rospy is 1."""
+    """Return the ratios as bars in an SVG, in which rospy is 1."""
     bars = [
         (name, ratio(name, value, medians["rospy"][name]))
         for name, value in medians["minirospy"].items()

@@ -70,7 +70,7 @@ def wait_until(condition: Callable[[], bool], seconds: float, what: str) -> None
 
 
 def fork_nodes(master: MasterProxy, count: int, pids: list[int]) -> None:
-    """Fork nodes some at a time, which saves each of them the imports; append their process ids to ``pids``."""
+    """Fork nodes in groups, so that each need not import the modules; append their process ids to ``pids``."""
     import rospy
     import std_srvs.srv  # noqa: F401
 
@@ -86,7 +86,7 @@ def fork_nodes(master: MasterProxy, count: int, pids: list[int]) -> None:
             continue
         status = 1
         try:
-            # One process group, as for the terminal's Ctrl-C.
+            # Put all processes into one group, as for the terminal's Ctrl-C.
             os.setpgid(0, pids[0] if pids else 0)
             sys.argv = ["node", f"__name:={TESTED[1:]}{number}"]
             signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -103,7 +103,7 @@ def fork_nodes(master: MasterProxy, count: int, pids: list[int]) -> None:
 
 
 def round_of_forks(master: MasterProxy, nodes: int) -> tuple[float, int]:
-    """Start nodes, interrupt all; return the seconds until the last process has exited, and the number that failed."""
+    """Start nodes and interrupt all; return the seconds until the last process has exited, and the number of failed ones."""
     pids: list[int] = []
     try:
         fork_nodes(master, nodes, pids)
@@ -146,7 +146,7 @@ def write_package(folder: Path, nodes: int) -> Path:
 def round_of_launch(
     master: MasterProxy, nodes: int, file: Path, environ: dict[str, str], *, kill: bool
 ) -> tuple[float, int]:
-    """Launch the nodes and stop them; return the seconds that it took, and the exit status of roslaunch."""
+    """Launch the nodes and stop them; return the number of seconds, and roslaunch's exit status."""
     command = [sys.executable, "-m", "minirospy.ros.roslaunch.commands.roslaunch", "--wait", str(file)]
     launch = subprocess.Popen(command, env=environ, stdout=subprocess.DEVNULL)
     try:
@@ -175,7 +175,7 @@ def running_master(environ: dict[str, str], *, is_real: bool) -> Iterator[Master
         environ = {name: value for name, value in environ.items() if name != "PYTHONPATH"}
         command = [shutil.which("rosmaster", path="/usr/bin") or "rosmaster", "--core", "-p", port]
     process = subprocess.Popen(command, env=environ, stdout=subprocess.DEVNULL)
-    # A real rosmaster may be busy for a long time.
+    # Real rosmaster may be busy for a long time.
     master = MasterProxy(environ["ROS_MASTER_URI"], "/benchmark", timeout=60.0)
     try:
         wait_until(master.is_online, 20.0, "the master has not started")
@@ -186,7 +186,7 @@ def running_master(environ: dict[str, str], *, is_real: bool) -> Iterator[Master
         try:
             process.wait(20)
         except subprocess.TimeoutExpired:
-            # A real rosmaster may hang after its nodes have exited.
+            # Real rosmaster may hang after its nodes have exited.
             process.kill()
             process.wait()
 

@@ -35,7 +35,10 @@ def open_tap(namespace, number):
 
 
 def pass_frames(taps, delay, jitter, loss):
-    """Forward frames until stdin is closed. ``delay``, ``jitter``: seconds, one way; ``loss``: a fraction, one way."""
+    """Forward frames until stdin is closed.
+
+    ``delay`` and ``jitter`` are in seconds, ``loss`` is a fraction, all for one direction.
+    """
     there = {taps[0]: taps[1], taps[1]: taps[0]}
     waiting = []
     order = itertools.count()
@@ -59,7 +62,7 @@ def pass_frames(taps, delay, jitter, loss):
             try:
                 os.write(tap, frame)
             except OSError:
-                pass  # that device is down: the link is cut
+                pass  # that device is down, so the link is cut
 
 
 def main():

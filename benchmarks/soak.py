@@ -37,7 +37,7 @@ MAX_FILES = 50
 
 
 class Sample(NamedTuple):
-    """The resources of the master at one moment."""
+    """The master's resources at one moment."""
 
     seconds: float
     mb: float
@@ -55,7 +55,7 @@ class Sample(NamedTuple):
 
 
 class Churn:
-    """The calls of nodes and tools to a master."""
+    """Nodes and tools that call a master."""
 
     def __init__(self, port: int, seed: int) -> None:
         self._port = port
@@ -74,9 +74,9 @@ class Churn:
         happens()
 
     def join(self) -> None:
-        """Start a node; a node of its name may already exist."""
+        """Start a node; a node with the same name may already exist."""
         name = f"/robot{self._random.randrange(NAMES)}"
-        # Always a new address: a new process has a new port, here a new path.
+        # Always use a new address: a new process would have a new port, here it has a new path.
         uri = f"http://127.0.0.1:{self._random.choice(self._slaves).port}/{self._random.randrange(10**9)}/"
         self._live[name] = uri
         for topic in ("/rosout", f"{name}/out"):
@@ -107,7 +107,7 @@ class Churn:
         self.calls += 24
 
     def vanish(self) -> None:
-        """Kill a node: its registrations remain."""
+        """Kill a node, so that its registrations remain."""
         if self._live:
             self._live.popitem()
 
@@ -122,7 +122,7 @@ class Churn:
             self.call("deleteParam", "/tool", key)
 
     def look(self) -> None:
-        """Query as `rosnode list` and `rosparam list` do."""
+        """Query the master like `rosnode list` and `rosparam list`."""
         self.call("getSystemState", "/tool")
         self.call("getParamNames", "/tool")
 
@@ -132,7 +132,7 @@ class Churn:
             sock.sendall(b"POST / HTTP/1.1\r\nContent-Length: 100\r\n\r\n<methodCall>")
 
     def call(self, method: str, *args: object) -> None:
-        """Make a call and ignore its answer."""
+        """Make a call and ignore the response."""
         self._master.call(method, *args)
         self.calls += 1
 
@@ -140,7 +140,7 @@ class Churn:
 def samples(
     program: psutil.Process, home: Path, churn: Churn, seconds: float, pause: float
 ) -> Iterator[Sample]:
-    """Churn for the given time; yield samples."""
+    """Run the churn for the given time; yield samples."""
     start = time.monotonic()
     following = start
 
@@ -166,7 +166,7 @@ def samples(
 
 
 def main() -> int:
-    """Churn and print the result."""
+    """Run the churn and print the result."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

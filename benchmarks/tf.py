@@ -35,7 +35,7 @@ def stamped(parent, child, seconds, x=0.0):
 
 
 def best_of_five(step, count):
-    """Return the seconds that one step takes in the best of five batches."""
+    """Return the seconds for one step, in the best of five batches."""
     best = 1e9
     for _ in range(5):
         start = time.perf_counter()
@@ -105,7 +105,7 @@ def listen(seconds):
 
 
 def send(rate, transforms):
-    """Publish messages of ``transforms`` transforms until stdin is closed: from bytes, so that the sender keeps up."""
+    """Publish messages with ``transforms`` transforms until stdin is closed; serialized bytes let the sender keep up."""
     import io
     import select
     import struct
@@ -144,7 +144,7 @@ def send(rate, transforms):
 
 
 def measure_listeners(stack, listeners, rate, transforms, seconds):
-    """Return the results of all listeners: microseconds per message, share of a core, messages per second of each."""
+    """Return the results for all listeners: microseconds per message, share of a core, and messages per second for each."""
     python, master = STACKS[stack]
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -174,7 +174,7 @@ def measure_listeners(stack, listeners, rate, transforms, seconds):
                 break
             except OSError:
                 time.sleep(0.05)
-        # The same sender for both: real rospy's reaches a quarter of this rate.
+        # Use the same sender for both, because real rospy's reaches only a quarter of this rate.
         start(sys.executable, "--send", rate, transforms)
         programs = [start(python, "--listen", seconds) for _ in range(listeners)]
         for program in programs:

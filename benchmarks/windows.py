@@ -110,7 +110,7 @@ def main() -> int:
 
 
 def measure(system: str) -> dict[str, float]:
-    """Measure one system once; return name with unit -> value."""
+    """Measure one system once; return the values by name with unit."""
     environ = {
         "ROS_MASTER_URI": f"http://localhost:{(port := free_port())}",
         "MINIROSPY_LOCAL": "1",
@@ -148,7 +148,7 @@ def measure(system: str) -> dict[str, float]:
 
 
 def _commands(system: str, folder: Path, environ: dict[str, str]) -> tuple[Starter, list[str], list[str]]:
-    """Return a function that starts Python, or a command, and the first words of roscore and rostopic."""
+    """Return a function that starts Python or a command, and the first words of roscore's and rostopic's command lines."""
     if system == "Wine":
         home = {"ROS_HOME": WINDOWS.path(folder)}
 
@@ -173,7 +173,7 @@ def _commands(system: str, folder: Path, environ: dict[str, str]) -> tuple[Start
 
 
 def _seconds(python: Starter, *words: str) -> float:
-    """Return how long a process takes; the first of two runs fills the system's caches."""
+    """Return how long a process takes. Run it twice, because the first run fills the system's caches."""
     for _ in range(2):
         start = time.perf_counter()
         run = python(*words)

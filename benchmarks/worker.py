@@ -1,4 +1,4 @@
-"""One process of a benchmark: `worker.py ROLE name=value ...`. Only the rospy API, so it runs on any rospy.
+"""One process of a benchmark: `worker.py ROLE name=value ...`. It uses only the rospy API, so it runs on any rospy.
 
 A worker prints a line of JSON when it is ready, one when it has measured, and one with its cost at the
 end; it reads the lines "go" and "stop" from stdin.
@@ -64,7 +64,7 @@ def message_of(kind):
 
 
 def reader_of(kind):
-    """Return a function that reads a message as a typical callback does."""
+    """Return a function that reads a message like a typical callback."""
     if kind == "small":
         return lambda message: message.data
     if kind == "scan":
@@ -73,7 +73,7 @@ def reader_of(kind):
 
 
 def talk(options):
-    """Publish one kind of message: as fast as possible, or ``hz`` times a second."""
+    """Publish one kind of message, as fast as possible or ``hz`` times a second."""
     import rospy
 
     rospy.init_node("bench_talker")
@@ -146,7 +146,7 @@ def echo(_options):
 
 
 def ping(options):
-    """Measure round trips of a small message: each pong's callback sends the next ping."""
+    """Measure round trips of a small message; the callback for each pong sends the next ping."""
     import rospy
     from std_msgs.msg import UInt64
 

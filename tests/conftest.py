@@ -16,30 +16,30 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-# On a busy machine examples are slow without being wrong.
+# On a busy machine, examples are slow without being wrong.
 settings.register_profile("minirospy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("minirospy")
 
 
 def pytest_configure() -> None:
-    """Reset ignored signals: a shell makes background jobs ignore SIGINT, and `nohup` SIGHUP; the tests' processes must not."""
+    """Reset signals that a shell (SIGINT, for background jobs) or `nohup` (SIGHUP) ignores, for the tests' processes."""
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
-        # The signal has no effect here; a new process starts with the system's default.
+        # The signal has no effect here, and new processes start with the system's default.
         signal.signal(signal.SIGHUP, lambda *_: None)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Escape surrogates in a test's output and log: pytest-xdist cannot send them."""
+    """Escape surrogates in a test's output and log, because pytest-xdist cannot send them."""
     report = yield
     report.sections = [(name, escaped_surrogates(text)) for name, text in report.sections]
     return report
 
 
 def escaped_surrogates(text: str) -> str:
-    """Return a text that UTF-8 can encode."""
+    """Escape a text so that UTF-8 can encode it."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 
@@ -56,8 +56,8 @@ def write_files(folder: Path, texts: Mapping[str, str], executable: Collection[s
 def free_port() -> int:
     """Return a port without a listener, for a server that another process starts, or that is restarted.
 
-    It is outside of the ephemeral range (from 32768 or 49152 on): such a port may be assigned to any
-    connection of another test before it is used.
+    The port is below the ephemeral range (from 32768 or 49152 on), whose ports may be assigned to any connection of
+    another test before this test uses them.
     """
     while True:
         port = random.SystemRandom().randrange(20_000, 32_000)
@@ -71,7 +71,7 @@ def free_port() -> int:
 
 @pytest.fixture(scope="session")
 def _board_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Yield the folder of the virtual boards of all tests; stop all boards at the end."""
+    """Yield the folder for all tests' virtual boards; stop all boards at the end."""
     folder = tmp_path_factory.mktemp("boards")
     yield folder
     if any(folder.iterdir()):
@@ -94,7 +94,7 @@ def _own_environment(
     monkeypatch.setenv("ROS_HOME", str(home))
     monkeypatch.setenv("ROS_LOG_DIR", str(home / "log"))
     monkeypatch.setenv("ROS_HOSTNAME", "localhost")
-    # A port on which nothing listens: a test without its own master fails immediately.
+    # Nothing listens on this port, so that a test without its own master fails immediately.
     monkeypatch.setenv("ROS_MASTER_URI", "http://localhost:1")
     monkeypatch.setenv("MINIROSPY_BOARD", f"test-{uuid.uuid4().hex[:12]}")
     monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(_board_folder))
@@ -126,7 +126,7 @@ def master(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 
 @pytest.fixture
 def interrupted_processes(monkeypatch: pytest.MonkeyPatch) -> list[subprocess.Popen[bytes]]:
-    """Return the processes that are started from now on; this process gets a Ctrl-C whenever one starts."""
+    """Return a list of the processes started from now on; this process receives a Ctrl-C each time it starts one."""
     children: list[subprocess.Popen[bytes]] = []
 
     class Interrupted(subprocess.Popen):  # type: ignore[type-arg]

@@ -25,7 +25,7 @@ from typing import Any
 INPUTS_PER_MASTER = 2000
 FINDING = Path("fuzz-finding.bin")
 HEAD = b"POST / HTTP/1.1\r\nContent-Length: %d\r\n\r\n"
-CUT = b"\xff\xfe"  # separates the parts of an input that arrive with one receive each
+CUT = b"\xff\xfe"  # separates the parts of an input; each part arrives in a separate receive call
 
 
 class Faults(logging.Handler):
@@ -41,7 +41,7 @@ class Faults(logging.Handler):
 
 
 class Target:
-    """A master, and one connection for each input."""
+    """A master, to which each input opens a new connection."""
 
     def __init__(self) -> None:
         self._loop = asyncio.SelectorEventLoop()
@@ -96,7 +96,7 @@ class Target:
         self._master = Master()
         self._master.notifier.send = lambda notice: None
         await self._master.start()
-        # A name that no input can guess, and so take over.
+        # A name that an input cannot guess and thus take over.
         self._name = f"/kept{random.getrandbits(64):x}"
         self._master.dispatch(
             "registerPublisher", [self._name, self._name, "std_msgs/String", "http://127.0.0.1:1/"]

@@ -30,6 +30,7 @@ from typing import Any, NamedTuple
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.fuzz import CUT, Faults, mutated
 from tests.fuzz_readers import peak_megabytes
+from tests.waiting import until
 
 FINDING = Path("fuzz-bridge-finding.bin")
 INPUTS_PER_BRIDGE = 2000
@@ -122,7 +123,7 @@ PAGES = [
 
 
 def tcp_pair() -> tuple[socket.socket, socket.socket]:
-    """Return both sockets of a TCP connection: Unix sockets have no ports, which a request contains."""
+    """Return both sockets of a TCP connection. A Unix socket has no ports, which a request contains."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         theirs = socket.create_connection(server.getsockname())
         ours, _ = server.accept()
@@ -130,7 +131,7 @@ def tcp_pair() -> tuple[socket.socket, socket.socket]:
 
 
 class Kind(NamedTuple):
-    """The inputs of one protocol: the first bytes of a connection, text messages and binary ones."""
+    """The inputs for one protocol: the first bytes of a connection, its text messages and its binary messages."""
 
     openings: Sequence[bytes]
     texts: Sequence[bytes] = ()
@@ -138,7 +139,7 @@ class Kind(NamedTuple):
 
 
 def kinds() -> Mapping[str, Kind]:
-    """Return the name of each listener -> its inputs."""
+    """Return the inputs for each listener, by its name."""
     from minirospy.web.rosbridge.cbor import encode_cbor, typed_array
     from minirospy.web.rosbridge.protocol import encode
 
@@ -162,7 +163,7 @@ def frame(payload: bytes, opcode: int) -> bytes:
 
 
 class Target:
-    """A bridge with its master, and one connection for each input."""
+    """A bridge with its master, to which each input opens a new connection."""
 
     def __init__(self) -> None:
         self._loop = asyncio.SelectorEventLoop()
@@ -219,18 +220,15 @@ class Target:
         await self._settle(bridge)
 
     async def _settle(self, bridge: Any) -> None:
-        """Wait until no state of the client is left."""
+        """Wait until no state of the client remains."""
 
         def left() -> list[object]:
             connections = [each for listener in bridge.listeners.values() for each in listener.connections]
-            rosbridge = [*bridge.rosbridge.sessions, *bridge.rosbridge.services]
+            rosbridge = [*bridge.rosbridge.sessions, *bridge.rosbridge.shared.services]
             graph = [*bridge.graph.publishers, *bridge.graph.topics]
             return [*connections, *rosbridge, *bridge.video.feeds, *graph]
 
-        end = time.monotonic() + 60
-        while left():
-            assert time.monotonic() < end, left()
-            await asyncio.sleep(0.001)
+        await until(lambda: not left(), pause=0.001)
         assert len(bridge.foxglove.sessions) == 1
         assert not self._faults.found, self._faults.found.pop()
 
@@ -242,13 +240,13 @@ class Target:
         from minirospy import Node
         from minirospy.runtime.master.master import Master
         from minirospy.web.bridge import Bridge, BridgeOptions
-        from minirospy.web.rosbridge.endpoint import RosbridgeOptions
+        from minirospy.web.rosbridge.shared import RosbridgeOptions
 
         master = Master()
         await master.start()
         node = Node("bridge", master_uri=f"http://localhost:{master.port}", host="localhost", rosout=False)
         await node.start()
-        # A client's errors are not findings, and would be logged for each input.
+        # Do not log a client's errors, which are not findings and occur for each input.
         logging.getLogger(node.log.name).disabled = True
         options = BridgeOptions(
             foxglove_port=0,
@@ -263,10 +261,9 @@ class Target:
         images = await node.advertise("/image", Image, latch=True)
         await images.publish(Image(height=2, width=2, encoding="mono8", step=2, data=b"abcd"))
         await node.serve("/set", SetBool, lambda request: (request.data, "set"))
-        # A client that stays connected, so that the next one is offered channels immediately.
+        # Keep a client connected, so that the next one is offered channels immediately.
         bridge.foxglove.open(Steady())  # type: ignore[arg-type]
-        while not bridge.foxglove.channels.by_id:
-            await asyncio.sleep(0.01)
+        await until(lambda: bridge.foxglove.channels.by_id)
         self._parts = (master, node, bridge)
 
     async def _end(self) -> None:
@@ -301,7 +298,7 @@ class Steady:
 
 
 def an_input(rng: random.Random, kind: Kind) -> bytes:
-    """Return the start of a connection and some frames, mutated outside or inside of the frames."""
+    """Return the start of a connection and some frames, with mutations outside or inside the frames."""
     opening = rng.choice(kind.openings)
     often = 0.95 if kind.texts else 0.3
     parts = [opening if rng.random() < often else mutated(rng, list(kind.openings))]
@@ -310,11 +307,11 @@ def an_input(rng: random.Random, kind: Kind) -> bytes:
         sources = list(kind.texts if is_text else kind.binaries)
         payload = rng.choice(sources)
         if rng.random() < 0.6:
-            # The mutations are those of requests, whose body is the payload.
+            # Mutate the payload like a request's body.
             requests = [b"\r\n\r\n" + each for each in sources]
             payload = mutated(rng, requests).replace(CUT, b"").partition(b"\r\n\r\n")[2]
         if rng.random() < 0.1:
-            # Continuations, pings, pongs, closes, and opcodes and bits without a meaning.
+            # Continuations, pings, pongs, closes, and undefined opcodes and bits.
             parts.append(frame(payload[: rng.choice((0, 2, 100, 200))], rng.choice(OPCODES)))
         opcode = 1 if is_text else 2
         if rng.random() < 0.1:

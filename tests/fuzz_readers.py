@@ -31,14 +31,14 @@ from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-# Address space of the process: a reader that claims more gets a MemoryError, a finding.
+# Limit for the process's address space: a reader that allocates more gets a MemoryError, which is a finding.
 MEMORY_BYTES = 3 << 30
-MAX_SECONDS = 20.0  # CPU time of an input of some kilobytes; more is a finding
-MAX_INPUT = 50_000  # bytes
+MAX_SECONDS = 20.0  # CPU seconds for an input of some kilobytes; if an input takes longer, it is a finding
+MAX_INPUT = 50_000  # maximum size of an input in bytes
 
 
 class Reader(NamedTuple):
-    """Seed texts or files, the function that reads them, and its documented errors."""
+    """A reader: seed texts or files, the function that reads them, and its documented errors."""
 
     seeds: Sequence[bytes]
     read: Callable[[bytes], object]
@@ -203,7 +203,7 @@ def xml_readers() -> dict[str, Reader]:
 
     def launch(data: bytes) -> None:
         text = data.decode("utf-8", "replace")
-        # Expressions of a launch file are evaluated: those of a mutation must not be.
+        # Do not evaluate the expressions in a mutated launch file.
         if "eval" not in text:
             load_text(text, {}, packages, {"HOME": "/h"})
 
@@ -225,7 +225,7 @@ def xml_readers() -> dict[str, Reader]:
         try:
             URDF.from_xml_string(data)
         except Exception as error:
-            # Same as the real one's errors: for an invalid number, an unknown shape, and two shapes in one
+            # These are also the real parser's errors: for an invalid number, an unknown shape, and two shapes in one
             # <geometry>.
             if type(error) not in (Exception, AssertionError, ValueError):
                 raise
@@ -398,14 +398,14 @@ def mutated(source: random.Random, seeds: Sequence[bytes]) -> bytes:
 
 
 class NoProgram:
-    """Replaces subprocess.Popen: a launch file runs programs, and those of a mutation must not run."""
+    """Replaces subprocess.Popen, because a launch file runs programs, and those of a mutation must not run."""
 
     def __init__(self, *_: object, **__: object) -> None:
         raise FileNotFoundError
 
 
 class Run:
-    """The inputs that were tried, and the findings."""
+    """The inputs tried so far, and the findings."""
 
     def __init__(self) -> None:
         self.inputs: Counter[str] = Counter()
@@ -424,7 +424,7 @@ class Run:
             if "\n" in str(error).rstrip("\n") and name not in ("yaml", "urdf_parser_py"):
                 self._found(name, data, f"{type(error).__name__} of several lines", f"{error}\n")
         except Exception as error:  # noqa: BLE001 - that is what is looked for
-            # An error at the same location is the same finding.
+            # Errors at the same location count as the same finding.
             frames = traceback.extract_tb(error.__traceback__)
             place = next(
                 (

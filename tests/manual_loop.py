@@ -1,4 +1,4 @@
-"""An event loop whose clock the test controls: timeouts expire when the test decides, on any machine."""
+"""An event loop whose clock the test controls, so that timeouts expire when the test decides, on any machine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 __all__ = ["ManualLoop", "run_manually", "until"]
 
-_PATIENCE = 60.0  # seconds of the wall clock after which a condition is considered to never become true
+_PATIENCE = 60.0  # seconds of wall time after which a condition is assumed never to become true
 
 
 class ManualLoop(asyncio.SelectorEventLoop):
@@ -24,8 +24,8 @@ class ManualLoop(asyncio.SelectorEventLoop):
         return self._now
 
     async def advance(self, seconds: float) -> None:
-        """Advance the clock in one step, as after a stall of the machine, and run what is due then."""
-        # New tasks set their timers by the current clock.
+        """Advance the clock in one step, as if the machine had stalled, and run everything that is due then."""
+        # Let new tasks set their timers by the current clock.
         await self._settle()
         self._now += seconds
         await self._settle()
@@ -49,7 +49,7 @@ def run_manually(scene: Callable[[ManualLoop], Coroutine[Any, Any, None]]) -> No
 
 
 async def until(condition: Callable[[], object]) -> None:
-    """Let sockets and threads run until the condition is true; the loop's clock does not advance meanwhile."""
+    """Let sockets and threads run until the condition is true. Meanwhile, the loop's clock does not advance."""
     end = time.monotonic() + _PATIENCE
     while not condition():
         if time.monotonic() > end:

@@ -1,4 +1,4 @@
-"""Mutation testing: insert small faults into pure rooms, the journal and access, and check that a test detects each one.
+"""Mutation testing: insert small faults into pure modules, the journal and access, and check that a test detects each one.
 
     make mutants                                  # all rooms
     python tests/mutants.py journal --show        # one, with the source of every survivor
@@ -46,7 +46,7 @@ class Room:
     modules: Sequence[str]
     tests: Sequence[str]
     deselected: Sequence[str] = ()
-    """Parts of names of excluded tests: they start other processes, which would run the original code."""
+    """Parts of the names of excluded tests, which start other processes that would run the original code."""
 
 
 ROOMS = {
@@ -128,7 +128,7 @@ _SWAPS: dict[type[ast.AST], type[ast.AST]] = {
 _IMPOSSIBLE = 42  # exit status of a fork that could not install its mutant
 
 Mutate = Callable[[ast.AST], ast.AST | None]
-"""Return a node's replacement; None if the node itself was changed."""
+"""Returns a node's replacement, or None if the node itself was changed."""
 
 
 # --- finding mutants
@@ -170,14 +170,14 @@ def _untested(node: ast.AST) -> Iterator[ast.AST]:
         case ast.Call(func=ast.Attribute(value=ast.Name(id="_log"))):
             yield node
         case ast.Call(func=ast.Name(id="getattr"), args=[ast.Name(id="os"), *_]):
-            # Code for some systems only.
+            # Skip code for some systems only.
             yield node
         case ast.Expr(value=ast.Constant()) | ast.ImportFrom() | ast.Import():
             yield node
         case ast.If(test=ast.Name(id="TYPE_CHECKING")):
             yield node
         case ast.If(test=ast.Compare(left=ast.Attribute(value=ast.Name(id="sys"), attr="platform"))):
-            # Code for another system.
+            # Skip code for another system.
             yield from (node.test, *(node.body if sys.platform != "win32" else node.orelse))
         case ast.Assign(targets=[ast.Name(id="__all__")]):
             yield node
@@ -258,7 +258,7 @@ def _is_none(node: ast.AST) -> bool:
 def install(
     mutant: Mutant, tree: ast.Module, path: str, functions: dict[tuple[int, str], list[FunctionType]]
 ) -> bool:
-    """Change the code of the running module; return whether that was possible. ``functions``: by line and name.
+    """Change the running module's code; return whether that was possible. ``functions`` contains them by line and name.
 
     It is not possible if the fault removes a function's only use of an outer variable, such as super().
     """
@@ -311,7 +311,7 @@ def _holds(statement: ast.stmt, line: int) -> bool:
 
 
 def _assign(module: ModuleType, statement: ast.stmt, path: str) -> None:
-    """Run a mutated assignment of a module, and set its value in the modules that import the name."""
+    """Run a module's mutated assignment, and set its value in the modules that import the name."""
     before = dict(vars(module))
     exec(compile(ast.Module([statement], []), path, "exec"), vars(module))
     for name, old in before.items():
@@ -346,7 +346,7 @@ class Mutants:
         self.results: Counter[str] = Counter()
 
     def pytest_sessionstart(self) -> None:
-        """Reduce the number of generated examples, and use the same ones for each mutant.
+        """Reduce the number of generated examples, and use the same examples for each mutant.
 
         The tests' own profile is loaded by now.
         """
@@ -356,11 +356,11 @@ class Mutants:
         settings.load_profile("mutants")
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Exclude the tests of other processes."""
+        """Exclude the tests that start other processes."""
         items[:] = [item for item in items if not any(part in item.name for part in self._room.deselected)]
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Run the tests once, then the relevant ones for each mutant."""
+        """Run the tests once, then run the relevant ones for each mutant."""
         for index, item in enumerate(session.items):
             self._record(session, index, item)
         session._setupstate.teardown_exact(None)
@@ -389,7 +389,7 @@ class Mutants:
 
             return on_line
 
-        # Cached results are computed only in the first test.
+        # Clear the caches, because cached results are computed only in the first test.
         for name in self._trees:
             importlib.import_module(f"minirospy.{name}")
             _clear_caches(name)
@@ -461,7 +461,7 @@ class Mutants:
         return found
 
     def _tests(self, mutant: Mutant, session: pytest.Session) -> list[int]:
-        """Return the tests that execute the statement, the quickest first; for code run at import, all of the module."""
+        """Return the tests that execute the statement, the quickest first; for code run at import, all of the module's."""
         tree = self._trees[mutant.module][1]
         statement: ast.AST = tree
         inside = None
@@ -486,7 +486,7 @@ class Mutants:
                 if name == mutant.module
                 for index in indexes
             }
-            # A test of a documented limit executes no line.
+            # A test of a documented limit executes no line of the module.
             test_file = "test_" + mutant.module.rpartition(".")[2]
             found |= {index for index, item in enumerate(session.items) if item.path.stem == test_file}
         else:
@@ -516,7 +516,7 @@ class Mutants:
             for stream in (0, 1, 2):
                 os.dup2(nowhere, stream)
             path, tree = self._trees[mutant.module]
-            # Its stream is a copy of stdout.
+            # The reporter's stream is a copy of stdout.
             session.config.pluginmanager.unregister(name="terminalreporter")
             if not install(mutant, tree, path, functions[mutant.module]):
                 status = _IMPOSSIBLE
@@ -544,7 +544,7 @@ def run_room(name: str, options: argparse.Namespace) -> float:
     """Try the mutants of a room; return the percentage that was killed."""
     room, start_time = ROOMS[name], time.monotonic()
     plugin = Mutants(room, options)
-    # importlib mode; rewriting asserts is only useful for people.
+    # Use importlib mode; rewriting asserts only helps people who read the output.
     arguments = [
         "-q",
         "-p",

@@ -1,4 +1,4 @@
-"""Raise the product's time limits in a test: above any stall of a machine that runs tests."""
+"""Raises the product's time limits in a test above any stall of a machine that runs tests."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 
 __all__ = ["PATIENCE", "patient_limits"]
 
-PATIENCE = 60.0  # seconds; a machine that runs tests may stall for some
+PATIENCE = 60.0  # seconds; longer than a machine that runs tests may stall
 LIMITS = (
     "aio.topics.JOIN_SECONDS",
     "fleet.definitions.ANSWER_SECONDS",
@@ -19,11 +19,11 @@ LIMITS = (
     "ros2.services.QUERY_SECONDS",
     "cli.bridge_status.ANSWER_SECONDS",
 )
-"""Limits after which the product gives up, or continues without an answer, in seconds."""
+"""Limits, in seconds, after which the product gives up or continues without a response."""
 
 
 @pytest.fixture(autouse=True)
 def patient_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Raise the limits above a machine's stalls. A test of a limit sets it after this."""
+    """Raise the limits above a machine's stalls. A test of a limit sets it after calling this."""
     for name in LIMITS:
         monkeypatch.setattr(f"minirospy.{name}", PATIENCE)

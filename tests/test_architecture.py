@@ -1,4 +1,4 @@
-"""docs/architecture.md is correct: its rooms are those of the layer test, and each file that it names exists; links too."""
+"""docs/architecture.md is correct: its rooms are those in the layer test, and all files and links in it exist."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_rooms_are_those_of_the_layer_test() -> None:
 @pytest.mark.parametrize("path", paths())
 def test_named_file_exists(path: str) -> None:
     base = ROOT if path.startswith("tests/") else PACKAGE
-    # In the diagrams a module has no suffix.
+    # In the diagrams, a module has no suffix.
     assert any((base / candidate).exists() for candidate in (path, f"{path}.py"))
 
 
@@ -46,7 +46,7 @@ def test_contributing_names_files_that_exist() -> None:
 
 
 def test_named_functions_and_tables_exist() -> None:
-    """Such as `_hz` in `ros/rostopic/commands/rostopic_rates.py`, `Node.close` in `runtime/node/node.py`."""
+    """For example `_hz` in `ros/rostopic/commands/rostopic_rates.py`, or `Node.close` in `runtime/node/node.py`."""
     named = re.findall(r"`([\w.]+)` in `([\w/]+/\w+\.py)`", TEXT)
     assert len(named) >= 5
     for name, path in named:

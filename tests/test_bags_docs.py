@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the page shows 
 
 
 def make_bag(path: Path) -> None:
-    """Write the bag of the recipes."""
+    """Write the bag that the recipes use."""
     from io import BytesIO
 
     from sensor_msgs.msg import CompressedImage
@@ -53,7 +53,7 @@ def make_bag(path: Path) -> None:
 
 
 def matches(shown: list[str], printed: list[str]) -> bool:
-    """Return whether printed lines match the shown ones; ``...`` is any text, on a separate line any lines."""
+    """Return whether printed lines match the shown ones. ``...`` matches any text, and on a separate line, any lines."""
     if not shown:
         return not printed
     first, *rest = shown

@@ -32,7 +32,7 @@ PAGES: tuple[str, ...] = record.PAGES if record else ()
 
 
 class Course:
-    """One student for all tests: a page continues with the files that the earlier pages left in the home folder."""
+    """One student for all tests, because each page continues with the files that earlier pages left in the home folder."""
 
     def __init__(self, home: Path, boards: Path) -> None:
         assert record is not None
@@ -51,7 +51,7 @@ def course(tmp_path_factory: pytest.TempPathFactory, _board_folder: Path) -> Cou
     return Course(tmp_path_factory.mktemp("student"), _board_folder)
 
 
-# The earlier pages may have to be played first, on a busy machine.
+# On a busy machine, the earlier pages may have to be played first.
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("page", PAGES)
 def test_page_shows_the_output_of_its_commands(course: Course, page: str) -> None:
@@ -59,7 +59,7 @@ def test_page_shows_the_output_of_its_commands(course: Course, page: str) -> Non
 
 
 def test_recorded_session_is_that_of_the_pages() -> None:
-    """`python docs/workshop/record.py` records it again."""
+    """`python docs/workshop/record.py` records the session again."""
     assert record is not None
     session = (FOLDER / "session.txt").read_text(encoding="utf-8")
     heads = [f"\n===== {page} =====\n" for page in PAGES]

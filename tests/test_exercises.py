@@ -40,7 +40,7 @@ def test_each_exercise_has_its_test() -> None:
 
 @pytest.mark.parametrize("exercise", EXERCISES)
 def test_one_launch_file_starts_all_robots(exercise: str) -> None:
-    """workshop.launch runs the nodes of the exercise's own file, and every node in it has a program."""
+    """workshop.launch runs the nodes in the exercise's own file, and every node in it has a program."""
     packages = Packages()
 
     def nodes(name: str, **args: str) -> list[tuple[str, str]]:
@@ -62,7 +62,7 @@ def test_argument_without_its_colon_is_refused() -> None:
 
 
 def test_solutions_run_in_a_copied_workspace(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """catkin_make accepts their CMakeLists.txt."""
+    """catkin_make accepts the solutions' CMakeLists.txt."""
     source = tmp_path / "src"
     source.mkdir()
     for name in ("rpi_feros", "launch"):

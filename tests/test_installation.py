@@ -28,12 +28,12 @@ entrypoints = [
     { name = "catkin", install-path = "/home/me/.local/bin/catkin", from = "minirospy" },
 ]
 """
-"""The format of uv 0.13."""
+"""The format used by uv 0.13."""
 
 
 @pytest.fixture
 def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the folder of an environment in which this process seems to run."""
+    """Return the folder of an environment in which this process appears to run."""
     folder = tmp_path / "minirospy"
     folder.mkdir()
     monkeypatch.setattr(sys, "prefix", str(folder))
@@ -109,7 +109,7 @@ def test_environment_without_pip_is_one_of_uv(prefix: Path, monkeypatch: pytest.
 def test_path_of_windows_is_a_command_in_cmd_and_in_powershell(
     prefix: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # A PowerShell line that starts with a quote is an expression.
+    # In PowerShell, a line that starts with a quote is an expression.
     monkeypatch.setattr(installation, "IS_WINDOWS", True)
     monkeypatch.setattr(sys, "executable", r"C:\Program Files\Python (x86)\python.exe")
     expected = r'C:\"Program Files"\"Python (x86)"\python.exe -m pip install "minirospy[web]"'

@@ -1,4 +1,4 @@
-"""Imports go only downwards through the rooms, and the pure rooms stay pure. Checked by parsing, not by importing."""
+"""Imports go only downwards through the rooms, and the pure rooms stay pure. This is checked by parsing, not by importing."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ LEAVES = {
     "rosbag's migration": ["ros/rosbag/migration", "ros/rosbag/rosbag/migration.py"],
     "bags of version 1.2": ["core/bag/reader12.py"],
 }
-"""Parts that can be deleted: nothing outside imports one, except for functions of `cli/`, which run it. Name -> its paths."""
+"""Parts that can be deleted, with their paths. Nothing outside a part imports it, except for functions in `cli/` that run it."""
 LEAF_PATHS = sorted(path for paths in LEAVES.values() for path in paths)
 SYSTEM_PACKAGES = {"catkin", "python_orocos_kdl", "rospkg"}
-"""Real ROS has these from the system or for each package: a package.xml uses rosdep's name, or none."""
+"""In real ROS, these come from the system or with each package, so a package.xml has rosdep's name for them, or none."""
 UNNAMED = {
     ("camera_info_manager_py", "camera_calibration_parsers"): "both read the files of cameras' calibrations",
     ("catkin", "rosunit"): "run_tests runs the tests of all kinds",
@@ -74,7 +74,7 @@ UNNAMED = {
     ("tf2_py", "tf2_ros"): "the buffer is in tf2_ros",
     ("tf2_sensor_msgs", "tf2_geometry_msgs"): "both transform with PyKDL",
 }
-"""(package, imported package) missing from the real package's package.xml -> the reason for the import."""
+"""(package, imported package) that the real package's package.xml lacks, with the reason for the import."""
 DEPTH = {room: depth for depth, rooms in enumerate(LAYERS) for room in rooms}
 BYTES_ONLY = [PACKAGE / "runtime", PACKAGE / "core" / "wire"]
 PURE = {"core"}
@@ -150,7 +150,7 @@ FILES = sorted(
 
 @functools.cache
 def imports(path: Path, *, for_types: bool = True) -> frozenset[str]:
-    """Return every module that a file imports, anywhere in the file; without ``for_types`` only run-time imports."""
+    """Return every module that a file imports, anywhere in the file; without ``for_types``, only those imported at run time."""
     found: set[str] = set()
     blocks: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
     while blocks:
@@ -163,13 +163,13 @@ def imports(path: Path, *, for_types: bool = True) -> frozenset[str]:
         elif isinstance(node, ast.If) and not for_types and ast.unparse(node.test) == "TYPE_CHECKING":
             blocks += node.orelse
         elif not isinstance(node, ast.expr):
-            # Imports are statements, which expressions cannot contain.
+            # Imports are statements, and expressions cannot contain statements.
             blocks += ast.iter_child_nodes(node)
     return frozenset(found)
 
 
 def graph_of_imports(room: str) -> dict[str, set[str]]:
-    """Return module -> the modules of the same room that it imports, including in functions, excluding imports for types."""
+    """Return the modules of the same room that each module imports, including in functions, but excluding imports for types."""
     files = [path for path in FILES if path.relative_to(PACKAGE).with_suffix("").parts[0] == room]
     modules = {module_name(path): path for path in files}
     found = {module: imports(path, for_types=False) for module, path in modules.items()}
@@ -230,13 +230,13 @@ def test_no_room_has_an_import_cycle(room: str) -> None:
 
 
 def ros_package_of(path: Path) -> str:
-    """Return a file's ROS package; an empty string for a file of another room."""
+    """Return a file's ROS package, or an empty string if the file is in another room."""
     parts = path.relative_to(PACKAGE).parts
     return parts[1] if parts[0] == "ros" and len(parts) > 2 else ""
 
 
 def package_imports() -> dict[tuple[str, str], set[str]]:
-    """Return (package, imported package of `ros/`) -> the files; the package is empty outside of `ros/`."""
+    """Return the files for each (package, imported package of `ros/`); the package is empty outside `ros/`."""
     found: dict[tuple[str, str], set[str]] = {}
     for path in FILES:
         for module in imports(path):
@@ -249,7 +249,7 @@ def package_imports() -> dict[tuple[str, str], set[str]]:
 
 
 def named_dependencies(package: str) -> set[str]:
-    """Return the dependencies in package.xml; nothing for a package that real ROS has from the system."""
+    """Return the dependencies in package.xml, or nothing if real ROS has the package from the system."""
     folders = (PACKAGE / "ros" / package, PACKAGE.parent / "msgs" / package)
     manifests = [folder / "package.xml" for folder in folders if (folder / "package.xml").exists()]
     return {
@@ -267,12 +267,12 @@ def test_ros_package_imports_what_its_manifest_names() -> None:
         if package and other not in SYSTEM_PACKAGES and other not in named_dependencies(package)
     }
     assert {pair: files for pair, files in unnamed.items() if pair not in UNNAMED} == {}
-    # Remove exceptions that are no longer needed.
+    # Exceptions that are no longer needed must be removed.
     assert set(UNNAMED) - unnamed.keys() == set()
 
 
 def leaf_of(path: str) -> str:
-    """Return the leaf that a path in the package is in, an empty string for another one; each ROS package is a leaf."""
+    """Return the leaf that contains a path in the package, or an empty string if none does. Each ROS package is a leaf."""
     for leaf in LEAF_PATHS:
         if path == leaf or path.startswith(f"{leaf}/"):
             names = [name for name, paths in LEAVES.items() if leaf in paths]
@@ -282,7 +282,7 @@ def leaf_of(path: str) -> str:
 
 @functools.cache
 def leaf_of_module(module: str) -> str:
-    """Return the leaf that a dotted name is in, such as ``package.module.name``."""
+    """Return the leaf that contains a dotted name, such as ``package.module.name``."""
     parts = module.split(".")
     if parts[0] != "minirospy":
         return ""
@@ -292,7 +292,7 @@ def leaf_of_module(module: str) -> str:
 
 @functools.cache
 def imported_on_import(path: Path) -> frozenset[str]:
-    """Return a file's imports at import time: not those in functions or for types only."""
+    """Return the modules that are imported when a file is imported: not those in functions, or for types only."""
     found: set[str] = set()
     blocks: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
     while blocks:
@@ -383,14 +383,14 @@ def test_every_room_has_its_place() -> None:
 
 GENERATED = {"_buff", "_connection_header", "_full_text", "_has_header", "_md5sum", "_request_class", "_response_class",
              "_slot_types", "_type"}  # fmt: skip
-"""Private names that genpy gives to messages: programs of ROS use them."""
+"""Private names that genpy gives to messages; programs for ROS use them."""
 OF_PYTHON = {"_actions", "_ArgumentGroup", "_asdict", "_create_unverified_context", "_current_frames", "_exit", "_getframe",
              "_group_actions", "_make", "_replace"}  # fmt: skip
-"""Private names of the standard library, and those of NamedTuple, which are public."""
+"""Private names in the standard library, and those of NamedTuple, which are public."""
 
 
 def test_private_members_stay_in_their_room() -> None:
-    """`ros/` is left out: names such as ``_chain`` are those of the real packages."""
+    """`ros/` is left out, because names such as ``_chain`` are those of the real packages."""
     named: dict[str, set[str]] = {}
     used: dict[str, list[tuple[str, str]]] = {}
     for path in FILES:

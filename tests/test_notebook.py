@@ -1,6 +1,6 @@
-"""Cells of a notebook: the kernel's event loop runs in the main thread, and an interrupt ends a cell, not the kernel.
+"""Cells in a notebook: the kernel's event loop runs in the main thread, and an interrupt ends a cell, not the kernel.
 
-The tests need no IPython kernel: they imitate its handling of signals and of the loop.
+The tests need no IPython kernel, because they imitate its handling of signals and of the loop.
 """
 
 from __future__ import annotations

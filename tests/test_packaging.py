@@ -22,7 +22,7 @@ from minirospy.ros.overlay_modules import overlay_files
 from tools.release import faults_of_metadata, unpack
 
 ROOT = Path(__file__).parents[1]
-MAX_WHEEL_BYTES = 6_000_000  # it is copied to small computers
+MAX_WHEEL_BYTES = 6_000_000  # maximum size, because the wheel is copied to small computers
 
 USE = """
 import site, sys
@@ -45,9 +45,9 @@ print(Packages().find_executable("rpi_feros", "led_actuator.py")[1])
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the wheel of this checkout as pip does, only from files under version control."""
+    """Build this checkout's wheel as pip does, from files under version control only."""
     source = tmp_path_factory.mktemp("source") / "minirospy"
-    # Generated files of the checkout are left out: the build itself must generate them.
+    # Leave out the checkout's generated files, because the build itself must generate them.
     left_out = shutil.ignore_patterns(".*", "__pycache__", "build", "dist")
     shutil.copytree(ROOT, source, ignore=left_out)
     shutil.copy(ROOT / ".gitignore", source)
@@ -71,7 +71,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_extra_that_is_named_exists() -> None:
-    """Both in the messages that contain the pip command, and in the docs."""
+    """This covers the messages that contain the pip command, and the docs."""
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     table = text.partition("[project.optional-dependencies]\n")[2].partition("\n\n")[0]
     extras = set(re.findall(r"^(\w+) = ", table, flags=re.MULTILINE))
@@ -85,8 +85,8 @@ def test_every_extra_that_is_named_exists() -> None:
         for name in names.split(",")
     }
     assert named <= extras
-    # All extras except those for development and the site, the GPIO that hides the virtual board, and those without a
-    # wheel for every system.
+    # All extras except those for development and the site, the GPIO that hides the virtual board, and those that lack
+    # a wheel on some system.
     assert set(
         re.findall(r'^all = \["minirospy\[(.*)\]"\]', table, flags=re.MULTILINE)[0].split(",")
     ) == extras - {"all", "dev", "docs", "fleet", "pi"}
@@ -164,7 +164,7 @@ def test_record_fits_the_files_of_the_wheel(wheel: Path) -> None:
         ("a('b; // c'); d(\"e) // f\");\n", "a('b; // c'); d(\"e) // f\");\n"),
         ("  d(); // `e`\n", "d(); // `e`\n"),
         ("/* a */ b(); /* c */\n", "/* a */ b(); /* c */\n"),
-        # Lines of a template literal are part of its text.
+        # Lines in a template literal are part of its text.
         ("  a = `\n  // b\n\n  c`;\n  d();\n", "a = `\n  // b\n\n  c`;\nd();\n"),
         ("  a = `b`;\n  // c\n", "a = `b`;\n"),
         ("  a = '`';\n  // b\n", "  a = '`';\n  // b\n"),
@@ -175,9 +175,9 @@ def test_files_of_the_page_are_lean(text: str, wanted: str) -> None:
     assert lean(text) == wanted
 
 
-@pytest.mark.timeout(900)  # it computes for seconds, on a busy machine for minutes
+@pytest.mark.timeout(900)  # this computes for seconds, on a busy machine for minutes
 def test_modules_of_the_wheel_are_those_of_the_sources_without_lines_of_comment(wheel: Path) -> None:
-    """The same programs, with the same line numbers in a traceback."""
+    """The programs are the same, with the same line numbers in a traceback."""
     blanked = 0
     with zipfile.ZipFile(wheel) as archive:
         for name in archive.namelist():
@@ -193,7 +193,7 @@ def test_modules_of_the_wheel_are_those_of_the_sources_without_lines_of_comment(
 
 
 def _code(code: CodeType) -> Iterator[object]:
-    """Yield the compiled code with its line numbers: far faster than comparing syntax trees as text."""
+    """Yield the compiled code with its line numbers, which is much faster than comparing syntax trees as text."""
     yield code, tuple(code.co_lines())
     for each in code.co_consts:
         if isinstance(each, CodeType):
@@ -219,7 +219,7 @@ def test_description_has_no_link_into_the_sources(wheel: Path) -> None:
 
 @pytest.mark.timeout(300)
 def test_one_address_is_in_sdist_and_wheel(tmp_path: Path) -> None:
-    """The address is set when the sdist is made: a wheel that others build from it has the same metadata."""
+    """The address is set when the sdist is made, so that a wheel that others build from it has the same metadata."""
     address = "https://git.example.org/robots/ours"
     sdist = _build(tmp_path, "--sdist", ROOT, {ADDRESS_VARIABLE: address})
     with tarfile.open(sdist) as archive:
@@ -251,7 +251,7 @@ def test_wheel_works_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
         archive.extractall(site)
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     done = subprocess.run(
-        # -S: the checkout's own path lines are not read; its libraries are added by hand.
+        # -S: do not read the checkout's own path lines; the libraries are added by hand.
         [sys.executable, "-S", "-c", USE, str(site)],
         env={**environment, "PYTHONPATH": _libraries(tmp_path)},
         cwd=tmp_path,
@@ -278,7 +278,7 @@ def test_wheel_works_in_a_new_environment(wheel: Path, tmp_path: Path) -> None:
 
 @pytest.mark.timeout(180)
 def test_folder_of_pip_target_offers_rospy(wheel: Path, tmp_path: Path) -> None:
-    """Python reads no `.pth` file there: a program of `minirospy python` can import rospy nevertheless."""
+    """Python reads no `.pth` file there, but a program run by `minirospy python` can import rospy nevertheless."""
     folder = tmp_path / "folder"
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder)
@@ -293,7 +293,7 @@ def test_folder_of_pip_target_offers_rospy(wheel: Path, tmp_path: Path) -> None:
 
 @pytest.mark.timeout(180)
 def test_archive_is_refused(wheel: Path, tmp_path: Path) -> None:
-    """An archive as made by `python -m zipapp`."""
+    """An archive as created by `python -m zipapp`."""
     done = _run_wheel(tmp_path, [str(wheel)], "demo")
 
     assert (done.returncode, done.stdout) == (2, "")
@@ -304,7 +304,7 @@ def test_archive_is_refused(wheel: Path, tmp_path: Path) -> None:
 
 def _run_wheel(folder: Path, path: list[str], *words: str) -> subprocess.CompletedProcess[str]:
     """Run `minirospy` with a path that no `.pth` file extends."""
-    # -S: the checkout's own path lines are not read; its libraries are added by hand.
+    # -S: do not read the checkout's own path lines; the libraries are added by hand.
     return subprocess.run(
         [sys.executable, "-S", "-m", "minirospy", *words],
         env={**os.environ, "PYTHONPATH": os.pathsep.join([*path, _libraries(folder)])},

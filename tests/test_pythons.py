@@ -1,4 +1,4 @@
-"""`make pythons`: which of the Pythons found are chosen."""
+"""`make pythons`: which of the Pythons that it finds are selected."""
 
 from __future__ import annotations
 

@@ -15,11 +15,11 @@ from minirospy.cli.registry import console_scripts
 ROOT = Path(__file__).parents[1]
 PROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
 
-CONDA_NAMES = {"msgpack": "msgpack-python"}  # PyPI name -> conda-forge name, if they differ
+CONDA_NAMES = {"msgpack": "msgpack-python"}  # conda-forge names by PyPI name, if they differ
 
 
 def _section(title: str) -> str:
-    """Return the lines of a table of pyproject.toml (Python 3.10 has no parser for it)."""
+    """Return the lines of a table in pyproject.toml, for which Python 3.10 has no parser."""
     return PROJECT.partition(f"[{title}]\n")[2].partition("\n[")[0]
 
 
@@ -80,6 +80,6 @@ def test_lists_of_commands_are_those_of_the_registry() -> None:
 def test_dockerfile_installs_the_wheel_of_a_release() -> None:
     text = (ROOT / "packaging" / "Dockerfile").read_text(encoding="utf-8")
     assert "COPY dist/minirospy-*-py3-none-any.whl" in text
-    # A program in a container must receive signals itself: the command is not run by a shell.
+    # A program in a container must receive signals itself, so a shell must not run the command.
     assert re.search(r'^CMD \["roscore"\]$', text, flags=re.MULTILINE)
     assert text.index("USER ros") < text.index("CMD ")

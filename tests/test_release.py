@@ -1,4 +1,4 @@
-"""`make release`: which wheels are refused, and the addresses that are published."""
+"""`make release`: which wheels are rejected, and the addresses that are published."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def test_addresses_of_gitlab_have_its_paths() -> None:
     ],
 )
 def test_release_refuses_an_invalid_address(address: str) -> None:
-    """The error is one line, before anything is built."""
+    """The error is one line, printed before anything is built."""
     done = subprocess.run(
         [sys.executable, str(ROOT / "tools" / "release.py")],
         env={**os.environ, ADDRESS_VARIABLE: address},
@@ -152,7 +152,7 @@ def test_metadata_without_the_addresses_is_named() -> None:
 
 
 def test_every_link_of_the_readme_leads_to_a_file() -> None:
-    """The links are below the address, as in the published description."""
+    """The links start with the address, as in the published description."""
     files = f"{ADDRESS}/blob/HEAD/"
     text = readme_of_wheel((ROOT / "README.md").read_text(encoding="utf-8"), files)
     named = [link.partition(")")[0] for link in text.split(f"]({files}")[1:]]
@@ -161,7 +161,7 @@ def test_every_link_of_the_readme_leads_to_a_file() -> None:
 
 
 def test_both_builds_are_of_one_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also if a commit is made between them."""
+    """This holds even if a commit is made between them."""
     repository = tmp_path / "repository"
     repository.mkdir()
     environ = {**os.environ, "GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_NOSYSTEM": "1"}

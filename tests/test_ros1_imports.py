@@ -63,7 +63,7 @@ def test_messages_of_ros2_that_came_first_are_named_in_one_line(sourced: dict[st
 
 
 def test_a_process_without_rospy_imports_what_is_first(sourced: dict[str, str]) -> None:
-    # As in the ROS 2 bridge, which uses ROS 2's packages.
+    # The ROS 2 bridge uses ROS 2's packages in this way.
     done = run("import minirospy.aio.node\nfrom std_msgs.msg import Thing\nprint(Thing.kind)", sourced)
     assert done.stdout == "ROS 2\n", done.stderr
 

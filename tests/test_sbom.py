@@ -1,4 +1,4 @@
-"""The bill of materials of a wheel: its contents with licences; a part that differs from its description is refused."""
+"""A wheel's bill of materials: its contents with licences; a part that differs from its description is rejected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pages as a site: mkdocs.yml lists each of them, and no link is broken, on the site or in the sources."""
+"""The pages as a site: mkdocs.yml lists all of them, and no link is broken on the site or in the sources."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _prose(page: Path) -> str:
 
 
 def _anchors(page: Path) -> set[str]:
-    """Return the names by which GitHub, and the site, link to the headings of a page."""
+    """Return the names by which GitHub and the site link to a page's headings."""
     found: Counter[str] = Counter()
     names = set()
     for heading in re.findall(r"^#+ (.*)$", _prose(page), flags=re.MULTILINE):

@@ -1,4 +1,4 @@
-"""The types of rospy and of messages that mypy and editors see in a student's file."""
+"""The types of rospy and of messages that mypy and editors find in a student's file."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_constructors_of_messages_are_typed(tmp_path: Path) -> None:
 
 
 def test_any_stays_rare() -> None:
-    """`Any` disables the checker: a value that is only passed on is an `object`, and a message has a protocol."""
+    """`Any` disables the checker; a value that is only passed on should be an `object`, and a message should have a protocol."""
     package = Path(__file__).parents[1] / "minirospy"
     texts = {
         path.relative_to(package): path.read_text(encoding="utf-8")
@@ -115,6 +115,6 @@ def test_any_stays_rare() -> None:
 
 @pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 replaces the constructor of a protocol")
 def test_message_protocol_takes_any_constructor() -> None:
-    # pyright compares constructors of protocols, too: with `object` it refuses Publisher("x", Twist).
+    # pyright also compares the constructors of protocols: with `object`, it would reject Publisher("x", Twist).
     hints = get_type_hints(Message.__init__)
     assert (hints["args"], hints["kwds"]) == (Any, Any)

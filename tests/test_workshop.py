@@ -42,7 +42,7 @@ spin = rospy.spin
 rospy.spin = lambda: (print("spins", flush=True), spin())
 runpy.run_path(sys.argv.pop(1), run_name="__main__")
 """
-"""Runs a program, and prints when everything before its rospy.spin() is done."""
+"""Runs a program, and prints a line when everything before its rospy.spin() is done."""
 
 Start = Callable[..., "subprocess.Popen[str]"]
 
@@ -55,7 +55,7 @@ def board() -> Iterator[Board]:
 
 @pytest.fixture
 def start(master: str) -> Iterator[Start]:
-    """Start `python ARGUMENTS`, as a student does."""
+    """Return a function that starts `python ARGUMENTS`, as a student does."""
     running: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str | Path) -> subprocess.Popen[str]:
@@ -101,7 +101,7 @@ def test_each_press_toggles_the_led_by_service(folder: Path, start: Start, board
         board.press(BUTTON)
         board.release(BUTTON)
         assert next(edges).level == level
-        # The LED changes before the response arrives: a Ctrl-C in between would interrupt the call.
+        # The LED changes before the response arrives, and a Ctrl-C in between would interrupt the call.
         wait_line(client, "Successfully changed LED state.")
         # Wait for the client's bouncetime, in which it ignores the button.
         time.sleep(0.6)
@@ -130,7 +130,7 @@ def test_first_node_as_a_class_ends_by_ctrl_c(start: Start) -> None:
 def test_action_client_prints_the_progress_of_the_leds(start: Start, board: Board) -> None:
     server = start(LISTINGS / "ledrun_server.py")
     wait_line(server, "Server pripravljen")
-    # Start it before the runs: all ten, which take a second each, may be over by then.
+    # Start it before the runs, which take a second each: all ten may be over by the time it is ready.
     cancel = start("-c", CANCEL)
     wait_line(cancel, "ready")
     edges = board.watch(LEDS, timeout=40)
@@ -140,7 +140,7 @@ def test_action_client_prints_the_progress_of_the_leds(start: Start, board: Boar
     assert lit == [*LEDS, 2]
     cancel.communicate("\n", timeout=30)
     output, _ = client.communicate(timeout=30)
-    # The second run, or a later one on a busy machine.
+    # The goal is cancelled in the second run, or in a later one on a busy machine.
     assert re.fullmatch(r"Result: [2-9]\n", output)
     said = interrupt(server)
     assert "Stevilo iteracij: 10" in said
@@ -154,7 +154,7 @@ def test_ctrl_c_ends_the_server_in_the_middle_of_a_goal(start: Start, board: Boa
     client = start(LISTINGS / "ledrun_client.py")
     assert any(edge.level for edge in edges)
     interrupt(server)
-    # It waits for a server that comes back; without one, Ctrl-C stops it. The listing then has no result to print.
+    # The client waits for a server to return; without one, Ctrl-C stops it. The listing then has no result to print.
     wait_line(client, "Server is active.")
     client.send_signal(CTRL_C)
     output, _ = client.communicate(timeout=30)
@@ -170,7 +170,7 @@ def test_node_of_the_readme_runs(start: Start, board: Board, tmp_path: Path) -> 
     wait_for(board, 4, 1)
     interrupt(publisher)
     interrupt(mine)
-    # The next program will not print warnings about pins in use.
+    # The next program will then print no warnings about pins in use.
     assert board.state().pins[4].function is Function.IN
 
 
@@ -194,7 +194,7 @@ def wait_for(board: Board, pin: int, level: int, seconds: float = 40.0) -> None:
 def interrupt(process: subprocess.Popen[str]) -> str:
     """Send Ctrl-C; assert that the process exits soon with status 0 and without a traceback; return its output."""
     process.send_signal(CTRL_C)
-    # 0.2 s on a quiet machine; a program that is not notified of the shutdown runs forever.
+    # This takes 0.2 s on a quiet machine; a program that is not notified of the shutdown runs forever.
     output, _ = process.communicate(timeout=100)
     assert "Traceback" not in output, output
     assert process.returncode == 0, output

@@ -21,7 +21,7 @@ TOOLS = ROOT / "tools" / "page"
 MODULES = TOOLS / "node_modules"
 PAGE = "minirospy/web/dashboard/page/js"
 TESTS = "tests/web/page"
-MIN_NODE = (20, 19)  # eslint 10 needs it
+MIN_NODE = (20, 19)  # minimum version that eslint 10 supports
 CHECKS = (
     ("eslint/bin/eslint.js", "--config", "tools/page/eslint.config.js", PAGE, TESTS),
     (
@@ -39,7 +39,7 @@ CHECKS = (
 
 
 def find_node() -> str | None:
-    """Return the path of a node that can run the checkers; None if there is none."""
+    """Return the path of a node that can run the checkers, or None if there is none."""
     node = shutil.which("node")
     if node is None:
         return None

@@ -52,7 +52,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def choose(words: Sequence[str], found: Sequence[str]) -> list[str]:
-    """Return the versions that ``words`` select from those found, which are sorted. Raise LookupError."""
+    """Return the versions that ``words`` select from those found, which are sorted. Raise LookupError if one is not found."""
     with_gil = [name for name in found if not name.endswith("t")] or list(found)
     names = {{"oldest": with_gil[0], "newest": with_gil[-1]}.get(word, word) for word in words}
     if missing := names - set(found):
@@ -61,7 +61,7 @@ def choose(words: Sequence[str], found: Sequence[str]) -> list[str]:
 
 
 def _version(python: str) -> str:
-    """Return a name such as 3.13.0, or 3.14.0t of a build without the GIL."""
+    """Return a name such as 3.13.0, or 3.14.0t for a build without the GIL."""
     code = "import sys, sysconfig as s; print(sys.version.split()[0] + 't' * bool(s.get_config_var('Py_GIL_DISABLED')))"
     return subprocess.run([python, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
 

@@ -28,7 +28,7 @@ from tools.sbom import SbomError, make_sbom
 
 ROOT = Path(__file__).parents[1]
 
-MAX_BYTES = 6_000_000  # the wheel is copied to small computers
+MAX_BYTES = 6_000_000  # maximum size, because the wheel is copied to small computers
 
 OLDEST = (3, 10)
 
@@ -37,13 +37,13 @@ _INCLUDED = {
     "minirospy/share/rpi_feros/": "rpi_feros/",
     "minirospy/share/launch/": "launch/",
 }
-"""Folders of the wheel -> the location of their files in the sources, as in hatch_build.py."""
+"""Folders in the wheel with the location of their files in the sources, as in hatch_build.py."""
 
 _VENDORED = "minirospy/web/dashboard/page/vendor/"
 
 
 class ReleaseError(Exception):
-    """A failed step; the text names the step and the reason."""
+    """A step has failed; the text names the step and the reason."""
 
 
 def main() -> int:
@@ -54,7 +54,7 @@ def main() -> int:
             raise ReleaseError(
                 f"not all is committed, but a release is built from the last commit:\n{changed}"
             )
-        # Use one commit for both builds, even if another one is made meanwhile.
+        # Use one commit for both builds, even if another one is made in the meantime.
         commit, epoch = _run("git", "log", "-1", "--format=%H %ct").split()
         dist = ROOT / "dist"
         with tempfile.TemporaryDirectory() as scratch:
@@ -90,7 +90,7 @@ def main() -> int:
 
 
 def faults_of_wheel(contents: Mapping[str, int], size: int, tracked: Collection[str]) -> list[str]:
-    """Return the faults of a wheel of ``size`` bytes: ``contents`` are its files, ``tracked`` those of the sources."""
+    """Return the faults of a wheel of ``size`` bytes. ``contents`` are its files, ``tracked`` are those in the sources."""
     sources = set(tracked)
     faults = []
     if size >= MAX_BYTES:
@@ -120,7 +120,7 @@ def faults_of_wheel(contents: Mapping[str, int], size: int, tracked: Collection[
 
 
 def faults_of_metadata(text: str, urls: Mapping[str, str]) -> list[str]:
-    """Return the faults of a METADATA file: its addresses should be ``urls``, and the README's links must lead there."""
+    """Return the faults of a METADATA file. Its addresses should be ``urls``, and the README's links must lead there."""
     metadata = message_from_string(text)
     given = [f"{label}, {url}" for label, url in urls.items()]
     faults = []
@@ -153,7 +153,7 @@ def _is_expected(name: str, sources: Collection[str]) -> bool:
     ):
         return True
 
-    # Generated from msgs/.
+    # The remaining modules are generated from msgs/.
     package = module.partition("/")[0]
     return f"msgs/{package}/package.xml" in sources and name.endswith((".py", ".pyi", "/py.typed"))
 
@@ -170,7 +170,7 @@ def _metadata(wheel: Path) -> str:
 
 
 def unpack(archive: tarfile.TarFile, folder: Path) -> None:
-    """Unpack an archive as data, which Python 3.14 does by default and the first releases of 3.10 and 3.11 cannot."""
+    """Unpack an archive as data, which is the default from Python 3.14 on, and unsupported in the first 3.10 and 3.11."""
     archive.extraction_filter = getattr(tarfile, "data_filter", lambda member, _: member)
     archive.extractall(folder)
 
@@ -178,7 +178,7 @@ def unpack(archive: tarfile.TarFile, folder: Path) -> None:
 def _build(folder: Path, commit: str, epoch: str, *, elsewhere: bool = False) -> list[Path]:
     """Build a commit, the wheel from the unpacked sdist; return both files.
 
-    ``elsewhere``: as in another user's shell, with another time zone, language, file mode and set order.
+    With ``elsewhere``, build as in another user's shell, with another time zone, language, file mode and set order.
     """
     source = folder / "minirospy"
     archive = subprocess.run(["git", "archive", commit], cwd=ROOT, check=True, capture_output=True).stdout
@@ -202,7 +202,10 @@ def _compare(first: list[Path], second: list[Path]) -> None:
 
 
 def find_pythons() -> dict[str, str]:
-    """Return one interpreter of each version from OLDEST on: "3.13" or, of a build without the GIL, "3.13t", and its path."""
+    """Return the path of one interpreter for each version from OLDEST on.
+
+    The keys are versions such as "3.13", or "3.13t" for a build without the GIL.
+    """
     pyenv = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv") / "versions"
     names = [f"python3.{minor}{build}" for minor in range(OLDEST[1], 20) for build in ("", "t")]
     found = [
@@ -220,8 +223,7 @@ def find_pythons() -> dict[str, str]:
             text=True,
             check=False,
         )
-        # pyenv's commands exist also for versions that are not selected; Debian's have no ensurepip without
-        # python3-venv.
+        # pyenv also has commands for versions that are not selected; Debian's have no ensurepip without python3-venv.
         if done.returncode == 0:
             major, minor, is_free = map(int, done.stdout.split())
             versions.setdefault((major, minor, is_free), path)
@@ -233,7 +235,7 @@ def find_pythons() -> dict[str, str]:
 
 
 def _try_out(python: str, wheel: Path, scratch: Path) -> None:
-    """Install the wheel into a new environment, and run the demo there. Raise ReleaseError."""
+    """Install the wheel into a new environment, and run the demo there. Raise ReleaseError if that fails."""
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         venv = Path(folder, "venv")
         _run(python, "-m", "venv", str(venv))
@@ -253,7 +255,7 @@ def _try_out(python: str, wheel: Path, scratch: Path) -> None:
 
 
 def _run(*command: str, environ: Mapping[str, str] | None = None, cwd: str | Path = ROOT) -> str:
-    """Run a command and return its output. Raise ReleaseError with its output."""
+    """Run a command and return its output. Raise ReleaseError with the output if the command fails."""
     done = subprocess.run(
         command,
         env=environ,

@@ -27,11 +27,11 @@ Json = dict[str, object]
 
 
 class SbomError(Exception):
-    """A wheel whose parts differ from their description; the text names the file."""
+    """A part of the wheel differs from its description; the text names the file."""
 
 
 def make_sbom(wheel: Path, seconds: int) -> str:
-    """Return the text of the wheel's bill of materials, made at a time (Unix seconds). Raise SbomError."""
+    """Return the text of the wheel's bill of materials, made at ``seconds`` (Unix time). Raise SbomError if a part is wrong."""
     with zipfile.ZipFile(wheel) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
@@ -59,7 +59,7 @@ def make_sbom(wheel: Path, seconds: int) -> str:
                 "licenses": [{"license": {"id": project["License"]}}],
                 "hashes": [{"alg": "SHA-256", "content": digest}],
                 "purl": root,
-                # The contents of the wheel itself; packages that pip installs with it are below.
+                # These are the contents of the wheel itself; packages that pip installs with it are below.
                 "components": parts,
             },
         },
@@ -94,7 +94,7 @@ def _page_libraries(files: dict[str, bytes]) -> list[Json]:
         inside: list[Json] = []
         described = {Path(path).name: digest for path, digest in entry["files"].items()}
         if bundle := entry.get("bundle"):
-            # esbuild's output for the parts of the library that the page uses.
+            # This is esbuild's output for the parts of the library that the page uses.
             described[bundle["file"]] = bundle["sha256"]
         for file, expected in described.items():
             name = VENDOR + folder + "/" + (f"{file}.txt" if file == "LICENSE" else file)

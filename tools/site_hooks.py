@@ -18,7 +18,7 @@ PAGES = {
     "CHANGELOG.md": "CHANGELOG.md",
     "tests/README.md": "tests.md",
 }
-"""Pages outside of docs/ -> their names on the site (README.md would be its start page)."""
+"""Pages outside docs/, with their names on the site (README.md would become its start page)."""
 
 _LINK = re.compile(r"(\]\()(?!https?:|#|mailto:)([^)\s]+)(\))")
 
@@ -29,7 +29,7 @@ def place_on_site(page: str) -> str:
 
 
 def link_on_site(target: str, page: str) -> str:
-    """Return the target on the site of a link in ``page`` (a path in the sources)."""
+    """Return a link's target on the site; ``page`` is the path of the page in the sources."""
     name, mark, anchor = target.partition("#")
     if not name:
         return target
@@ -38,7 +38,7 @@ def link_on_site(target: str, page: str) -> str:
 
 
 def on_config(config: Any) -> Any:
-    """Make the anchors of headings as GitHub does, so that links work in both places."""
+    """Make the anchors of headings in the same way as GitHub, so that links work in both places."""
     from pymdownx.slugs import slugify
 
     config.mdx_configs.setdefault("toc", {})["slugify"] = slugify(case="lower")
@@ -46,7 +46,7 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """Add the pages outside of docs/."""
+    """Add the pages outside docs/."""
     from mkdocs.structure.files import File
 
     for page, place in PAGES.items():
@@ -55,7 +55,7 @@ def on_files(files: Any, config: Any) -> Any:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Convert a page's links to those of the site."""
+    """Convert a page's links to the site's paths."""
     place = page.file.src_uri
     original = {there: here for here, there in PAGES.items()}.get(place, f"docs/{place}")
     return _LINK.sub(lambda link: link[1] + link_on_site(link[2], original) + link[3], markdown)

@@ -59,7 +59,7 @@ def main() -> int:
 
 
 def _bundle(bundle: dict[str, str], scratch: Path) -> bytes:
-    """Return one minified module with the entry's exports; the package is in ``scratch/node_modules``."""
+    """Return a minified module with the entry's exports; the package is in ``scratch/node_modules``."""
     entry = Path(shutil.copy(Path(__file__).parent / bundle["entry"], scratch))
     words = ["npx", "--yes", f"esbuild@{bundle['esbuild']}", entry.name, "--bundle", "--minify"]
     options = ["--format=esm", "--target=es2022", "--legal-comments=none", "--log-level=error"]
@@ -72,7 +72,7 @@ def _file_name(path: str) -> str:
 
 
 def _without_map(body: bytes) -> bytes:
-    """Leave out the line that names a source map, which is not vendored: a browser would request it."""
+    """Remove the line that names a source map, which is not vendored, because a browser would request it."""
     kept = [line for line in body.split(b"\n") if not line.startswith(b"//# sourceMappingURL=")]
     return b"\n".join(kept)
 

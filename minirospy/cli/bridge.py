@@ -209,7 +209,7 @@ def _bridge(given: BridgeArguments) -> int:
     from minirospy.web.foxglove.endpoint import CAPABILITIES
     from minirospy.web.graph import Filters
     from minirospy.web.serve import run
-    from minirospy.web.server.connection import Limits
+    from minirospy.web.server.client import Limits
 
     address = given.address or ("0.0.0.0" if given.listen else "127.0.0.1")
     if not is_loopback(address) and not given.listen:

@@ -23,6 +23,7 @@ from minirospy.base.errors import (
     TransportTerminated,
 )
 from minirospy.base.ros1_imports import prefer_ros1
+from minirospy.base.script_names import find_packages_named_like_scripts
 from minirospy.client.identity import private_parameters
 from minirospy.client.log import (
     DEBUG,
@@ -157,6 +158,7 @@ __all__ = [
 # Do this before the first message is imported: if ROS 2 is sourced, its packages with the same names are first on the
 # path.
 prefer_ros1()
+find_packages_named_like_scripts()
 
 
 def spin() -> None:

@@ -78,6 +78,7 @@ class Lifecycle:
         self.interrupts: list[Callable[[], object]] = []
         """Called to unblock blocking calls, after is_shutdown() has become true and before the node leaves the graph."""
 
+        self.has_waited = False  # a thread has waited or slept in a call of rospy
         self.deferral = Deferral()
         self.machine = ShutdownMachine()
         self._this_thread = _ThisThread(self.machine.main)
@@ -135,6 +136,7 @@ class Lifecycle:
         A signal handler may call ``interrupt`` at any point in the main thread, so the events that it sets are
         SignalSafeEvents.
         """
+        self.has_waited = True
         return _Interrupting(self, interrupt)
 
     def spin(self) -> None:
@@ -160,6 +162,11 @@ class Lifecycle:
     def is_notified(self) -> bool:
         """Return whether the calling thread was notified of the shutdown."""
         return self._this_thread.state.awareness is Awareness.NOTIFIED
+
+    @property
+    def main_polls(self) -> bool:
+        """Return whether the main thread has called is_shutdown()."""
+        return self.machine.main.awareness is not Awareness.NONE
 
     def poll_shutdown(self) -> bool:
         """Return whether the node has shut down.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from minirospy.client.session import Session
 
-__all__ = ["configure", "start"]
+__all__ = ["configure", "configured_by_file", "start"]
 
 _FILE_FORMAT = "[%(name)s][%(levelname)s] %(asctime)s: %(message)s"
 _FILE_BYTES = 50_000_000
@@ -54,7 +54,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
 
     # A user's configuration file uses this, and so do programs that look for their log file.
     os.environ["ROS_LOG_FILENAME"] = str(path)
-    if not _configured_by_file(session):
+    if not configured_by_file(session.identity.environment.home):
         _rosout.setLevel(logging.INFO)
         _add_handler(session, _rosout, RosStreamHandler())
         _log_to_file(session, path)
@@ -118,10 +118,10 @@ def _offer_logger_services() -> None:
     Service("~set_logger_level", SetLoggerLevel, set_level)
 
 
-def _configured_by_file(session: Session) -> bool:
-    """Apply the user's configuration file for ``logging`` and return True, or return False if there is none."""
+def configured_by_file(home: Path) -> bool:
+    """Apply the user's configuration file for ``logging``, of ROS_HOME ``home``, and return True; False if there is none."""
     named = os.environ.get("ROS_PYTHON_LOG_CONFIG_FILE")
-    folder = session.identity.environment.home / "config"
+    folder = home / "config"
     found = [folder / f"python_logging.{kind}" for kind in ("conf", "yaml", "yml")]
     for path in [Path(named)] if named else [path for path in found if path.is_file()]:
         import logging.config

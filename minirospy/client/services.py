@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import logging
 import threading
 import time
@@ -13,6 +12,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from minirospy.base.clock import SignalSafeEvent, wait_for_event
+from minirospy.base.environment import split_uri
 from minirospy.base.errors import (
     CallFailed,
     DeserializationError,
@@ -23,8 +23,10 @@ from minirospy.base.errors import (
     RpcRefused,
     SerializationError,
     ServiceException,
+    TransportException,
     WireError,
 )
+from minirospy.base.numpy_names import add_numpy_note
 from minirospy.base.times import Duration
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import Session, current_session
@@ -32,11 +34,13 @@ from minirospy.client.topic import unregister_from_master
 from minirospy.core.idl.message import args_kwds_to_message, number_header
 from minirospy.core.idl.service import to_response
 from minirospy.core.wire.header import Header
+from minirospy.core.wire.service import RESPONSE_HEAD, parse_response_head, serialize_failure
 from minirospy.core.wire.tcpros import ANY, InterfaceType
 
 if TYPE_CHECKING:
     from types import TracebackType
 
+    from minirospy.client.tcpros import TCPROSServiceClient, TCPROSTransport
     from minirospy.core.idl.protocols import Message
     from minirospy.runtime.node.service_client import ServiceClient
     from minirospy.runtime.node.services import ServiceServer
@@ -84,7 +88,7 @@ class Service(Generic[_S_co]):
         self.handler = handler
         self.error_handler = error_handler or self._log_error
         self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
-        self._sequence = itertools.count(1)
+        self.seq = 0  # the number of responses, which is the seq of responses whose first field is a header
         self._server: ServiceServer | None = None
         self._ended = SignalSafeEvent()
 
@@ -150,18 +154,58 @@ class Service(Generic[_S_co]):
             request = self.request_class()
             request.deserialize(body if self._takes_memoryview else bytes(body))
             request._connection_header = header
+            if getattr(self._handle_request, "__func__", None) is not _HANDLE_REQUEST:
+                return self._handle_by_program(request, header)
             response = to_response(self.response_class, self.handler(request))
-            number_header(response, next(self._sequence))
+            self.seq += 1
+            number_header(response, self.seq)
             buffer = BytesIO()
             response.serialize(buffer)
             return buffer.getvalue()
+        except CallFailed as error:  # sent by a program's _handle_request
+            raise ServiceException(str(error)) from None
         except ServiceException as error:
             raise ServiceException(f"service cannot process request: {error}") from error
         except Exception as error:  # an error in the user's handler; it is sent to the client
             self._report(error)
             raise ServiceException(f"error processing request: {error}") from error
 
+    def _handle_by_program(self, request: Message, header: Header) -> bytes:
+        """Return the response that a program's own ``_handle_request`` sends. Raise CallFailed if it is an error."""
+        from minirospy.client.tcpros import ResponseTransport
+
+        transport = ResponseTransport(self.resolved_name, self.service_class, header)
+        self._handle_request(transport, request)
+        if not transport.sent:
+            raise RuntimeError("_handle_request has sent no response")
+        ok, length = parse_response_head(transport.sent[:RESPONSE_HEAD])
+        body = transport.sent[RESPONSE_HEAD : RESPONSE_HEAD + length]
+        if not ok:
+            raise CallFailed(body)
+        return body
+
+    def _handle_request(self, transport: TCPROSTransport, request: Message) -> None:
+        """Call the handler and send its response, or its error, through ``transport``.
+
+        Programs replace this method, in a subclass or in the class itself; otherwise, it is not called.
+        """
+        try:
+            response = to_response(self.response_class, self.handler(request))
+            self.seq += 1
+            transport.write_buff.write(b"\1")
+            transport.send_message(response, self.seq)
+        except ServiceException as error:
+            self._write_service_error(transport, f"service cannot process request: {error}")
+        except Exception as error:  # noqa: BLE001 - an error in the user's handler; it is sent to the client
+            self._report(error)
+            self._write_service_error(transport, f"error processing request: {error}")
+
+    def _write_service_error(self, transport: TCPROSTransport, err_msg: str) -> None:
+        """Send an error to the client."""
+        transport.write_data(serialize_failure(ServiceException(err_msg)))
+
     def _report(self, error: Exception) -> None:
+        add_numpy_note(error)
         try:
             self.error_handler(error, type(error), error, error.__traceback__)
         except Exception:  # noqa: BLE001 - the user's too; rospy ends the connection, and the client never sees why
@@ -171,6 +215,9 @@ class Service(Generic[_S_co]):
     def _log_error(error: Exception, _: type[Exception], __: Exception, tb: TracebackType | None) -> None:
         text = "".join(traceback.format_exception(type(error), error, tb))
         _log.error("Error processing request: %s\n%s", error, text)
+
+
+_HANDLE_REQUEST = Service._handle_request
 
 
 class ServiceProxy(Generic[_S_co]):
@@ -205,6 +252,10 @@ class ServiceProxy(Generic[_S_co]):
         self._client_session: Session | None = None
         # Number of calls that reached the service. It is the seq of requests whose first field is a header.
         self._calls = 0
+        self._transport: TCPROSTransport | None = (
+            None  # set by the program, or the connection that it asked for
+        )
+        self._protocol: TCPROSServiceClient | None = None
         self._lock = threading.Lock()
 
     def __call__(self, *args: object, **kwds: object) -> Any:
@@ -220,6 +271,8 @@ class ServiceProxy(Generic[_S_co]):
         request = args_kwds_to_message(self.request_class, args, kwds)
         if not hasattr(type(request), "_type"):
             raise TypeError("request object is not a valid request message instance")
+        if self._transport is not None and self._is_transport_usable(self._transport):
+            return self._call_through(self._transport, request)
         body = self._serialize(request)
         if not self.persistent:
             return self._exchange(self._connect(body), body, keep=False)
@@ -230,6 +283,46 @@ class ServiceProxy(Generic[_S_co]):
             if self._client is None:
                 self._client, self._client_session = self._connect(body), current_session()
             return self._exchange(self._client, body, keep=True)
+
+    @property
+    def seq(self) -> int:
+        """The number of calls that reached the service."""
+        return self._calls
+
+    @property
+    def protocol(self) -> TCPROSServiceClient:
+        """The fields for the connection header, and the class of the responses; for a program's own TCPROSTransport."""
+        if self._protocol is None:
+            from minirospy.client.tcpros import TCPROSServiceClient
+
+            headers = {**self._headers, "persistent": "1"} if self.persistent else self._headers
+            self._protocol = TCPROSServiceClient(self.resolved_name, self.service_class, headers)
+        return self._protocol
+
+    @property
+    def transport(self) -> TCPROSTransport | None:
+        """The persistent connection, or None. A program may set a connection of its own, which calls then use."""
+        client = self._client
+        if self._transport is None and client is not None:
+            from minirospy.client.tcpros import TCPROSTransport
+
+            # From here on the connection belongs to the transport, which the program may use or close.
+            transport = TCPROSTransport(self.protocol, self.resolved_name)
+            transport.set_socket(client.detach(), client.uri)
+            transport.dest_address = split_uri(client.uri, "rosrpc")[:2]
+            with contextlib.suppress(TransportException):  # some servers send no type
+                transport.use_header(client.header)
+            self._client, self._transport, self._transport_is_own = None, transport, True
+        return self._transport
+
+    @transport.setter
+    def transport(self, transport: TCPROSTransport | None) -> None:
+        self._disconnect()
+        self._transport, self._transport_is_own = transport, False
+
+    def _get_service_uri(self, request: object) -> str:
+        """Return the service's URI; ``request`` has no effect here. Raise ServiceException if the master has none."""
+        return self._find_uri()
 
     def wait_for_service(self, timeout: float | None = None) -> None:
         """Wait until the service is available. Raise ROSException after ``timeout`` seconds."""
@@ -244,6 +337,45 @@ class ServiceProxy(Generic[_S_co]):
             client.hang_up()
         else:
             self._disconnect()
+        transport, self._transport = self._transport, None
+        if transport:
+            transport.close()
+
+    def _is_transport_usable(self, transport: TCPROSTransport) -> bool:
+        """Return whether calls use ``transport``; drop it if it is the proxy's own connection and has ended.
+
+        A program's connection may go to another server than the master's, so it is not replaced.
+        """
+        from minirospy.runtime.transport.sockets import is_readable
+
+        sock = transport.socket
+        if self._transport_is_own and (sock is None or is_readable(sock)):
+            transport.close()
+            self._transport = None
+        return self._transport is not None
+
+    def _call_through(self, transport: TCPROSTransport, request: Message) -> Message:
+        """Return the response to a call on a program's connection."""
+        is_kept = False
+        self._calls += 1
+        try:
+            transport.send_message(request, self._calls)
+            responses = transport.receive_once()
+            is_kept = self.persistent
+        except ServiceException:
+            is_kept = self.persistent
+            raise
+        except TransportException as error:
+            if current_session().is_shutdown():
+                raise current_session().lifecycle.interrupted(
+                    "node shutdown interrupted service call"
+                ) from error
+            raise ServiceException(f"transport error completing service call: {error}") from error
+        finally:
+            if not is_kept:
+                transport.close()
+                self._transport = None
+        return responses[0]
 
     def _disconnect(self) -> None:
         client, self._client = self._client, None
@@ -301,13 +433,17 @@ class ServiceProxy(Generic[_S_co]):
             same_host=current_session().identity.environment.same_host,
         )
 
-    def _connect_by_master(self, ahead: ServiceClient | None, request: bytes) -> ServiceClient:
+    def _find_uri(self) -> str:
         try:
-            self.uri = uri = current_session().master.lookup_service(self.resolved_name)
+            self.uri = current_session().master.lookup_service(self.resolved_name)
         except RpcRefused:
             raise ServiceException(f"service [{self.resolved_name}] unavailable") from None
         except (MasterUnreachableError, RpcError) as error:
             raise ServiceException(f"unable to contact master: {error}") from error
+        return self.uri
+
+    def _connect_by_master(self, ahead: ServiceClient | None, request: bytes) -> ServiceClient:
+        uri = self._find_uri()
         try:
             if ahead and ahead.uri == uri:
                 # The server may have been about to exit, so connect again. Do not retry if the server does not

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import re
+import sys
 import threading
 from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING, TypeVar
@@ -223,9 +224,29 @@ class Session:
     def shut_down_at_exit(self) -> None:
         """Shut down when the program exits. If another thread is already shutting down, wait for it."""
         if self._opened or self.is_fork:
+            if not self.lifecycle.is_shutdown_requested:
+                self._warn_of_missing_spin()
             self.lifecycle.signal_shutdown("atexit")
             wait_for_event(self.lifecycle.left, None)
         self.signals.flush_at_exit()
+
+    def _warn_of_missing_spin(self) -> None:
+        """Log one line if the program ends right after it has subscribed, without an error and before any message has arrived."""
+        waiting = {topic: state for topic, state in self.subscribed.items() if state.has_callback}
+        # A program that polls or waits decides itself when it ends, as does the user of an interactive session.
+        is_meant = self.lifecycle.has_waited or self.lifecycle.main_polls or hasattr(sys, "ps1")
+        topics = sorted(topic for topic in waiting if topic != "/clock")
+        if (
+            topics
+            and not is_meant
+            and not hasattr(sys, "last_value")
+            and all(state.is_new for state in waiting.values())
+        ):
+            logging.getLogger("rosout").warning(
+                "the program ends while it subscribes to %s, before any message has arrived. rospy.spin() at its end keeps it "
+                "running",
+                ", ".join(topics),
+            )
 
     def abandon_in_fork(self) -> None:
         """In a fork, drop the references to the node, its sockets and its locks, because they belong to the parent."""

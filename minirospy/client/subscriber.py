@@ -6,11 +6,13 @@ Source: http://wiki.ros.org/rospy/Overview/Publishers%20and%20Subscribers.
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from minirospy.base.clock import SignalSafeEvent, wait_for_event
 from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError, ThreadLimitError
+from minirospy.base.numpy_names import add_numpy_note
 from minirospy.client.connection import Connection, connection_to_publisher
 from minirospy.client.session import Session, current_session
 from minirospy.client.topic import SharedTopic, Topic, register_with_master, unregister_from_master
@@ -30,6 +32,7 @@ _log = logging.getLogger("rosout")
 _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _BUFF_SIZE = 65536
+_NEW_SECONDS = 2.0  # a program that ends sooner after its last Subscriber has not waited for messages
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
 """Topics that are not counted: the statistics themselves, and the clock that provides their times."""
 
@@ -159,6 +162,18 @@ class SubscribedTopic(SharedTopic):
         self._statistics: StatisticsPublisher | None = None
         self._misfits = RateLimitedLogger(_log)
         self._registered = False
+        self._since = time.monotonic()  # when the last Subscriber was created
+
+    @property
+    def has_callback(self) -> bool:
+        """Return whether a Subscriber has a callback."""
+        return any(handle.callback is not None for handle in self._handles)
+
+    @property
+    def is_new(self) -> bool:
+        """Return whether no message has arrived, and the last Subscriber was created just before."""
+        has_received = any(link.received for link in self.links)
+        return not has_received and time.monotonic() - self._since < _NEW_SECONDS
 
     @property
     def links(self) -> tuple[InLink, ...]:
@@ -199,6 +214,7 @@ class SubscribedTopic(SharedTopic):
             self.buff_size = buff_size
         self.tcp_nodelay = self.tcp_nodelay or tcp_nodelay
         self._handles.append(handle)
+        self._since = time.monotonic()
         self._update()
 
     def leave(self, handle: Subscriber[Message]) -> None:
@@ -352,6 +368,7 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
         else:
             callback.function(message, callback.args)
     except BaseException as error:
+        add_numpy_note(error)
         # As in rospy, sys.exit() has no effect in a link's thread, but exits the program inside the Subscriber()
         # call.
         if is_callers_thread and not isinstance(error, Exception):

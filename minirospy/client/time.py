@@ -277,6 +277,7 @@ def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
         raise ROSInitException(session.why_fork_has_no_effect("simulated time"))
     lifecycle = session.lifecycle
     lifecycle.deferral.poll()
+    lifecycle.has_waited = True
     end = stop or (threading.Event() if lifecycle.is_notified else lifecycle.shutting_down)
 
     try:

@@ -85,7 +85,7 @@ class Exporter:
     async def start(self) -> None:
         """Announce the robot until :meth:`close`.
 
-        Raise MasterUnreachableError if no master answers, or RpcError if the call fails.
+        Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
         await self.look()
         network, ends = self._network, f"{self.claim.name}/{self.claim.gateway}"
@@ -121,7 +121,7 @@ class Exporter:
     async def look(self) -> bool:
         """Announce the current graph; return whether it has changed.
 
-        Raise MasterUnreachableError if no master answers, or RpcError if the call fails.
+        Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
         changed = await self.graph.look()
         self._announce()

@@ -142,7 +142,10 @@ class Importer:
         return list(self.robots)
 
     async def start(self) -> None:
-        """Show robots until :meth:`close`. Raise MasterUnreachableError if no master answers, or RpcError if the call fails."""
+        """Show robots until :meth:`close`.
+
+        Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
+        """
         self._node.parameters.listeners.append(self._parameter_changed)
         await self._node.parameters.add(MACHINES)
         await self._read_machines()
@@ -401,7 +404,7 @@ class Importer:
         return False
 
     def _trim_soon(self, removed: int) -> None:
-        """Return the memory of removed names to the system after a delay, because links linger."""
+        """Return the memory of removed names to the system after a delay, because links are closed late."""
         self._removed += removed
         if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
             loop = asyncio.get_running_loop()

@@ -287,8 +287,9 @@ class FleetNetwork:
         is_control: bool = False,
         from_others: bool = False,
     ) -> Deferred:
-        """Answer queries: ``handler(key, request)`` returns the reply, or raises MinirospyError with the reason for a refusal.
+        """Answer queries.
 
+        ``handler(key, request)`` returns the reply, or raises MinirospyError with the reason for a refusal.
         Set ``is_control`` for the fleet's own queries, whose handlers never wait for user nodes. With ``from_others``,
         ignore queries from this session.
         """

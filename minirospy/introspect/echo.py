@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, cast
 from minirospy.base.errors import UsageError
 from minirospy.base.times import Time
 from minirospy.core.idl.protocols import is_message, is_stamped
-from minirospy.introspect.fields import field_type, field_value, parse_path
+from minirospy.introspect.fields import Report, field_type, field_value, parse_path
 from minirospy.introspect.messages import MessageClasses, fill, serialize, words_of
 from minirospy.introspect.plot import plot_header, plot_row
 
@@ -49,7 +49,8 @@ class Echo:
     ``plot``: print comma-separated values, with a header line first. ``strings`` and ``arrays``: show fields of these
     kinds. ``width``: the width of numbers. ``offset``: show times as differences from ``now()``, which returns
     nanoseconds. ``header_times``: in a plot, use the time in a message's header, if it has one, instead of the receive
-    time. ``is_type_known``: ROS looks up the type of a field that is not a message, as it does for topics, but not for
+    time. ``report`` is called with the error for each element of a slice that lacks the rest of the path; the element is
+    shown as null. ``is_type_known``: ROS looks up the type of a field that is not a message, as it does for topics, but not for
     bags.
     """
 
@@ -65,6 +66,7 @@ class Echo:
         now: Callable[[], int] = time.time_ns,
         header_times: bool = True,
         is_type_known: bool = True,
+        report: Report = lambda _: None,
     ) -> None:
         self._path = field.path
         self._steps = parse_path(field.path)
@@ -76,6 +78,7 @@ class Echo:
         self._now = now
         self._header_times = header_times
         self._is_type_known = is_type_known
+        self._report = report
 
         self._type = ""
         self._classes = MessageClasses()
@@ -98,7 +101,7 @@ class Echo:
 
     def text(self, message: Message, received: Received) -> str:
         """Return the output for a message. Raise IndexError if the path's index exceeds the array."""
-        value = field_value(message, self._steps)
+        value = field_value(message, self._steps, self._report)
         return self._row(value, received) if self._plot else self._block(value)
 
     def _row(self, value: object, received: Received) -> str:
@@ -150,10 +153,12 @@ def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int 
 def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
     """Return ``value`` with placeholders for strings or arrays; ``type_`` is its ROS type, or "" if unknown.
 
-    As in ROS, arrays of messages are not elided, and the placeholder of a fixed-length array contains the length, as in
-    ``[3``.
+    As in ROS, arrays of messages are not elided, the placeholder of a fixed-length array contains the length, as in ``[3``,
+    and the values of a field in all elements of an array are treated as one value of the field's type.
     """
-    if type_.endswith("]") or isinstance(value, list | tuple):
+    if type_ == "string" and isinstance(value, list):
+        return value if strings else f"<string length: {len(value)}>"
+    if type_.endswith("]") or (isinstance(value, list | tuple) and not type_):
         values = cast("Sequence[object]", value)
         if not arrays or (type_.startswith("string[") and not strings):
             return f"<array type: {type_.rstrip('[]')}, length: {len(values)}>"

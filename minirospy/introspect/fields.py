@@ -7,6 +7,7 @@ http://wiki.ros.org/rostopic#rostopic_echo.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from minirospy.base.errors import NotFoundError, UsageError
@@ -14,7 +15,7 @@ from minirospy.base.errors import NotFoundError, UsageError
 if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Message
 
-__all__ = ["Step", "field_type", "field_value", "parse_path"]
+__all__ = ["Report", "Step", "field_type", "field_value", "parse_path"]
 
 _STEP = re.compile(r"^(\w+)(?:\[(-?\d+|-?\d*(?::-?\d*){1,2})\])?$")
 
@@ -38,10 +39,15 @@ def parse_path(path: str) -> tuple[Step, ...]:
     return tuple(_parse_step(part, path) for part in path.split("/")) if path else ()
 
 
-def field_value(message: object, steps: tuple[Step, ...]) -> object:
+Report = Callable[[NotFoundError | IndexError], object]
+"""Receives the error for an element of a slice that lacks the rest of the path."""
+
+
+def field_value(message: object, steps: tuple[Step, ...], report: Report | None = None) -> object:
     """Return the value at a path. For a slice of messages followed by a field, return a list of that field's values.
 
-    Raise NotFoundError if a field does not exist, IndexError if an array is too short.
+    Strings have indices and slices, too. Raise NotFoundError if a field does not exist, IndexError if an array is too short.
+    With ``report``, an element of a slice that lacks the rest of the path is None, and its error is reported.
     """
     value: object = message
 
@@ -51,18 +57,32 @@ def field_value(message: object, steps: tuple[Step, ...]) -> object:
         value = _attribute(value, name)
         if index is None:
             continue
-        if not isinstance(value, list | tuple | bytes):
+        if not isinstance(value, list | tuple | bytes | str):
             raise NotFoundError("array", name, hint=f"the field is a single {_type_of(value)}")
         rest = steps[at + 1 :]
-        if isinstance(index, slice) and rest:
-            return [field_value(element, rest) for element in value[index]]
-        size = len(value)
+        if isinstance(index, slice) and rest and not isinstance(value, str | bytes):
+            return [_element_value(element, rest, report) for element in value[index]]
+        size = (
+            f"string has {len(value)} characters"
+            if isinstance(value, str)
+            else f"array has {len(value)} elements"
+        )
         try:
             value = value[index]
-        except IndexError:
-            raise IndexError(f"{name}[{index}]: the array has {size} elements") from None
+        except IndexError as error:
+            raise IndexError(f"{name}[{index}]: the {size}") from error
 
     return value
+
+
+def _element_value(element: object, rest: tuple[Step, ...], report: Report | None) -> object:
+    if report is None:
+        return field_value(element, rest)
+    try:
+        return field_value(element, rest, report)
+    except (NotFoundError, IndexError) as error:
+        report(error)
+        return None
 
 
 def field_type(message_class: type[Message], path: str) -> str:

@@ -39,15 +39,25 @@ def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -
     elif isinstance(value, int | float):
         yield _Cell(name, str(value))
     elif isinstance(value, str):
-        if strings:
-            yield _Cell(name, value)
+        yield _Cell(name, value)
+    elif value is None:
+        # An element that lacks the field of a path such as points[:]/x[0] keeps its column.
+        yield _Cell(name, "")
     elif hasattr(value, "to_nsec"):
         # Subtract the origin only from points in time, not from durations.
         yield _Cell(name, str(value.to_nsec() - (origin if hasattr(value, "to_time") else 0)))
     elif isinstance(value, list | tuple):
-        if arrays:
-            for index, element in enumerate(value):
-                yield from _cells(f"{name}{index}", element, strings, arrays, origin)
+        for index, element in enumerate(value):
+            yield from _cells(f"{name}{index}", element, strings, arrays, origin)
     else:
         for field in getattr(value, "__slots__", ()):
-            yield from _cells(f"{name}.{field}", getattr(value, field), strings, arrays, origin)
+            inner = getattr(value, field)
+            # As in ROS, fields of messages are left out, but not a path's own value.
+            if (strings and arrays) or not _is_left_out(inner, strings, arrays):
+                yield from _cells(f"{name}.{field}", inner, strings, arrays, origin)
+
+
+def _is_left_out(value: object, strings: bool, arrays: bool) -> bool:
+    if isinstance(value, list | tuple):
+        return not arrays or (not strings and bool(value) and isinstance(value[0], str))
+    return not strings and isinstance(value, str)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "add_angles",
+    "arithmetic",
     "check_parameter",
     "format_pretty",
     "format_value",
@@ -118,10 +119,13 @@ def format_value(value: object) -> str:
     return yaml.safe_dump(value).removesuffix(_DOCUMENT_END)
 
 
-def format_pretty(value: object) -> str:
-    """Format a value for people, as `rosparam get -p` prints it: strings are unquoted, so the output cannot be parsed."""
+def format_pretty(value: object, indent: str = "") -> str:
+    """Format a value for people, as `rosparam get -p` prints it: strings unquoted, not meant to be parsed.
+
+    ``indent`` is put before the entries of a dictionary.
+    """
     if isinstance(value, dict):
-        return "\n".join(_pretty_lines(value, ""))
+        return "\n".join(_pretty_lines(value, indent))
     return value if isinstance(value, str) else format_value(value)
 
 
@@ -205,7 +209,7 @@ def add_angles(loader_class: type[_Loader]) -> None:
             text = loader.construct_scalar(node)
             match = in_brackets.match(text)
             try:
-                return unit * _arithmetic(match.group(2) if match else text)
+                return unit * arithmetic(match.group(2) if match else text)
             except (ValueError, SyntaxError, ArithmeticError) as error:
                 raise yaml.constructor.ConstructorError(
                     None, None, f"[{text}] is not an angle: {error}", node.start_mark
@@ -218,7 +222,7 @@ def add_angles(loader_class: type[_Loader]) -> None:
         loader_class.add_implicit_resolver(tag, re.compile(rf"^{name}\(.*\)$"), [name[0]])
 
 
-def _arithmetic(text: str) -> float:
+def arithmetic(text: str) -> float:
     """Evaluate an arithmetic expression over numbers and ``pi``.
 
     Raise ValueError, SyntaxError or ArithmeticError if it is invalid.

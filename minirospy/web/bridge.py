@@ -19,12 +19,14 @@ from minirospy.base.errors import BridgeError, ROSInterruptException
 from minirospy.introspect.snapshot import fetch
 from minirospy.web.access import Access
 from minirospy.web.foxglove.assets import ALLOWED, Assets
-from minirospy.web.foxglove.endpoint import CAPABILITIES, FoxgloveEndpoint, FoxgloveOptions, Playback
+from minirospy.web.foxglove.endpoint import CAPABILITIES, FoxgloveEndpoint, FoxgloveOptions
+from minirospy.web.foxglove.protocol import Playback
 from minirospy.web.graph import Filters, SharedGraph
 from minirospy.web.rosbridge.client_topics import ClientTopics
-from minirospy.web.rosbridge.endpoint import RosbridgeEndpoint, RosbridgeOptions
+from minirospy.web.rosbridge.endpoint import RosbridgeEndpoint
+from minirospy.web.rosbridge.shared import RosbridgeOptions
 from minirospy.web.server.account import Account
-from minirospy.web.server.connection import Endpoint, Exchange, HttpHandler, Limits
+from minirospy.web.server.client import Endpoint, Exchange, HttpHandler, Limits
 from minirospy.web.server.listener import Listener
 from minirospy.web.server.pipe import tls_context
 from minirospy.web.video.pages import VideoPages

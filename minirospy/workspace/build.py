@@ -100,7 +100,7 @@ class Workspace(NamedTuple):
 
 
 def find_workspace(start: Path) -> Path:
-    """Return the workspace that contains ``start``: a parent folder that was built before, or that contains src.
+    """Return the workspace that contains ``start``: a folder that was built before, or one in whose ``src`` it is.
 
     Raise BuildError if there is none.
     """
@@ -109,7 +109,9 @@ def find_workspace(start: Path) -> Path:
         if (folder / ".catkin_workspace").is_file() or (folder / ".catkin_tools").is_dir():
             return folder
     for folder in (start, *start.parents):
-        if (folder / "src").is_dir() and not (folder / "package.xml").is_file():
+        # A folder such as ~, with a src of something else, is not the workspace of all folders in it.
+        is_inside = start == folder or start.is_relative_to(folder / "src")
+        if is_inside and (folder / "src").is_dir() and not (folder / "package.xml").is_file():
             return folder
     raise BuildError(str(start), 0, "not in a workspace: make one with `mkdir src`, and put packages into it")
 
@@ -237,9 +239,9 @@ class _Builder:
             *(ours / "core" / "idl").glob("*.py"),
             *(ours / "ros" / "dynamic_reconfigure" / "dynamic_reconfigure").glob("*.py"),
         ]
-        made_of = [
-            path for plan in plans for path in (*plan.definitions, *_option_files(plan), plan.cmake_lists)
-        ]
+        made_of = [path for plan in plans for path in (*plan.definitions, *_option_files(plan))]
+        # A package that is left out may have no CMakeLists.txt.
+        made_of += [plan.cmake_lists for plan in plans if plan.cmake_lists.is_file()]
         self._key = _key([*made_of, *compiler])
 
     def package(self, plan: Plan) -> Report:

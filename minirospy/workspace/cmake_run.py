@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,7 +24,9 @@ _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
 """Optional packages that Python packages search for, reported as found."""
+_ROS_2 = re.compile(r"(ament|rcl|rosidl)")  # packages that a file for ROS 1 and ROS 2 searches for
 _CHECKS = ("check_include_file", "check_include_files", "check_include_file_cxx")
+_FINDERS = ("find_package_handle_standard_args", "pkg_check_modules", "pkg_search_module")
 _MAX_LOOPS = 100_000  # iterations of a foreach() with RANGE
 _MAX_DEPTH = 40  # nested files and macros; a file nested deeper must include itself
 
@@ -51,13 +54,16 @@ class _Leave(Exception):
     """Raised by ``return()``, ``break()`` or ``continue()``."""
 
 
-def run_cmake(file: Path, variables: Mapping[str, str]) -> Iterator[Command]:
+def run_cmake(
+    file: Path, variables: Mapping[str, str], own: Collection[str] = frozenset()
+) -> Iterator[Command]:
     """Yield the commands that a CMakeLists.txt runs.
 
     ``variables`` holds the initial variables; a key ``ENV{X}`` sets an environment variable. Raise BuildError if the file
     does not exist, a bracket is not closed, or a condition or pattern cannot be parsed.
+    Commands in ``own`` are yielded even if the file defines a macro of that name.
     """
-    return _Run(file.parent, dict(variables), {}, 0).file(file)
+    return _Run(file.parent, dict(variables), {}, 0, own).file(file)
 
 
 def _items(text: str) -> list[str]:
@@ -88,15 +94,23 @@ class _Run:
     """Runs the commands of one folder.
 
     ``_known``: the variables of the current scope; ``_raised``: those that ``PARENT_SCOPE`` sets in the enclosing scope;
-    ``_macros``: the defined macros and functions.
+    ``_macros``: the defined macros and functions; ``_own``: names that these cannot take.
     """
 
-    def __init__(self, folder: Path, known: dict[str, str], macros: dict[str, _Macro], depth: int) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        known: dict[str, str],
+        macros: dict[str, _Macro],
+        depth: int,
+        own: Collection[str],
+    ) -> None:
         self._folder = folder
         self._known = known
         self._raised: dict[str, str] = {}
         self._macros = macros
         self._depth = depth
+        self._own = own
 
         self._readers: dict[str, Callable[[Statement, list[str], Path], Iterator[Command]]] = {
             "if": self._if,
@@ -105,6 +119,7 @@ class _Run:
             "macro": self._define,
             "function": self._define,
             "include": self._include,
+            "find_package": self._find,
             "add_subdirectory": self._subdirectory,
             **dict.fromkeys(("return", "break", "continue"), self._leave),
         }
@@ -117,7 +132,7 @@ class _Run:
             "list": self._list,
             "string": self._string,
             "file": self._file,
-            "find_package": self._find_package,
+            **dict.fromkeys(_FINDERS, self._handle_standard_args),
             "get_filename_component": self._filename,
             **dict.fromkeys(_CHECKS, self._check),
         }
@@ -133,14 +148,18 @@ class _Run:
         yield from self._body(parse_cmake(text, str(file)), file)
 
     def _body(self, statements: Sequence[Statement], file: Path) -> Iterator[Command]:
-        """Yield a file's or a macro's commands, up to its ``return()``."""
+        """Yield a file's or a function's commands, up to its ``return()``."""
+        with self._nested(statements, file), suppress(_Leave):
+            yield from self._run(statements, file)
+
+    @contextmanager
+    def _nested(self, statements: Sequence[Statement], file: Path) -> Iterator[None]:
+        """Count a level of nesting. Raise BuildError if there are too many."""
         self._depth += 1
         if self._depth > _MAX_DEPTH:
             raise BuildError(str(file), statements[0].line if statements else 0, "includes or calls itself")
         try:
-            yield from self._run(statements, file)
-        except _Leave:
-            pass
+            yield
         finally:
             self._depth -= 1
 
@@ -235,7 +254,7 @@ class _Run:
         raise _Leave(statement.name)
 
     def _define(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
-        if arguments:
+        if arguments and arguments[0].lower() not in self._own:
             has_scope = statement.name == "function"
             self._macros[arguments[0].lower()] = _Macro(has_scope, arguments[1:], statement.body, file)
         yield from ()
@@ -251,7 +270,9 @@ class _Run:
             "ARGC": str(len(arguments)),
         }
         if not macro.has_scope:
-            yield from self._body(_substituted(macro.body, values), macro.file)
+            # A macro's commands run as those of its caller: return() leaves the caller.
+            with self._nested(macro.body, macro.file):
+                yield from self._run(_substituted(macro.body, values), macro.file)
             return
 
         around, raised = self._known, self._raised
@@ -262,13 +283,27 @@ class _Run:
     def _include(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
         """Yield the commands of an included file in the package; skip CMake's own modules."""
         for name in arguments[:1]:
-            folders = [self._folder, *map(Path, _items(self._known.get("CMAKE_MODULE_PATH", "")))]
+            folders = [self._folder, *self._module_folders()]
             paths = [folder / f"{name}{ending}" for folder in folders for ending in ("", ".cmake")]
-            for path in filter(Path.is_file, paths):
-                self._known["CMAKE_CURRENT_LIST_DIR"] = path.parent.as_posix()
-                yield from self.file(path)
-                self._known["CMAKE_CURRENT_LIST_DIR"] = file.parent.as_posix()
-                break
+            yield from self._first(paths, file)
+
+    def _module_folders(self) -> list[Path]:
+        return [self._folder / item for item in _items(self._known.get("CMAKE_MODULE_PATH", ""))]
+
+    def _first(self, paths: Iterable[Path], file: Path) -> Iterator[Command]:
+        """Yield the commands of the first file that exists, if any."""
+        for path in filter(Path.is_file, paths):
+            self._known["CMAKE_CURRENT_LIST_DIR"] = path.parent.as_posix()
+            yield from self.file(path)
+            self._known["CMAKE_CURRENT_LIST_DIR"] = file.parent.as_posix()
+            break
+
+    def _find(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
+        """Yield find_package() itself and the commands of the package's own module ``FindNAME.cmake``."""
+        self._find_package(arguments)
+        yield Command(statement.name, tuple(arguments), statement.line, file, self._folder)
+        for name in arguments[:1]:
+            yield from self._first([folder / f"Find{name}.cmake" for folder in self._module_folders()], file)
 
     def _subdirectory(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
         for name in arguments[:1]:
@@ -280,7 +315,7 @@ class _Run:
                     f"add_subdirectory({name}): {folder / 'CMakeLists.txt'} does not exist",
                 )
             places = dict.fromkeys(("CMAKE_CURRENT_SOURCE_DIR", "CMAKE_CURRENT_LIST_DIR"), folder.as_posix())
-            below = _Run(folder, {**self._known, **places}, self._macros, self._depth)
+            below = _Run(folder, {**self._known, **places}, self._macros, self._depth, self._own)
             yield from below.file(folder / "CMakeLists.txt")
             self._known.update(below._raised)
 
@@ -362,9 +397,20 @@ class _Run:
         self._known[arguments[1]] = ";".join(sorted(name.as_posix() for name in names))
 
     def _find_package(self, arguments: list[str]) -> None:
-        """Report required packages as found; the build reports missing ones."""
-        if "REQUIRED" in arguments or _HERE & {*arguments[:1]}:
+        """Report packages as found, unless the file expects (QUIET) that there are none; the build reports missing ones.
+
+        A file whose library is missing often ends with return(), before the commands that matter to Python.
+        """
+        name = "".join(arguments[:1])
+        if "REQUIRED" in arguments or name in _HERE:
             self._known.update(dict.fromkeys((f"{name}_FOUND" for name in arguments), "1"))
+        elif "QUIET" not in arguments and not _ROS_2.match(name):
+            self._known.update(dict.fromkeys((f"{name}_FOUND", f"{name.upper()}_FOUND"), "1"))
+
+    def _handle_standard_args(self, arguments: list[str]) -> None:
+        """Report a library as found, of ``FindNAME.cmake`` or of pkg-config: nothing is compiled with it."""
+        for name in arguments[:1]:
+            self._known.update(dict.fromkeys((f"{name}_FOUND", f"{name.upper()}_FOUND"), "TRUE"))
 
     def _check(self, arguments: list[str]) -> None:
         """Run ``check_include_files(header NAME)``: report the header as found, because nothing is compiled with it."""

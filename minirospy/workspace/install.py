@@ -69,6 +69,7 @@ def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path
 
 
 def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Path, tuple[Path, bool]]]:
+    rule = rule._replace(sources=tuple(name for name in rule.sources if not _is_compiled(workspace, name)))
     rule.check(plan.folder)
     place = workspace.install / rule.destination
     for name in rule.sources:
@@ -85,6 +86,13 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
             left_out = any(re.search(pattern, parent) for pattern in rule.excluded for parent in parents)
             if not left_out and (not rule.chosen or any(re.search(each, parents[0]) for each in rule.chosen)):
                 yield target / below, (path, _is_script(path))
+
+
+def _is_compiled(workspace: Workspace, name: str) -> bool:
+    """Return whether a source would be made by CMake or a compiler: a generator expression, or missing in build or devel."""
+    made = Path(name)
+    folders = (workspace.build, workspace.devel)
+    return name.startswith("$<") or (not made.exists() and any(map(made.is_relative_to, folders)))
 
 
 def _files(folder: Path) -> Iterator[Path]:

@@ -11,7 +11,7 @@ import fnmatch
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -22,13 +22,14 @@ from minirospy.workspace.cmake import keyword_arguments
 from minirospy.workspace.cmake_run import Command, run_cmake
 from minirospy.workspace.manifest import PACKAGE_NAME, VARIABLES, Kind, Manifest, read_manifest
 
-__all__ = ["DIST_PACKAGES", "Install", "Plan", "Test", "read_plan"]
+__all__ = ["DIST_PACKAGES", "Download", "Install", "Plan", "Test", "read_plan"]
 
 DIST_PACKAGES = "lib/python3/dist-packages"
 """The folder for Python packages in a devel or install folder, as in ROS on Debian and Ubuntu."""
 
 _FOLDERS = {"add_message_files": "msg", "add_service_files": "srv", "add_action_files": "action"}
 _COMPILED = ("add_executable", "add_library", "catkin_add_gtest", "add_rostest_gtest")
+_DOWNLOADS = ("catkin_download", "catkin_download_test_data")
 _TESTS = {
     "catkin_add_nosetests": "pytest",
     "catkin_add_pytests": "pytest",
@@ -45,6 +46,7 @@ _FILES_WORDS = _keywords("FILES DIRECTORY NOINSTALL BASE_DIR")
 _TEST_WORDS = _keywords(
     "ARGS DEPENDENCIES IGNORE_UNSET_ARGS OPTIONS TIMEOUT USE_TEST_DEPENDENCIES WORKING_DIRECTORY"
 )
+_DOWNLOAD_WORDS = _keywords("DESTINATION FILENAME MD5 REQUIRED EXCLUDE_FROM_ALL")
 _WORDS = _keywords("REQUIRED QUIET COMPONENTS OPTIONAL_COMPONENTS EXACT MODULE CONFIG NO_MODULE")
 _PACKAGE_WORDS = _keywords(
     "INCLUDE_DIRS LIBRARIES CATKIN_DEPENDS DEPENDS CFG_EXTRAS EXPORTED_TARGETS SKIP_CMAKE_CONFIG_GENERATION"
@@ -107,6 +109,20 @@ class Test(NamedTuple):
     folder: str = ""
 
 
+class Download(NamedTuple):
+    """A file to download.
+
+    ``md5``: "" if any content is right; ``required``: a failure is an error; ``for_tests``: a build does not need it.
+    """
+
+    url: str
+    path: Path
+    md5: str
+    required: bool
+    for_tests: bool
+    line: int
+
+
 class Plan(NamedTuple):
     """A package's part in the build.
 
@@ -130,6 +146,7 @@ class Plan(NamedTuple):
     warnings: tuple[str, ...]
     options: tuple[Path, ...] = ()
     compiled: tuple[str, ...] = ()
+    downloads: tuple[Download, ...] = ()
 
     @property
     def cmake_lists(self) -> Path:
@@ -149,7 +166,11 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
         raise ManifestError(str(manifest.path), *problem)
 
     file = folder / "CMakeLists.txt"
-    collector = _Collector(folder, manifest)
+    known = {**_variables(folder, manifest.name), **(variables or {})}
+    if "CMAKE_BINARY_DIR" in known:
+        place = f"{known['CMAKE_BINARY_DIR']}/{manifest.name}"
+        known |= dict.fromkeys(("PROJECT_BINARY_DIR", "CMAKE_CURRENT_BINARY_DIR"), place)
+    collector = _Collector(folder, manifest, known.get("PROJECT_BINARY_DIR", "."))
     if manifest.build_type != "catkin":
         collector.warn(manifest.path, 1, f"left out: it is built by [{manifest.build_type}], not by catkin")
         return collector.plan()
@@ -157,10 +178,15 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
         collector.warn(manifest.path, *problem)
 
     if not file.is_file():
-        raise BuildError(str(file), 0, f"package [{manifest.name}] has no CMakeLists.txt")
+        collector.warn(
+            manifest.path,
+            1,
+            f"package [{manifest.name}] is left out: it has no CMakeLists.txt, of which `catkin_create_pkg` writes an example",
+        )
+        return collector.plan()
 
     try:
-        for command in run_cmake(file, {**_variables(folder, manifest.name), **(variables or {})}):
+        for command in run_cmake(file, known, collector.commands):
             collector.read(command)
     except RecursionError:
         raise BuildError(str(file), 1, "is nested too deeply") from None
@@ -172,9 +198,10 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
 class _Collector:
     """Builds a plan, command by command."""
 
-    def __init__(self, folder: Path, manifest: Manifest) -> None:
+    def __init__(self, folder: Path, manifest: Manifest, build_folder: str) -> None:
         self._folder = folder
         self._manifest = manifest
+        self._build_folder = build_folder
 
         self._definitions: dict[Path, Command] = {}
         self._not_installed: set[Path] = set()
@@ -188,6 +215,7 @@ class _Collector:
         self._tests: list[Test] = []
         self._warnings: list[str] = []
         self._option_files: list[Path] = []
+        self._downloads: list[Download] = []
 
         self._readers: dict[str, Callable[[Command], None]] = {
             "project": self._project,
@@ -199,10 +227,16 @@ class _Collector:
             "install": self._install,
             "generate_dynamic_reconfigure_options": self._options,
             **dict.fromkeys(_FOLDERS, self._add_files),
+            **dict.fromkeys(_DOWNLOADS, self._download),
             **dict.fromkeys(_COMPILED, self._compiled),
             "set_target_properties": self._target_properties,
             **dict.fromkeys(_TESTS, self._test),
         }
+
+    @property
+    def commands(self) -> Collection[str]:
+        """Return the names of the commands that have an effect."""
+        return self._readers.keys()
 
     def read(self, command: Command) -> None:
         """Record a command's effect on the plan. Raise BuildError if the command is invalid."""
@@ -255,6 +289,7 @@ class _Collector:
             warnings=tuple(self._warnings),
             options=tuple(self._option_files),
             compiled=tuple(map(self._file_name, self._skipped)),
+            downloads=tuple(self._downloads),
         )
 
     def _path(self, command: Command, name: str) -> str:
@@ -391,6 +426,25 @@ class _Collector:
             folder = next(iter(given.get("WORKING_DIRECTORY", ())), "")
             path = self._path(command, command.arguments[0])
             self._tests.append(Test(path, _TESTS[command.name], command.line, arguments, folder))
+
+    def _download(self, command: Command) -> None:
+        given = keyword_arguments(command.arguments, _DOWNLOAD_WORDS)
+        if len(given[""]) != 2:
+            raise _error(command, f"{command.name}(TARGET URL ...) is its form")
+        url = given[""][1]
+        folder = "".join(given.get("DESTINATION", [])) or self._build_folder
+        name = "".join(given.get("FILENAME", [])) or url.rpartition("/")[2]
+        for_tests = command.name.endswith("_test_data") or "EXCLUDE_FROM_ALL" in given
+        self._downloads.append(
+            Download(
+                url,
+                command.folder / folder / name,
+                "".join(given.get("MD5", [])),
+                "REQUIRED" in given,
+                for_tests,
+                command.line,
+            )
+        )
 
     def _install_python(self, command: Command) -> None:
         given = keyword_arguments(command.arguments, frozenset(["PROGRAMS", "DESTINATION", "OPTIONAL"]))

@@ -5,7 +5,7 @@ import rospy
 from RPi import GPIO
 from std_msgs.msg import Bool
 
-BUTTON = 11  # BCM
+BUTTON = 11  # BCM pin number
 
 
 def main() -> None:
@@ -16,12 +16,12 @@ def main() -> None:
     rate = rospy.Rate(10)  # Hz
     try:
         rate.sleep()  # subscribers need a moment to connect
-        # In every turn, not only on a change: a subscriber that comes late learns the state, too.
+        # Publish repeatedly, not only on a change, so that a subscriber that joins late receives the state, too.
         while not rospy.is_shutdown():
             publisher.publish(Bool(data=bool(GPIO.input(BUTTON))))
             rate.sleep()
     except rospy.ROSInterruptException:
-        pass  # Ctrl-C while it slept
+        pass  # Ctrl-C while sleeping
     finally:
         GPIO.cleanup()
 

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Toggle the LED of /set_led_state with every press of button 1."""
+"""Toggle the LED through /set_led_state each time button 1 is pressed."""
 
 import rospy
 from RPi import GPIO
 from std_srvs.srv import SetBool
 
-BUTTON = 11  # BCM
-BOUNCE_TIME = 500  # ms
+BUTTON = 11  # BCM pin number
+BOUNCE_TIME = 500  # milliseconds
 
 
 class Toggle:
-    """Asks the service for the other state at each call."""
+    """Requests the opposite state from the service at each call."""
 
     def __init__(self) -> None:
         self._set_led_state = rospy.ServiceProxy("/set_led_state", SetBool)
@@ -38,7 +38,7 @@ def main() -> None:
         GPIO.add_event_detect(BUTTON, GPIO.RISING, callback=toggle.pressed, bouncetime=BOUNCE_TIME)
         rospy.spin()
     except rospy.ROSInterruptException:
-        pass  # Ctrl-C while it waited for the service
+        pass  # Ctrl-C while waiting for the service
     finally:
         GPIO.cleanup()
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Light the second red LED while /button_state says True."""
+"""Light the second red LED while /button_state is True."""
 
 import rospy
 from RPi import GPIO
 from std_msgs.msg import Bool
 
-LED = 7  # BCM
+LED = 7  # BCM pin number
 ALL_LEDS = range(2, 8)
 
 
@@ -19,7 +19,7 @@ def main() -> None:
     GPIO.setup(list(ALL_LEDS), GPIO.OUT, initial=GPIO.LOW)
     subscriber = rospy.Subscriber("/button_state", Bool, show)
     rospy.spin()
-    # First no more callbacks, then no more pins.
+    # Stop the callbacks before releasing the pins.
     subscriber.unregister()
     GPIO.cleanup()
 

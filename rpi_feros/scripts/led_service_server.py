@@ -5,7 +5,7 @@ import rospy
 from RPi import GPIO
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
-LED = 2  # BCM
+LED = 2  # BCM pin number
 ALL_LEDS = range(2, 8)
 
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Serve /set_led_zone_state: light the two LEDs of a zone's colour."""
+"""Serve /set_led_zone_state: light the two LEDs with a zone's colour."""
 
 import rospy
 from RPi import GPIO
 from rpi_msgs.srv import safetyZone, safetyZoneRequest, safetyZoneResponse
 
-ZONES = (("green", (2, 3)), ("yellow", (4, 5)), ("red", (6, 7)))  # BCM
+ZONES = (("green", (2, 3)), ("yellow", (4, 5)), ("red", (6, 7)))  # BCM pin numbers
 ALL_LEDS = list(range(2, 8))
 
 

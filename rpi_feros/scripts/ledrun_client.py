@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Ask /run_led for /number_of_runs runs, and cancel them when something is nearer to the scanner than 0.2 m."""
+"""Send /run_led a goal of /number_of_runs runs, and cancel it when an object is closer to the scanner than 0.2 m."""
 
 import actionlib
 import rospy
 from rpi_msgs.msg import runningLedAction, runningLedFeedback, runningLedGoal
 from sensor_msgs.msg import LaserScan
 
-NEAR = 0.2  # m
+NEAR = 0.2  # metres
 
 
 def show(feedback: runningLedFeedback) -> None:
@@ -41,4 +41,4 @@ if __name__ == "__main__":
     try:
         main()
     except rospy.ROSInterruptException:
-        pass  # Ctrl-C while it waited
+        pass  # Ctrl-C while waiting

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Serve the action /run_led: light the LEDs one after the other, as many times as the goal says, unless it is cancelled."""
+"""Serve the action /run_led: light the LEDs one after the other, as many times as the goal requests, unless it is cancelled."""
 
 import actionlib
 import rospy
 from RPi import GPIO
 from rpi_msgs.msg import runningLedAction, runningLedFeedback, runningLedGoal, runningLedResult
 
-LEDS = list(range(2, 8))  # BCM
+LEDS = list(range(2, 8))  # BCM pin numbers
 
 
 class Runner:
-    """Runs along the LEDs, /led_frequency of them a second."""
+    """Lights the LEDs one after the other, /led_frequency per second."""
 
     def __init__(self) -> None:
         self._frequency = rospy.get_param("/led_frequency", 6)  # Hz
@@ -23,14 +23,15 @@ class Runner:
         try:
             self._run(goal.numberOfRuns)
         except rospy.ROSInterruptException:
-            pass  # Ctrl-C while it slept
+            pass  # Ctrl-C while sleeping
         else:
             GPIO.output(LEDS, False)
 
     def _run(self, runs: int) -> None:
         rate = rospy.Rate(self._frequency)
         for done in range(runs):
-            # At the start of a run: feedback right before the result may arrive after it, and is lost.
+            # Publish at the start of a run, because feedback sent right before the result may arrive after it and be
+            # lost.
             self._server.publish_feedback(runningLedFeedback(currentRun=done + 1))
             for led in LEDS:
                 if self._server.is_preempt_requested():

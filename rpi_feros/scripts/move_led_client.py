@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Ask /move_led with each press: button 1 moves the lit LED to the left, button 2 to the right."""
+"""Call /move_led at each press: button 1 moves the lit LED to the left, button 2 to the right."""
 
 import rospy
 from RPi import GPIO
 from std_srvs.srv import SetBool
 
-TO_THE_RIGHT = {11: False, 12: True}  # BCM
-BOUNCE_TIME = 200  # ms
+TO_THE_RIGHT = {11: False, 12: True}  # BCM pin numbers
+BOUNCE_TIME = 200  # milliseconds
 
 
 def main() -> None:
@@ -30,7 +30,7 @@ def main() -> None:
         rospy.loginfo("Press the buttons.")
         rospy.spin()
     except rospy.ROSInterruptException:
-        pass  # Ctrl-C while it waited for the service
+        pass  # Ctrl-C while waiting for the service
     finally:
         GPIO.cleanup()
 

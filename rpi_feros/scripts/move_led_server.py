@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Serve /move_led: move the lit LED to the right (True) or to the left (False), round the end of the row."""
+"""Serve /move_led: move the lit LED to the right (True) or to the left (False), wrapping around at the end of the row."""
 
 import threading
 
@@ -7,7 +7,7 @@ import rospy
 from RPi import GPIO
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
 
-LEDS = range(2, 8)  # BCM
+LEDS = range(2, 8)  # BCM pin numbers
 
 
 class Row:
@@ -19,7 +19,7 @@ class Row:
         GPIO.output(LEDS[self._lit], True)
 
     def move(self, request: SetBoolRequest) -> SetBoolResponse:
-        # Two clients may ask at the same time.
+        # Two clients may call at the same time.
         with self._lock:
             GPIO.output(LEDS[self._lit], False)
             self._lit = (self._lit + (1 if request.data else -1)) % len(LEDS)

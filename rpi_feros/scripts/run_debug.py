@@ -4,9 +4,9 @@
 import rospy
 from RPi import GPIO
 
-LEDS = list(range(2, 8))  # BCM
+LEDS = list(range(2, 8))  # BCM pin numbers
 LED_OF_BUTTON = {11: 2, 12: 3}
-STEP = 0.3  # s
+STEP = 0.3  # seconds
 
 
 def main() -> None:
@@ -27,7 +27,7 @@ def main() -> None:
                 GPIO.output(led, GPIO.input(button))
             rate.sleep()
     except rospy.ROSInterruptException:
-        pass  # Ctrl-C while it slept
+        pass  # Ctrl-C while sleeping
     finally:
         GPIO.cleanup()
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Publish on /button_state whether something is nearer to the scanner than 0.2 m: the scanner as a button."""
+"""Publish on /button_state whether an object is closer to the scanner than 0.2 m, so that the scanner acts as a button."""
 
 import rospy
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 
-NEAR = 0.2  # m
+NEAR = 0.2  # metres
 
 
 def main() -> None:

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Tell /set_led_zone_state in which zone the nearest thing is: 0 further than 0.4 m, 1 between, 2 nearer than 0.2 m."""
+"""Send /set_led_zone_state the zone of the closest object: 0 beyond 0.4 m, 1 in between, 2 closer than 0.2 m."""
 
 import rospy
 from rpi_msgs.srv import safetyZone
 from sensor_msgs.msg import LaserScan
 
-FAR, NEAR = 0.4, 0.2  # m
+FAR, NEAR = 0.4, 0.2  # metres
 GREEN, YELLOW, RED = range(3)
 
 
@@ -42,4 +42,4 @@ if __name__ == "__main__":
     try:
         main()
     except rospy.ROSInterruptException:
-        pass  # Ctrl-C while it waited for the service
+        pass  # Ctrl-C while waiting for the service

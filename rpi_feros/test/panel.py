@@ -1,13 +1,13 @@
-"""The panel of the workshop in a test's hands: press its buttons, walk before its scanner, wait for its LEDs."""
+"""Operates the workshop's panel in a test: presses its buttons, moves the person in front of its scanner, waits for its LEDs."""
 
 import time
 import unittest
 
 from minirospy.board.board import Board
 
-LEDS = range(2, 8)  # BCM
-PATIENCE = 40.0  # s
-BOUNCE = 0.6  # s, longer than the programs' bounce time
+LEDS = range(2, 8)  # BCM pin numbers
+PATIENCE = 40.0  # seconds
+BOUNCE = 0.6  # seconds, longer than the programs' bounce time
 
 
 class PanelTest(unittest.TestCase):
@@ -22,18 +22,19 @@ class PanelTest(unittest.TestCase):
         return [led for led in LEDS if self.board.get(led)]
 
     def wait_for_lit(self, *leds: int) -> None:
-        """Until these LEDs are lit, and no other."""
+        """Wait until these LEDs are lit, and no others."""
         edges = self.board.watch(LEDS, timeout=PATIENCE)
         if self.lit() != list(leds) and not any(self.lit() == list(leds) for _ in edges):
             self.fail(f"{self.lit()} are lit instead of {list(leds)}")
 
     def push(self, button: int, led: int, level: int = 1) -> None:
-        """Push a button, and again where nobody watched it yet, until an LED is switched."""
+        """Press a button, repeatedly until a program watches it, so that an LED is switched."""
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
             if self.is_watched:
                 time.sleep(BOUNCE)
-            # Once the program watches, a second push would switch again what is only late.
+            # Once the program watches the button, wait longer: a second press would switch back an LED that is only
+            # late.
             edges = self.board.watch([led], timeout=10.0 if self.is_watched else 0.7)
             self.board.press(button)
             is_switched = any(edge.level == level for edge in edges)
@@ -44,5 +45,5 @@ class PanelTest(unittest.TestCase):
         self.fail(f"button {button} did not switch LED {led}")
 
     def walk_to(self, ahead: float) -> None:
-        """Put the person so many metres before the scanner."""
+        """Move the person to this distance in front of the scanner, in metres."""
         self.board.move_person((ahead, 0.0))

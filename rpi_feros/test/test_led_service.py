@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""By service: each press of the button toggles the LED."""
+"""With the service, each press of the button toggles the LED."""
 
 from panel import PanelTest
 

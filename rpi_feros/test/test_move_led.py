@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Two buttons move the lit LED to the left and to the right, round the end of the row."""
+"""Two buttons move the lit LED to the left and to the right, wrapping around at the end of the row."""
 
 from panel import PanelTest
 

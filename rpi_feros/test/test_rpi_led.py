@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""By topic: the LED is lit while the button is held."""
+"""With the topic, the LED is lit while the button is held."""
 
 from panel import PanelTest
 

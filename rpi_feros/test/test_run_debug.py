@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The test of all pins lights each LED once, then shows the buttons."""
+"""The test of all pins lights each LED once, and then shows the buttons' states."""
 
 from panel import PanelTest
 

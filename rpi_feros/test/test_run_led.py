@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The action: LEDs are lit one after the other, until somebody is nearer to the scanner than 0.2 m."""
+"""With the action, LEDs are lit one after the other until a person is closer to the scanner than 0.2 m."""
 
 import rospy
 from actionlib_msgs.msg import GoalStatus

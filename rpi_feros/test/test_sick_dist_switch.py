@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""The scanner as a button: the LED is lit while something is nearer than 0.2 m."""
+"""The scanner acts as a button: the LED is lit while an object is closer than 0.2 m."""
 
 from panel import PanelTest
 
 
 class ScannerLightsLed(PanelTest):
     def test_led_follows_person(self) -> None:
-        # Their nearest leg is 0.15 m nearer than they are.
+        # The person's nearest leg is 0.15 m closer than the person's position.
         self.walk_to(0.3)
         self.wait_for_lit(7)
         self.walk_to(0.5)

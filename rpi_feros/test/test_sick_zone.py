@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The scanner chooses the colour: green further than 0.4 m, yellow, red nearer than 0.2 m."""
+"""The scanner selects the colour: green beyond 0.4 m, yellow in between, red closer than 0.2 m."""
 
 from panel import PanelTest
 

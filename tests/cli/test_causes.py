@@ -92,10 +92,10 @@ def test_suspended_node_is_said_to_be_suspended(master: str, command: Any) -> No
             # Wait until the process has stopped, because its other threads run until one thread has handled the
             # signal.
             os.waitid(os.P_PID, process.pid, os.WSTOPPED)
-            status, _, err = command("rosnode", "ping", "-c", "1", "/node")
             echo = [str(Path(sys.executable).parent / "rostopic"), "echo", "/rosout"]
             with subprocess.Popen(echo, stderr=subprocess.PIPE, text=True) as reader:
                 assert reader.stderr is not None
+                status, _, err = command("rosnode", "ping", "-c", "1", "/node")
                 warning = reader.stderr.readline()
                 reader.terminate()
         finally:

@@ -395,23 +395,29 @@ def test_silent_master_at_the_port_is_known_by_its_journal(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no program of Windows is suspended by a signal")
-@pytest.mark.parametrize("options", [(), ("--no-journal",)])
-def test_roscore_next_to_a_suspended_master(options: tuple[str, ...], start: Start) -> None:
-    core = start(*options)
-    core.process.send_signal(signal.SIGSTOP)
-    try:
-        done = subprocess.run([str(BIN / "roscore"), *options], capture_output=True, text=True, check=False)
-    finally:
+def test_roscore_next_to_a_suspended_master(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    def beside(*options: str) -> tuple[Core, str, subprocess.Popen[str]]:
+        """Suspend a roscore on a port of its own, and start another one there."""
+        uri = f"http://localhost:{free_port()}"
+        monkeypatch.setenv("ROS_MASTER_URI", uri)
+        core = start(*options)
+        core.process.send_signal(signal.SIGSTOP)
+        second = subprocess.Popen([str(BIN / "roscore"), *options], stderr=subprocess.PIPE, text=True)
+        return core, uri.rpartition(":")[2], second
+
+    with_journal, without = beside(), beside("--no-journal")
+    errors = []
+    for core, _, second in (with_journal, without):
+        errors.append(second.communicate()[1])
         core.process.send_signal(signal.SIGCONT)
-    port = os.environ["ROS_MASTER_URI"].rsplit(":", 1)[1].rstrip("/")
-    expected = (
-        f"port {port} is taken by another program or by a suspended master (no answer within 4 s): choose one with "
-        "`roscore -p PORT`\n"
-        if options
-        else f"; it (pid {core.process.pid}) does not answer: it is suspended, or reads a large journal\n"
+        assert second.returncode == 1
+    assert errors[0].endswith(
+        f"; it (pid {with_journal[0].process.pid}) does not answer: it is suspended, or reads a large journal\n"
     )
-    assert done.returncode == 1
-    assert done.stderr.endswith(expected)
+    assert errors[1].endswith(
+        f"port {without[1]} is taken by another program or by a suspended master (no answer within 4 s): choose one "
+        "with `roscore -p PORT`\n"
+    )
 
 
 @pytest.mark.parametrize(("stream", "call"), [("stderr", warn), ("stdout", commands._show)])

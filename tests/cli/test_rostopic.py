@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from typing import Any
@@ -304,10 +303,12 @@ def test_a_closed_pipe_is_quiet(robot: Any, program: Start) -> None:
     assert echo.stderr is not None
     assert echo.stdout.readline() == "data: True\n"
     echo.stdout.close()
-    deadline = time.monotonic() + 30
-    while echo.poll() is None and time.monotonic() < deadline:
+
+    def has_ended() -> bool:
         robot.publish("/button_state", Bool(True))
-        time.sleep(0.02)
+        return echo.poll() is not None
+
+    wait_until(has_ended, pause=0.02)
     assert echo.returncode == 0
     assert echo.stderr.read() == ""
     echo.stdout = None

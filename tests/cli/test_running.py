@@ -405,22 +405,16 @@ def test_family_lists_its_commands(capsys: pytest.CaptureFixture[str]) -> None:
     assert "did you mean topic?" in capsys.readouterr().err
 
 
-def test_the_demo_shows_the_led_following(started: list[subprocess.Popen[str]]) -> None:
-    demo = start(started, "minirospy", "demo", "--presses", "1")
-    output, _ = demo.communicate(timeout=200)
-    assert "1: button 1 pressed  -> LED on GPIO 7 on after " in output
-    assert "1: button 1 released -> LED on GPIO 7 off after " in output
-    assert demo.returncode == 0
-
-
-def test_the_demo_leaves_no_file_of_its_board(
+def test_the_demo_shows_the_led_following_and_leaves_no_file_of_its_board(
     started: list[subprocess.Popen[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = tmp_path / "boards"
     monkeypatch.delenv("MINIROSPY_BOARD")
     monkeypatch.setenv("MINIROSPY_RUNTIME_DIR", str(folder))
     demo = start(started, "minirospy", "demo", "--presses", "1")
-    demo.communicate(timeout=200)
+    output, _ = demo.communicate(timeout=200)
+    assert "1: button 1 pressed  -> LED on GPIO 7 on after " in output
+    assert "1: button 1 released -> LED on GPIO 7 off after " in output
     assert demo.returncode == 0
 
     boards = [

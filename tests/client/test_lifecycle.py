@@ -26,6 +26,7 @@ from minirospy.base.errors import RpcRefused
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.rpc.master_proxy import MasterProxy, SlaveProxy
 from minirospy.runtime.transport.loop import LoopThread
+from tests.waiting import wait_until
 
 POSIX_ONLY = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals, and no fork")
 
@@ -67,11 +68,14 @@ def deliver(process: subprocess.Popen[str], number: int) -> None:
         time.sleep(0.1)
         return
     status = Path(f"/proc/{process.pid}/status")
-    while process.poll() is None:
+
+    def is_received() -> bool:
+        if process.poll() is not None:
+            return True
         pending = re.search(r"ShdPnd:\s*([0-9a-f]+)", status.read_text(encoding="utf-8"))
-        if not pending or not int(pending[1], 16) >> number - 1 & 1:
-            return
-        time.sleep(0.001)
+        return not pending or not int(pending[1], 16) >> number - 1 & 1
+
+    wait_until(is_received, pause=0.001)
 
 
 def signalled(script: str, number: int) -> tuple[int, str, str, float]:

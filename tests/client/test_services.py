@@ -116,6 +116,20 @@ def test_a_persistent_proxy_outlives_its_server(started: list[Program]) -> None:
         assert hear(client) == "service [/s] unavailable"
 
 
+def test_a_proxy_whose_transport_was_read_connects_again(started: list[Program]) -> None:
+    client = start(
+        started, PERSISTENT.replace("print(proxy(True)", "print(proxy.transport is None, proxy(True)")
+    )
+    for name, has_none in (("one", True), ("two", False)):
+        server = start(started, SERVER, name)
+        assert hear(server) == "ready"
+        for is_none in (has_none, False):
+            say(client)
+            assert hear(client) == f"{is_none} {name}"
+        server.terminate()
+        server.wait(30)
+
+
 CLOSING = """
 import threading
 import rospy

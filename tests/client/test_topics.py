@@ -464,3 +464,43 @@ print(eventually(lambda: publisher.get_num_connections() == 0))
     )
     assert output == "True\nTrue 1\nTrue\n"
     assert errors.count("LookupError: bad property") == 1
+
+
+MISSING_SPIN = (
+    "the program ends while it subscribes to {}, before any message has arrived. "
+    "rospy.spin() at its end keeps it running"
+)
+
+
+@pytest.mark.parametrize(
+    ("body", "topics"),
+    [
+        ("", "/t"),
+        ("rospy.Subscriber('a', Bool, print)", "/a, /t"),
+        ("time.sleep(0.01)", "/t"),
+        ("sub.unregister()", ""),
+        ("rospy.spin()", ""),
+        ("rospy.is_shutdown()", ""),
+        ("rospy.sleep(0.01)", ""),
+        ("pub = rospy.Publisher('t', Bool, queue_size=1, latch=True); pub.publish(True); got.wait()", ""),
+        ("rospy.signal_shutdown('')", ""),
+        ("rospy.Subscriber('t', Bool); sub.unregister()", ""),
+        ("sys.ps1 = '> '", ""),
+        ("from minirospy.client import subscriber; subscriber._NEW_SECONDS = 0.0", ""),
+        ("1 / 0", ""),
+    ],
+)
+def test_program_without_spin_is_named(start: Start, body: str, topics: str) -> None:
+    program = start(f"""
+import time
+rospy.init_node("n")
+got = threading.Event()
+sub = rospy.Subscriber("t", Bool, lambda message: got.set())
+if {body == "rospy.spin()"}:
+    threading.Timer(0.1, rospy.signal_shutdown, [""]).start()
+{body}
+""")
+    _, errors = program.communicate(timeout=60)
+    assert program.returncode == int(body == "1 / 0")
+    lines = [line.partition("]: ")[2] for line in errors.splitlines() if line.startswith("[WARN]")]
+    assert lines == ([MISSING_SPIN.format(topics)] if topics else [])

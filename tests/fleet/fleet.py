@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
@@ -13,6 +12,7 @@ from minirospy.fleet.network import NetworkOptions
 from minirospy.runtime.master.master import Master
 from minirospy.runtime.transport.loop import LoopThread
 from tests.conftest import free_port
+from tests.waiting import until
 
 _T = TypeVar("_T")
 SECONDS = 60.0
@@ -111,17 +111,7 @@ class Fleet:
 
     def until(self, condition: Callable[[], Any]) -> Any:
         """Check a condition on the loop repeatedly; return its value once it is true."""
-
-        async def waiting() -> Any:
-            while True:
-                found = condition()
-                if asyncio.iscoroutine(found):
-                    found = await found
-                if found:
-                    return found
-                await asyncio.sleep(0.02)
-
-        return self.run(waiting())
+        return self.run(until(condition, pause=0.02))
 
     def until_shown(self, place: Place, *topics: str) -> None:
         """Return when a place's master lists these topics."""

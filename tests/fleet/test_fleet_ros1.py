@@ -13,7 +13,6 @@ from std_srvs.srv import Empty, SetBool, SetBoolResponse
 from minirospy.base.errors import BridgeError, ServiceException
 from minirospy.base.name_filter import NameFilter
 from minirospy.fleet import ros1_keys
-from minirospy.fleet.ros1_keys import LOST_SECONDS
 from minirospy.fleet.ros1_side import Ros1Side
 from minirospy.fleet.ros1_topic import MARK
 from minirospy.fleet.rules import GatewayRules
@@ -247,12 +246,23 @@ def test_a_service_of_this_master_is_not_replaced(fleet: Fleet, peer: Callable[.
     assert (asked, later) == ([True], [True])
 
 
+def until_lost(fleet: Fleet, running: Ros1Side, *names: str) -> None:
+    """Wait until a gateway misses resources; let their last beacons be too old, so that no second passes."""
+
+    def are_lost() -> bool:
+        found = [resource for resource in list(running.sightings) if resource.name in names]
+        for resource in found:
+            running.sightings.received(resource, float("-inf"))
+        return not found
+
+    fleet.until(are_lost)
+
+
 def test_topics_removed_there_leave_this_master_and_return(
-    fleet: Fleet, peer: Callable[..., Ros1Peer], monkeypatch: pytest.MonkeyPatch
+    fleet: Fleet, peer: Callable[..., Ros1Peer]
 ) -> None:
-    monkeypatch.setattr(ros1_keys, "LOST_SECONDS", LOST_SECONDS)
     place = fleet.place()
-    gateway(place, listens=True)
+    running = gateway(place, listens=True)
     robot = peer()
     robot.announce("pub", *STRING, "/chat")
     robot.announce("sub", *STRING, "/orders")
@@ -260,11 +270,14 @@ def test_topics_removed_there_leave_this_master_and_return(
     robot.announce("srv", *SWITCH, "/door")
     fleet.until_shown(place, "/chat", "/orders")
     until_serves(fleet, place, "/door")
+    assert {each.name for each in running.sightings} == {"/chat", "/orders", "/door"}
     robot.withdraw("sub", *STRING, "/orders")
+    until_lost(fleet, running, "/orders")
     fleet.until_gone(place, "/orders")
     assert "/chat" in place.names()
     # Simulate a killed process, which others notice only by its silence.
     robot.close()
+    until_lost(fleet, running, "/chat", "/door")
     fleet.until_gone(place, "/chat")
 
     async def is_gone() -> bool:

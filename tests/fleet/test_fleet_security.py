@@ -42,7 +42,9 @@ def certificate(tmp_path: Path) -> tuple[str, str]:
     return key, cert
 
 
-def test_messages_pass_with_tls(fleet: Fleet, tmp_path: Path, certificate: tuple[str, str]) -> None:
+def test_messages_pass_with_tls(
+    fleet: Fleet, tmp_path: Path, certificate: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     key, cert = certificate
     endpoint = fleet.endpoint.replace("tcp/127.0.0.1", "tls/localhost")
     server = configuration(
@@ -58,6 +60,7 @@ def test_messages_pass_with_tls(fleet: Fleet, tmp_path: Path, certificate: tuple
     fleet.until(lambda: found)
     assert found[0].data == "secret"
 
+    monkeypatch.setattr("minirospy.zenoh.library.CONNECT_MS", 1000)
     plain = NetworkOptions(connect=(fleet.endpoint.replace("127.0.0.1", "localhost"),))
     with pytest.raises(BridgeError):
         fleet.run(FleetNetwork.open(plain, waits=False))

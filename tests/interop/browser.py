@@ -20,6 +20,8 @@ import psutil
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+from tests.waiting import wait_until
+
 CHROMIUM = shutil.which("chromium")
 PATIENCE = 200.0  # seconds to wait for a state; a loaded machine may need many
 
@@ -269,25 +271,27 @@ class Page:
 
     def _connect(self) -> contextlib.AbstractContextManager[ClientConnection]:
         file = Path(self._folder.name, "DevToolsActivePort")
-        end = time.monotonic() + PATIENCE
-        while not (file.exists() and len(file.read_text().splitlines()) == 2):
+
+        def has_started() -> bool:
             assert self._process.poll() is None, "chromium has ended"
-            assert time.monotonic() < end, "chromium does not start"
-            time.sleep(0.05)
+            return file.exists() and len(file.read_text().splitlines()) == 2
+
+        wait_until(has_started, PATIENCE, "chromium does not start")
         port, path = file.read_text().splitlines()
         with connect(
             f"ws://127.0.0.1:{port}{path}", max_size=None, compression=None, open_timeout=PATIENCE
         ) as whole:
-            targets: list[str] = []
-            while not targets:
-                assert time.monotonic() < end, "chromium opens no tab"
+
+            def tabs() -> list[str]:
                 whole.send(json.dumps({"id": 1, "method": "Target.getTargets"}))
                 while (answer := json.loads(whole.recv(timeout=PATIENCE))).get("id") != 1:
                     pass
                 found = answer["result"]["targetInfos"]
-                targets = [each["targetId"] for each in found if each["type"] == "page"]
+                return [each["targetId"] for each in found if each["type"] == "page"]
+
+            tab = wait_until(tabs, PATIENCE, "chromium opens no tab")[0]
         return connect(
-            f"ws://127.0.0.1:{port}/devtools/page/{targets[0]}",
+            f"ws://127.0.0.1:{port}/devtools/page/{tab}",
             max_size=None,
             compression=None,
             open_timeout=PATIENCE,

@@ -386,6 +386,7 @@ poly/polygon poly/polygon/points poly/polygon/points[0] poly/polygon/points[0]/x
 poly/polygon/points[1:] poly/polygon/points[::-1] poly/header/stamp ns/chatter/data scan/ranges scan/ranges[1:3]
 joints/name joints/name[1] joints/name[-1] joints/name[0:2] duration/data duration/data/secs time/data/nsecs
 scan/header scan/ranges[-1] scan/ranges[::2] scan/ranges[:2] poly/polygon/points[0:1]/y bytes/layout
+ns/chatter/data[0] ns/chatter/data[0:2] ns/chatter/data[::-1] poly/header/frame_id[0:2] poly/header/frame_id[-1]
 """
 
 ECHOING = (
@@ -411,6 +412,14 @@ rostopic echo /tiny /scan
 rostopic echo -n1 -c /button_state
 rostopic echo -n1 -c -p /button_state
 rostopic echo -n1 --nostr /joints/name
+rostopic echo -n1 --nostr /ns/chatter/data[0:3]
+rostopic echo -n1 --nostr /poly/header/frame_id[0]
+rostopic echo -n1 --noarr /poly/polygon/points[:]/x
+rostopic echo -n1 -p --nostr /ns/chatter/data
+rostopic echo -n1 -p --nostr /joints/name
+rostopic echo -n1 -p --noarr /poly/polygon/points[:]/x
+rostopic echo -n1 -p /ns/chatter/data[1:3]
+rostopic echo -n1 -p /joints/name[0:2]
 rostopic echo -n1 --noarr /poly/polygon/points
 rostopic echo -n1 --filter 'm.data==True' /button_state
 rostopic echo -n1 --offset /duration

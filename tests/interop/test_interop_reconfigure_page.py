@@ -68,7 +68,7 @@ def test_saved_values_are_read_by_yaml_as_they_were() -> None:
         name: "double" if type(each) is float else {int: "int", bool: "bool"}.get(type(each), "str")
         for name, each in values.items()
     }
-    # JSON has no infinity: it is set as a string that JavaScript's Number parses.
+    # JSON has no infinity, so it is passed as a string that JavaScript's Number parses.
     parameters = {"map": [[name, {"type": type_}] for name, type_ in types.items()]}
     given = {"map": [[name, each] for name, each in values.items() if name != "inf"]}
     (text,) = page_functions(("reconfigure", "yamlOf", [parameters, given]))
@@ -135,7 +135,7 @@ def wait_value(page: Page, name: str, value: str) -> None:
 
 
 def enter(page: Page, name: str, text: str) -> None:
-    """Type a value, and move the focus away."""
+    """Type a value, and move the focus to another element."""
     page.type(ROW.format(name) + "input[type=text]", text)
     page.wait("document.activeElement.blur(); return true")
 
@@ -147,7 +147,7 @@ def test_parameters_are_changed_and_corrected_by_the_server(
 ) -> None:
     served, uri, program = lamp(stack)
     page = browse(address(served, "reconfigure"))
-    # The only server is opened; its name is on the left, too. The first click there keeps it open.
+    # The only server is opened. Its name is also on the left, where the first click keeps it open.
     page.wait_text("button.server[aria-pressed=true]", "/lamp")
     page.click("button.server", "/lamp")
     page.wait("return location.hash.includes('node=')")
@@ -178,7 +178,7 @@ def test_parameters_are_changed_and_corrected_by_the_server(
     enter(page, "power", "lots")
     page.wait_text(".note.error", 'power: "lots" is not a number')
     page.choose(ROW.format("mode") + "select", "2")
-    # The callback corrects the brightness, too.
+    # The callback also corrects the brightness.
     wait_value(page, "brightness", "0.75")
     page.click(ROW.format("is_on") + "input")
     lines_until(program, "callback 16")
@@ -193,7 +193,7 @@ def test_parameters_are_changed_and_corrected_by_the_server(
         )
     wait_value(page, "power", "59")
 
-    # Another client's change is shown.
+    # A change by another client is shown.
     assert dynparam("ours", uri, "set", "/lamp", "power", "7")[1] == 0
     wait_value(page, "power", "7")
     found = eval(dynparam("ours", uri, "get", "/lamp")[0])
@@ -207,7 +207,7 @@ def test_groups_are_tabs_boxes_and_folds(lamp: Callable[[str], Any], browse: Cal
     page.wait_text("[role=tab]", "Color_Choice")
     page.choose(ROW.format("color") + "select", "1")
     lines_until(program, "callback 64")
-    # The inner group is folded: the server's state decides.
+    # The inner group is folded, as determined by the server's state.
     fold = "[data-group=inner] button.fold"
     page.wait(f"return document.querySelector({json.dumps(fold)})?.ariaExpanded === 'false'")
     assert not page.evaluate(
@@ -221,7 +221,7 @@ def test_groups_are_tabs_boxes_and_folds(lamp: Callable[[str], Any], browse: Cal
         found = eval(dynparam("ours", uri, "get", "/lamp")[0])
         return found["groups"]["groups"]["Color_Choice"]["groups"]["inner"]["state"]
 
-    while not inner():  # the request is on its way
+    while not inner():  # the request has not arrived yet
         pass
 
 

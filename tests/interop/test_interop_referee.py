@@ -30,7 +30,7 @@ def test_record_is_the_output_of_real_rospy(name: str, real_master: str, tmp_pat
         recorded(name).write_text(said())
     found = ""
     for _ in range(4):
-        # Threads of real rospy and actionlib race on a busy machine, and rarely deadlock.
+        # On a busy machine, threads in real rospy and actionlib race, and rarely deadlock, so try again.
         found = differences(said(), recorded(name).read_text())
         if not found:
             break

@@ -1,4 +1,4 @@
-"""Debian's programs for robots and frames compared with minirospy's: equal transforms, output and exit statuses.
+"""Debian's programs for robots and frames have the same transforms, output and exit statuses as minirospy's.
 
 `RECORD=1 pytest tests/interop/test_interop_robots.py` records tests/core/urdf/check_urdf.json again.
 """
@@ -43,14 +43,14 @@ def command(stack: str, program: str) -> list[str]:
 
 
 class Programs:
-    """Programs of either stack at one master; stop them after the test."""
+    """Programs from either stack that use one master; they are stopped after the test."""
 
     def __init__(self, uri: str, running: ExitStack) -> None:
         self.uri = uri
         self._running = running
 
     def start(self, stack: str, program: str, *words: str) -> subprocess.Popen[str]:
-        """Start PACKAGE/PROGRAM; it runs until the test finishes."""
+        """Start PACKAGE/PROGRAM, which runs until the test finishes."""
         process = start([*command(stack, program), *words], self.uri, "ours" if stack == "ours" else "rospy")
         self._running.callback(end, process)
         return process
@@ -101,7 +101,7 @@ STATES: list[dict[str, float]] = [
 
 
 def random_robot(seed: int) -> tuple[str, list[dict[str, float]]]:
-    """Return a description with 30 joints, and states of them."""
+    """Return a description with 30 joints, and some states of these joints."""
     chance = random.Random(seed)
     kinds = ["revolute", "continuous", "prismatic", "fixed", "planar"]
 
@@ -269,7 +269,7 @@ def ended(programs: Programs, stack: str, line: str) -> tuple[int, str, str]:
 
 @pytest.fixture
 def frames(programs: Programs) -> Programs:
-    """Publish the frames a -> b on /tf, b -> c and p -> q on /tf_static."""
+    """Publish the frame a -> b on /tf, and b -> c and p -> q on /tf_static."""
     programs.start(
         "real", "tf/static_transform_publisher", *words_of("1 2 3 0.5 0.25 0.1 a b 100"), "__name:=moving"
     )
@@ -312,7 +312,7 @@ def test_delays_are_printed_alike(frames: Programs, line: str) -> None:
         waiting = [first.splitlines()[0].rstrip(". "), first.splitlines()[-1]]
         report: list[str] = []
         while sum(line.startswith("Frame: ") for line in report) < (2 if words else 3):
-            # Not all frames have arrived yet.
+            # Some frames have not arrived yet.
             until(process, "Frames:")
             report = masked(until(process, "Node: ")).splitlines()
         said.append((waiting, [line for line in report if line.startswith("Frame")]))
@@ -352,7 +352,7 @@ def test_echo_of_tf2_tools_says_the_same(frames: Programs, words: str) -> None:
     line = f"tf2_tools/echo.py {words}"
     found: list[tuple[int, str, str]] = []
     for _ in range(5):
-        # The frames at its first lookup, which may be its last, depend on timing.
+        # The frames at a program's first lookup, which may be its last, depend on timing.
         found = [ended(frames, stack, line) for stack in STACKS]
         if found[0] == found[1]:
             break
@@ -368,10 +368,10 @@ def test_frames_are_drawn_alike(frames: Programs, tmp_path: Path, monkeypatch: p
             monkeypatch.chdir(folder)
             graph = ""
             while not all(arrow in graph for arrow in ('"a" -> "b"', '"b" -> "c"', '"p" -> "q"')):
-                # It listens for five seconds, during which a busy machine may stall.
+                # The program listens for five seconds, during which a busy machine may stall.
                 frames.start(stack, program).communicate(timeout=PATIENCE)
                 graph = (folder / "frames.gv").read_text(encoding="utf-8")
-            # Frames are listed in order of arrival.
+            # The frames are listed in order of arrival.
             lines = masked(graph).splitlines()
             graphs.append(sorted(re.sub(r'}->"[ap]"', '}->"ROOT"', line) for line in lines))
             if stack == "ours":

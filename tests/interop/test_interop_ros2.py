@@ -1,4 +1,4 @@
-"""`minirospy ros2-bridge` with real ROS 2: bytes in both directions, late joiners, endpoints that leave, no loops."""
+"""`minirospy ros2-bridge` with real ROS 2: bytes in both directions, late joiners, endpoints that leave, and no loops."""
 
 from __future__ import annotations
 
@@ -37,10 +37,11 @@ from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, Go
 from minirospy.runtime.transport.loop import LoopThread
 from tests.interop.conftest import OUR_BIN, running_master
 from tests.interop.install_ros2 import PYTHON, STAMP
+from tests.waiting import until
 
 _T = TypeVar("_T")
 HERE = Path(__file__).parent
-LIMIT = 90.0  # seconds after which waiting for a state fails: far more than a busy machine takes
+LIMIT = 90.0  # seconds to wait for a state before failing: much longer than a busy machine takes
 
 DOMAIN_PORTS = 28_000
 
@@ -97,7 +98,7 @@ class Peer:
         print(json.dumps({"op": op, "topic": topic, **fields}), file=self._program.stdin, flush=True)
 
     def message(self, topic: str) -> bytes:
-        """Return the next message of a topic: its CDR without the header."""
+        """Return the next message on a topic, as CDR without the header."""
         found = self.wait(lambda each: each["op"] == "message" and each["topic"] == topic)
         return bytes.fromhex(found["data"])[4:]
 
@@ -118,7 +119,7 @@ class Peer:
             self._kept.append(each)
 
     def has_said(self, topic: str, data: bytes) -> bool:
-        """Return whether a message arrives within a moment; discard the messages that have arrived."""
+        """Return whether a message arrives within a moment; discard the messages that have arrived already."""
         with contextlib.suppress(queue.Empty):
             while True:
                 self._kept.append(self._said.get(timeout=0.5))
@@ -218,17 +219,16 @@ class Scene:
         self.run(handle.close())
 
     def until(self, condition: Callable[[Snapshot], bool]) -> None:
-        """Wait until the ROS 1 graph fulfils a condition."""
+        """Wait until the ROS 1 graph meets a condition."""
 
-        async def wait() -> None:
-            while not condition(await fetch(self.node.call_master)):
-                await asyncio.sleep(0.05)
+        async def holds() -> bool:
+            return condition(await fetch(self.node.call_master))
 
-        self.run(asyncio.wait_for(wait(), LIMIT))
+        self.run(until(holds, LIMIT, pause=0.05))
 
 
 def reserved_domain(parts: contextlib.ExitStack) -> str:
-    """Return a ROS 2 domain that no other test on this machine uses until ``parts`` is closed: a bound port reserves it."""
+    """Return a ROS 2 domain that no other test on this machine uses until ``parts`` is closed, reserved with a bound port."""
     for number in range(1, 101):
         sock = parts.enter_context(socket.socket())
         with contextlib.suppress(OSError):
@@ -250,7 +250,7 @@ def running_scene(folder: Path) -> Iterator[tuple[Scene, subprocess.Popen[bytes]
         uri = parts.enter_context(running_master("ours"))
         domain = reserved_domain(parts)
         environment = {
-            # With minirospy's ROS 1 packages on the path, those of ROS 2 could not be imported.
+            # With minirospy's ROS 1 packages on the path, ROS 2's could not be imported.
             **{name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
             "ROS_MASTER_URI": uri,
             "ROS_DOMAIN_ID": domain,
@@ -323,7 +323,7 @@ def test_messages_are_those_that_rosbags_converts(scene: Scene) -> None:
         # DDS pads to four bytes.
         assert scene.peer.message(topic) == cdr[4:] + bytes(-len(cdr) % 4), topic
 
-    # rclpy destroys a subscription to which nothing refers.
+    # Keep references, because rclpy destroys a subscription to which nothing refers.
     subscriptions = []
     back: list[tuple[str, queue.Queue[bytes], bytes]] = []
     for type_, (name, _, cdr) in zip(TYPES, there, strict=True):
@@ -383,20 +383,20 @@ def test_no_message_returns_if_both_sides_publish_and_subscribe(scene: Scene) ->
     publisher = scene.advertise(topic, "std_msgs/Int8")
     subscription, came = scene.subscribe(topic)
     scene.peer.do("subscribe", topic, type="std_msgs/Int8")
-    # Its publisher is connected to its own subscriber only.
+    # Its publisher is connected only to its own subscriber.
     scene.peer.do("publish", topic, type="std_msgs/Int8", data="0001000007")
     scene.until(
         lambda graph: bridge in graph.subscribers.get(topic, ()) and bridge in graph.publishers.get(topic, ())
     )
 
-    # Wait until both directions work; ignore the messages that were sent before.
+    # Wait until both directions work, and ignore the messages sent before.
     _until_received(
         came, b"\1", lambda: scene.peer.do("publish", topic, type="std_msgs/Int8", data="0001000001")
     )
     while not scene.peer.has_said(topic, b"\2"):
         scene.publish(publisher, b"\2")
 
-    # Send one more from each side, and then a last one: each message in between arrived once.
+    # Send one more message from each side, and then a last one: each message in between must have arrived once.
     scene.publish(publisher, b"\3")
     scene.publish(publisher, b"\4")
     received = []
@@ -409,13 +409,13 @@ def test_no_message_returns_if_both_sides_publish_and_subscribe(scene: Scene) ->
     while not values or values[-1] != 6:
         values.append(came.get(timeout=LIMIT)[0])
     assert values.count(5) == 1
-    # Messages from ROS 1 reached its own subscriber directly, and not again from ROS 2.
+    # Messages from ROS 1 reached ROS 1's own subscriber directly, and did not return from ROS 2.
     assert values.count(3) <= 1
     scene.end(subscription)
 
 
 def _until_received(came: queue.Queue[bytes], value: bytes, send: Callable[[], None]) -> None:
-    """Send repeatedly until the value is received: messages that are sent before the endpoints are connected are lost."""
+    """Send repeatedly until the value is received, because messages sent before the endpoints are connected are lost."""
     while True:
         send()
         with contextlib.suppress(queue.Empty):
@@ -504,7 +504,7 @@ rclpy.spin(node)
     found = b""
     while b"/motor" not in found:
         found = scene.peer.message("/rosout")
-    # The level follows the time: ERROR is 40 in ROS 2.
+    # The level follows the time; ERROR is 40 in ROS 2.
     assert found[8] == 40
     assert b"it is hot" in found
     scene.end(publisher)
@@ -535,7 +535,7 @@ def test_list_shows_pairs_and_reasons(scene: Scene) -> None:
 
 # --- services
 
-# A service with a string in its request, and a string next to ``success`` in its response.
+# A service with a string in its request, and a string in addition to ``success`` in its response.
 ADD = "diagnostic_msgs/AddDiagnostics"
 
 
@@ -570,7 +570,7 @@ def test_the_first_call_waits_until_the_server_has_found_the_bridge(scene: Scene
     environment = {**scene.environment, **{name: str(value) for name, value in late.items()}}
     other = Peer(environment, [str(PYTHON), str(HERE / "ros2_peer.py"), "late_peer"])
     try:
-        # The two processes have discovered each other; only the client of one more service is new.
+        # The two processes have discovered each other; only the client of a further service is new.
         other.do("serve", "/early", type=ADD, fields={"success": True})
         scene.until(lambda graph: "/early" in graph.services)
         assert scene.call("/early", ADD, text("a")) == [b"\1" + text("")]
@@ -749,7 +749,7 @@ def test_goals_of_ros1_reach_a_server_of_ros2(scene: Scene) -> None:
         async with ActionClient(scene.node, "/wait", FibonacciAction) as client:
             await client.wait_for_server()
             goal = client.send(FibonacciGoal(order=3))
-            # The goal is active.
+            # The goal is active now.
             async for feedback in goal:
                 if len(feedback.sequence) == 3:
                     break
@@ -779,9 +779,8 @@ def test_a_goal_of_ros1_is_aborted_when_its_server_in_ros2_ends(scene: Scene) ->
             client = ActionClient(scene.node, "/leaving", FibonacciAction)
             await client.wait_for_server()
             goal = client.send(FibonacciGoal(order=1))
-            while goal.state is not GoalState.ACTIVE:
-                assert goal.state not in TERMINAL, goal.text
-                await asyncio.sleep(0.01)
+            await until(lambda: goal.state is GoalState.ACTIVE or goal.state in TERMINAL)
+            assert goal.state is GoalState.ACTIVE, goal.text
             return client, goal
 
         client, goal = scene.run(start())
@@ -832,7 +831,8 @@ def test_goals_of_ros2_reach_a_server_of_ros1(scene: Scene) -> None:
         return found["status"], found["data"]
 
     server = scene.run(start())
-    # All feedback of an active goal arrives; rclpy drops feedback that it has not read when the result arrives.
+    # All feedback for an active goal arrives; rclpy itself drops feedback that it has not read when the result
+    # arrives.
     assert end_of(7, is_cancelled=True) == (5, list(range(7)))
     assert end_of(5) == (4, [0, 1, 2, 3, 4])
     assert end_of(-1) == (0, [])
@@ -858,7 +858,7 @@ def test_a_goal_of_ros2_is_aborted_when_the_bridge_ends(tmp_path: Path) -> None:
         assert scene.peer.wait(lambda each: each["op"] == "feedback")["data"] == [1]
         bridge.terminate()
         assert scene.peer.wait(lambda each: each["op"] == "end")["status"] == 6
-        # It is not interrupted a second time during shutdown.
+        # The bridge is not interrupted a second time during shutdown.
         assert bridge.wait(LIMIT) == 0
 
 
@@ -866,7 +866,7 @@ def test_a_goal_of_ros2_is_aborted_when_the_bridge_ends(tmp_path: Path) -> None:
 
 
 def example(name: str, folder: Path) -> str:
-    """Write a program of docs/ros2.md to a file, and return its path."""
+    """Write a program from docs/ros2.md to a file, and return its path."""
     page = (HERE.parents[1] / "docs" / "ros2.md").read_text(encoding="utf-8")
     block = page.partition(f"<!-- example {name} -->\n")[2]
     lines = itertools.takewhile(lambda line: not line or line.startswith("    "), block.split("\n"))
@@ -876,7 +876,7 @@ def example(name: str, folder: Path) -> str:
 
 
 def command(name: str) -> list[str]:
-    """Return the command that docs/ros2.md has on a separate line."""
+    """Return the command that is on a separate line in docs/ros2.md."""
     page = (HERE.parents[1] / "docs" / "ros2.md").read_text(encoding="utf-8")
     (line,) = [line for line in page.split("\n") if line.startswith(f"    {name}")]
     words = shlex.split(line)
@@ -888,7 +888,7 @@ def running(words: list[str], environment: dict[str, str]) -> Iterator[subproces
     program = subprocess.Popen(
         words, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     )
-    # Killing a program that prints nothing ends the wait for its line.
+    # Killing a program that prints nothing ends the wait for its output.
     limit = threading.Timer(LIMIT, program.kill)
     limit.start()
     with program:

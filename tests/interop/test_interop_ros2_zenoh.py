@@ -1,4 +1,4 @@
-"""`minirospy ros2-bridge --zenoh` with two independent implementations of rmw_zenoh's protocol: pyzeros, zenoh-ros2-sdk."""
+"""`minirospy ros2-bridge --zenoh` with two independent implementations of rmw_zenoh's protocol, pyzeros and zenoh-ros2-sdk."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def said(peer: Peer, topic: str) -> Any:
 
 
 def test_late_subscriber_receives_latched_messages(scene: ZenohScene, request: pytest.FixtureRequest) -> None:
-    # pyzeros does not support transient local.
+    # pyzeros does not support transient local durability.
     only(scene, "sdk", request)
     publisher = scene.advertise("/late", "std_msgs/String", latch=True)
     scene.publish(publisher, b"\4\0\0\0kept")
@@ -166,7 +166,7 @@ def test_messages_are_not_sent_back(scene: ZenohScene, request: pytest.FixtureRe
     scene.peer.do("publish", "/both", type="std_msgs/String", data="00010000020000006400")
     assert came.get(timeout=LIMIT) == b"\1\0\0\0d"
     assert scene.peer.message("/both") == b"\2\0\0\0d\0"
-    # Another message follows on each side: nothing arrived twice.
+    # Another message follows on each side, which shows that nothing arrived twice.
     scene.publish(publisher, b"\1\0\0\0c")
     assert scene.peer.message("/both") == b"\2\0\0\0c\0"
     assert came.get(timeout=LIMIT) == b"\1\0\0\0c"

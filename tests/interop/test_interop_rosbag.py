@@ -1,4 +1,4 @@
-"""Debian's rosbag and roslz4 compared with minirospy's, in both directions: each reads the other's files and prints the same."""
+"""Debian's rosbag and roslz4 compared with minirospy's in both directions: each reads the other's files and prints the same."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""minirospy's recorder and player with C++ `rosbag record` and `rosbag play`: the same bags and messages, in both directions."""
+"""minirospy's recorder and player with C++ `rosbag record` and `rosbag play`: bags and messages are equal in both directions."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Stored(NamedTuple):
 
 
 def stored(path: Path) -> list[Stored]:
-    """Return a bag's messages, sorted: two recorders receive two publishers' messages in any order."""
+    """Return a bag's messages, sorted because two recorders receive two publishers' messages in any order."""
     with Reader(path) as reader:
         return sorted(
             Stored(
@@ -58,7 +58,7 @@ def stored(path: Path) -> list[Stored]:
 
 
 def order(path: Path) -> dict[str, list[bytes]]:
-    """Return topic -> the messages in order of time."""
+    """Return the messages on each topic in order of time, by topic."""
     found: dict[str, list[bytes]] = {}
     with Reader(path) as reader:
         for connection, _, body in reader.messages():
@@ -146,7 +146,7 @@ def test_both_recorders_record_the_same(talkers: tuple[Talker, Talker], run: Run
 def test_a_type_that_comes_later_is_recorded(
     talkers: tuple[Talker, Talker], run: Run, tmp_path: Path
 ) -> None:
-    """C++ rosbag does not: roscpp uses the md5sum of its first connection for all later ones of the topic."""
+    """C++ rosbag does not record it, because roscpp uses the md5sum of a topic's first connection for all later ones."""
     one, two = talkers
     texts = one.advertise("/mixed")
     recorder = run("ours", "record", "--chunksize", "0", "-O", "ours", "/mixed")
@@ -270,7 +270,7 @@ def test_played_messages_are_recorded(player: str, recorder: str, run: Run, tmp_
     playing = run(player, "play", "-k", "in.bag", "-d", "1", "--wait-for-subscribers")
     for text in (b"59x", b"30x"):
         holds(tmp_path / "out.bag", text)
-    # A stalled machine makes it longer, and single intervals of the recording longer or shorter.
+    # A stalled machine makes the playback longer, and single intervals in the recording longer or shorter.
     assert time.monotonic() - start > 59**2 / 3000
     output, errors = finish(playing)
     assert output.replace("\r", "\n").splitlines()[-1].startswith(" [RUNNING]  Bag Time:   100")
@@ -278,7 +278,7 @@ def test_played_messages_are_recorded(player: str, recorder: str, run: Run, tmp_
     finish(recording)
 
     before, after = stored(tmp_path / "in.bag"), stored(tmp_path / "out.bag")
-    # One node publishes the messages of several.
+    # One node publishes the messages of several nodes.
     assert sorted(one._replace(callerid="") for one in before) == [one._replace(callerid="") for one in after]
     assert len({one.callerid for one in after}) == 1
     assert order(tmp_path / "out.bag") == order(tmp_path / "in.bag")

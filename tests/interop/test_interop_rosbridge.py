@@ -1,6 +1,6 @@
 """The bridge with roslibpy and roslib.js, rosbridge's clients in Python and JavaScript.
 
-roslibpy needs twisted and autobahn: it is installed once into a separate environment, in the user's cache folder.
+roslibpy needs twisted and autobahn, so it is installed once into a separate environment in the user's cache folder.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ def roslibpy_python() -> str:
     python = place / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     if not python.exists():
         cache.mkdir(parents=True, exist_ok=True)
-        # Other workers may create it at the same time: each creates its own, and the first to finish moves it into
-        # place.
+        # Other workers may do this at the same time: each creates its own environment, and the first to finish moves
+        # it into place.
         made = Path(tempfile.mkdtemp(dir=cache))
         subprocess.run([sys.executable, "-m", "venv", made], check=True, timeout=120)
         inner = made / python.relative_to(place)
@@ -118,7 +118,7 @@ def test_roslibpy_uses_all_that_the_bridge_offers(master: str, roslibpy_python: 
                     again = await line_of(peer)
                     answer = None
                     while answer is None:
-                        # roslibpy offers its services again a second after it has lost its connection.
+                        # roslibpy offers its services again only a second after it has lost its connection.
                         with contextlib.suppress(ServiceException):
                             answer = await node.call("/ours", SetBool, False)
             await offers[-1].close()

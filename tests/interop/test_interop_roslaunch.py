@@ -1,5 +1,5 @@
 # ruff: noqa: E501
-"""roslaunch of both stacks on the same files; minirospy's roslaunch with a real one on the "other" machine, and a real sshd.
+"""Both stacks' roslaunch with the same files; minirospy's with a real roslaunch on the "other" machine, and with a real sshd.
 
 The case launch_files of tests/referee compares the interpretation of the files in depth.
 """
@@ -69,7 +69,7 @@ def say(stack: str, *words: str) -> tuple[int, str]:
 def test_roslaunch_options_print_the_same_without_running(package: Path, words: list[str]) -> None:
     words = [*words, str(package / "outer.launch"), "need:=5"]
     (real_status, real), (status, ours) = say("rospy", *words), say("ours", *words)
-    # minirospy runs Python programs in its own interpreter.
+    # minirospy runs Python programs with its own interpreter.
     ours = ours.replace(f"{OUR_BIN / 'python'} ", "")
     assert (status, sorted(ours.splitlines())) == (real_status, sorted(real.splitlines()))
 
@@ -107,7 +107,7 @@ def end(process: subprocess.Popen[str]) -> str:
 
 
 def test_remote_node_by_a_real_roslaunch_child(package: Path, real_master: str, tmp_path: Path) -> None:
-    """Each accepts the other's calls."""
+    """Each roslaunch accepts the other's calls."""
     folder = tmp_path / "bin"
     folder.mkdir()
     ssh = folder / "ssh"
@@ -127,7 +127,7 @@ def test_remote_node_by_a_real_roslaunch_child(package: Path, real_master: str, 
 
 @pytest.mark.skipif(os.name != "posix" or not shutil.which("sshd", path="/usr/sbin"), reason="no sshd")
 def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path: Path) -> None:
-    """With a key, to the sshd's port; another user name would mean another machine."""
+    """Connect to the sshd's port with a key. The user name is the same, because another one would mean another machine."""
     for name in ("host", "user"):
         subprocess.run(
             ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(tmp_path / name)], check=True
@@ -140,7 +140,7 @@ def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path:
     )
     os.makedirs("/run/sshd", exist_ok=True)
     server = subprocess.Popen(["/usr/sbin/sshd", "-D", "-f", str(config)], stderr=subprocess.PIPE, text=True)
-    # The ssh command as a user types it, with a key and known hosts that are not the user's own.
+    # Use the ssh command as a user types it, but with a key and known hosts that are not the user's own.
     folder = tmp_path / "bin"
     folder.mkdir()
     ssh = folder / "ssh"
@@ -159,13 +159,13 @@ def test_remote_node_over_a_real_sshd(package: Path, real_master: str, tmp_path:
         f'<machine name="m" address="{name}" ssh-port="{port}" env-loader="{loader}" timeout="{PATIENCE}"/>'
         '<node machine="m" name="a" pkg="pkg" type="wait.py"/>'
     )
-    # A host name that only this ssh resolves, so that it does not count as this machine.
+    # Use a host name that only this ssh resolves, so that it does not count as this machine.
     ssh.write_text(
         ssh.read_text().replace("-l root", f"-l root -o HostName=127.0.0.1 -o HostKeyAlias={name}")
     )
 
     try:
-        # A refused connection would be a different error from an unknown key.
+        # A refused connection would cause a different error from that for an unknown key.
         wait_until(lambda: listens(port))
         process = launch(text, package, real_master, PATH=f"{folder}:{os.environ['PATH']}")
         refused, _ = process.communicate(timeout=PATIENCE)

@@ -86,7 +86,7 @@ depends
 
 SORTED = ["depends-on a", "depends-on e", "depends-on1 e", "depends-on1 d", "depends-on lib"]
 
-# The real one suggests no similar names, and prints less about input that it did not understand.
+# ROS suggests no similar names, and prints less about input that it does not understand.
 SAME_BEGINNING = """
 find nope
 find another_name
@@ -130,7 +130,7 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def run(command: list[str], cwd: Path | None = None) -> tuple[int, str, str]:
-    """Return (status, output, errors), without the real one's messages that rosdep is missing."""
+    """Return (status, output, errors), without the real program's messages that rosdep is missing."""
     done = subprocess.run(command, capture_output=True, text=True, env=os.environ, cwd=cwd, check=False)
     errors = [line for line in done.stderr.splitlines(keepends=True) if "rosdep2" not in line]
     return done.returncode, done.stdout, "".join(errors)
@@ -172,7 +172,7 @@ def test_rospack_errors_are_equal_with_hints(tree: Path) -> None:
 
 
 def test_lists(tree: Path) -> None:
-    """Compare all packages except those that either stack brings along."""
+    """Compare all packages except those that belong to one of the stacks."""
     for line in ("list", "list-names"):
         of_tree = [each for each in real("list")[1].splitlines() if f" {tree}/" in each]
         expected = of_tree if line == "list" else [each.split()[0] for each in of_tree]
@@ -182,7 +182,7 @@ def test_lists(tree: Path) -> None:
 
 
 def test_rosstack(tree: Path) -> None:
-    """For rosstack, every package is a stack, and metapackages are packages."""
+    """To rosstack, every package is a stack, and metapackages are packages."""
     for line in """
         find a
         find meta
@@ -258,7 +258,7 @@ found["in"] = rospkg.get_package_name(tree + "/a/src/deep")
 print(json.dumps(found))
 """
 
-# Lookups in rosdep's database, if it is installed: here, that boost is not a package.
+# Lookups in rosdep's database if it is installed; here they find that boost is not a package.
 ROSDEP = """
 def init_rospack_interface(): return {"view": 1}
 def is_view_empty(view): return False

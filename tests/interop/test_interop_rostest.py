@@ -58,13 +58,13 @@ class Ran:
         return self._popen.returncode, self._out
 
     def cases(self) -> dict[str, list[Case]]:
-        """Return result file -> (class, name, (kind and type of each fault, ...)) of its cases."""
+        """Return the cases in each result file, as (class, name, (kind and type of each fault, ...))."""
         found = {}
         for file in (self.home / "test_results").rglob("*.xml"):
             try:
                 root = ElementTree.parse(file).getroot()
             except ElementTree.ParseError:
-                # Real rosunit leaves an empty file after a timeout.
+                # After a timeout, real rosunit leaves an empty file.
                 continue
             found[str(file.relative_to(self.home))] = [
                 (
@@ -89,7 +89,7 @@ def summary(text: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def rostests(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, tuple[Ran, Ran]]]:
-    """Run rostest on every file, all at the same time: the tests wait more than they compute."""
+    """Run rostest on all files at the same time, because the tests wait more than they compute."""
     started = {
         file: both(tmp_path_factory.mktemp("rostest"), "rostest", "tested", file, "limit:=1.0")
         for file in FILES
@@ -139,7 +139,7 @@ def test_catkin_test_results(tmp_path: Path) -> None:
 
 
 def test_rospack_depends_of_the_packages_of_ros(tmp_path: Path) -> None:
-    """Compare the packages that exist here: minirospy's do not depend on C++ packages."""
+    """Compare only packages that exist here, because minirospy's do not depend on C++ packages."""
     known = {path.name for path in (ROOT / "minirospy" / "ros").iterdir()}
     known |= {path.name for path in (ROOT / "msgs").iterdir()}
     names = ("actionlib", "rosmsg", "rospy", "rostest")

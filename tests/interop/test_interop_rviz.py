@@ -1,4 +1,4 @@
-"""Debian's RViz as the reference for the dashboard's 3D view: the same file, topics and camera give the same colors."""
+"""Debian's RViz as the reference for the dashboard's 3D view: the same file, topics and camera must give the same colors."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ pytestmark = [
 ]
 
 BACKGROUND = (48, 48, 48)
-ALIKE = 16  # of 255, in each of red, green and blue: edges are smoothed differently
+ALIKE = 16  # maximum difference (of 255) in red, green and blue, because edges are smoothed differently
 
 
 def bodies(picture: Image.Image) -> list[tuple[int, int]]:
-    """Return positions inside of drawn bodies: their surroundings have about one color, which is not the background's."""
+    """Return positions inside drawn bodies, whose surroundings have about one color that is not the background's."""
     found = []
     for y in range(4, HEIGHT - 4, 4):
         for x in range(4, WIDTH - 4, 4):
@@ -42,10 +42,10 @@ def bodies(picture: Image.Image) -> list[tuple[int, int]]:
 
 
 def share_of_others(one: Image.Image, other: Image.Image) -> float:
-    """Return the share of drawn positions of one picture that have another color in the other: 0 to 1."""
+    """Return the share (0 to 1) of drawn positions in one picture that have another color in the other."""
     places = bodies(one)
     if len(places) <= 300:
-        return 1.0  # too little is drawn: messages arrive with a delay
+        return 1.0  # too little is drawn yet, because messages arrive with a delay
     pairs = [(one.getpixel(place), other.getpixel(place)) for place in places]
     return sum(any(abs(a - b) > ALIKE for a, b in zip(*pair, strict=True)) for pair in pairs) / len(pairs)  # type: ignore[arg-type]
 
@@ -75,7 +75,7 @@ def test_markers_have_the_places_sizes_and_colors_of_rviz(
     while True:
         theirs, ours = rviz.settled(), rviz_pictures.our_picture(page)
         shares = share_of_others(theirs, ours), share_of_others(ours, theirs)
-        # Compare the whole picture: lines, edges, text.
+        # Compare the whole picture, including lines, edges and text.
         others = ImageChops.difference(theirs, ours).convert("L").histogram()
         share = sum(others[40:]) / (WIDTH * HEIGHT)
         if max(shares) < 0.03 and share < 0.01:

@@ -1,4 +1,4 @@
-"""rosrun, rosversion, rosclean, rosconsole and rosgraph compared with the real ones: the same folders, the same node."""
+"""rosrun, rosversion, rosclean, rosconsole and rosgraph compared with the real ones, with the same folders and the same node."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def run(program: str, *words: str, stdin: str = "", path: Path = OUR_BIN) -> tup
 
 
 def both(program: str, *words: str, stdin: str = "") -> tuple[tuple[int, str], tuple[int, str]]:
-    """Return the results of minirospy and of the real one."""
+    """Return the results of minirospy's program and of the real one."""
     ours, real = (run(program, *words, stdin=stdin, path=path) for path in (OUR_BIN, REAL_BIN))
     return ours, real
 
@@ -66,7 +66,7 @@ def test_rosrun(workspace: Path) -> None:
                   ["--prefix", "echo in front", "my", "status", "x"]):  # fmt: skip
         ours, real = both("rosrun", *words)
         assert ours == real, words
-    # It runs /usr/lib/topic_tools/relay.
+    # This runs /usr/lib/topic_tools/relay.
     ours, real = both("rosrun", "topic_tools", "relay")
     assert ours == real
     assert "usage: relay" in ours[1]
@@ -88,7 +88,7 @@ def test_rosversion_of_the_packages_that_both_bring_along() -> None:
     )
     both_have = ours.keys() & real.keys()
     assert {"std_msgs", "sensor_msgs", "roscpp", "catkin"} <= both_have
-    # ros_comm has the last version of Noetic, the same for all packages.
+    # ros_comm is at the last version of Noetic, which is the same for all its packages.
     assert {name: ours[name] for name in both_have} == {
         name: "1.17.0" if real[name] == real["rosmaster"] else real[name] for name in both_have
     }
@@ -146,7 +146,7 @@ def test_rosconsole(talker: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_rosgraph(talker: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The real one never exits, and has no order: compare one round as a set of lines."""
+    """The real program never exits, and prints in no fixed order, so compare one round as a set of lines."""
     monkeypatch.setenv("ROS_MASTER_URI", talker)
     monkeypatch.setenv("PYTHONUNBUFFERED", "1")
     _, ours = run("rosgraph", "--once")

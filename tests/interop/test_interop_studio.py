@@ -1,4 +1,4 @@
-"""Foxglove Studio in Debian's chromium, in its last open source version on npm: it shows the graph by the bridge."""
+"""Foxglove Studio in Debian's chromium, in its last open source version on npm. It shows the graph through the bridge."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class Robot:
     def __init__(self, bridge: Running) -> None:
         self._bridge = bridge
         self._node = bridge.node("robot")
-        self.heard = ""  # string of the last message of /from_studio
+        self.heard = ""  # the string in the last message on /from_studio
 
     def start(self) -> None:
         self._bridge.run(self._start())

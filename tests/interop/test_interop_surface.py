@@ -1,4 +1,4 @@
-"""docs/compatibility/rospy.md and similar pages match real ROS and minirospy; nothing is missing."""
+"""docs/compatibility/rospy.md and similar pages match real ROS and minirospy, and are complete."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""German and English, keys, names for screen readers: the page in Debian's chromium, operated with the keyboard only."""
+"""Translations, keys, and names for screen readers: the page in Debian's chromium, operated with the keyboard only."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ TRANSLATED = (
     "plot",
     "graph",
 )
-"""The views that have German texts; add yours."""
+"""The views that have German texts; add new ones here."""
 
 PAGE = Path(minirospy.web.dashboard.__file__).parent / "page"
 
@@ -78,7 +78,7 @@ def test_language_is_the_chosen_one_else_the_first_of_the_browser_that_is_there(
 
 @pytest.mark.parametrize("module", ["form.js", "paths.js", "reconfigure.js", "ros1.js", "widgets.js"])
 def test_every_error_of_a_person_has_a_german_text(module: str) -> None:
-    """Errors for invalid user input; each is thrown as a TextError or through t()."""
+    """These errors are for invalid user input; each is thrown as a TextError or through t()."""
     text = (PAGE / "js" / module).read_text(encoding="utf-8")
     german = (PAGE / "js" / "german.js").read_text(encoding="utf-8")
     assert re.findall(r"new Error\((?!t\()", text) == []
@@ -95,7 +95,7 @@ def speak_german(page: Page) -> None:
 
 
 def fill_graph(served: Served) -> None:
-    """Publish messages for the views to show."""
+    """Publish messages that the views show."""
     served.run(publisher(served, "/button_state", Bool, latch=True).publish(True))
     line = Log(level=4, name="/talker", msg="Pause", file="a.py", function="f")
     served.run(publisher(served, "/rosout_agg", Log, latch=True).publish(line))
@@ -115,7 +115,7 @@ def test_views_have_no_text_without_its_german_one(
         page.evaluate(f"location.hash = '#/{view}{SETTINGS.get(view, '')}'")
         page.wait(f"return document.getElementById('view').dataset.view === '{view}'")
         page.wait("return document.getElementById('view').children.length > 0")
-        # Let a view's data from the graph arrive before the next view is opened; the test does not depend on it.
+        # Let a view's data from the graph arrive before opening the next view; the test does not depend on it.
         page.evaluate("new Promise(resolve => setTimeout(resolve, 300))")
     missing = [each for each in page.evaluate("[...window.missing]") if not each.startswith("/")]
     names = {"\u00d7", "←", "→", "✎", "?", ", .", "1 2", "/", "x", "y", "theta", "GPIO 2", "RViz"}
@@ -222,7 +222,7 @@ def test_keys_of_the_page_show_help_and_other_views(
     page.wait("return document.getElementById('view').dataset.view === 'topics'")
     press_key(page, "/", 191, "/")
     page.wait("return document.activeElement.type === 'search'")
-    # In an input field, keys are text.
+    # In an input field, keys are text input.
     page.call("Input.insertText", text="a")
     press_key(page, ".", 190, ".")
     assert page.evaluate("document.activeElement.value") == "a."

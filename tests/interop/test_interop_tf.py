@@ -1,4 +1,4 @@
-"""tf2 and tf compared with Debian's: the same queries to both, and transforms on the wire between minirospy and roscpp."""
+"""tf2 and tf compared with Debian's: both answer the same queries, and exchange transforms between minirospy and roscpp."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ for line in sys.stdin:
     where, turn, stamp = found.transform.translation, found.transform.rotation, found.header.stamp
     print(stamp.secs, stamp.nsecs, where.x, where.y, where.z, turn.x, turn.y, turn.z, turn.w, flush=True)
 """
-START = 1_700_000_000  # seconds: at this size, a float of seconds does not resolve nanoseconds
+START = 1_700_000_000  # seconds; at this size, a float in seconds does not resolve nanoseconds
 
 
 @pytest.mark.parametrize("lazily", [False, True], ids=["inserted", "as_bytes"])
@@ -103,14 +103,14 @@ def tf_peer(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Peer:
-    """A program that answers each line with a line."""
+    """A program that responds to each line with a line."""
 
     def __init__(self, program: subprocess.Popen[str]) -> None:
         self._program = program
         assert self._read() == "ready"
 
     def ask(self, *words: object) -> str:
-        """Send a line; return the answer."""
+        """Send a line; return the response."""
         assert self._program.stdin
         self._program.stdin.write(" ".join(map(str, words)) + "\n")
         self._program.stdin.flush()

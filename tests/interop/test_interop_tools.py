@@ -1,4 +1,4 @@
-"""minirospy's commands compared with the real ones: on the same graph, both tools print equal bytes to stdout."""
+"""minirospy's commands compared with the real ones: on the same graph, both tools print the same bytes to stdout."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ rostopic echo -n1 -p /scan
 
 @pytest.fixture
 def scene(request: pytest.FixtureRequest, any_master: str) -> Iterator[str]:
-    """Yield the URI of a master with the scene on it, a node of the stack that the test's parameter selects."""
+    """Yield the URI of a master with the scene, which is a node from the stack that the test's parameter selects."""
     python = "/usr/bin/python3" if request.param == "rospy" else sys.executable
     program = subprocess.Popen(
         [python, str(HERE / "scene.py")], env=_environment(any_master), stdout=subprocess.PIPE, text=True
@@ -83,7 +83,7 @@ def scene(request: pytest.FixtureRequest, any_master: str) -> Iterator[str]:
 @pytest.mark.timeout(3000)
 @pytest.mark.parametrize(("any_master", "scene"), [("rospy", "rospy")], indirect=True)
 def test_the_table(scene: str, tmp_path: Path) -> None:
-    """Each line prints the same bytes as in real ROS, or is known to differ; the page in docs/ is up to date."""
+    """Each line prints the same bytes as in real ROS, or is known to differ. The page in docs/ is up to date."""
     (tmp_path / "text.txt").write_text("a text\nof two lines\n")
     (tmp_path / "values.yaml").write_text("a: 1\nb: {c: [1, 2]}\n---\n_ns: inner\nx: 2\n")
     sections = {"Questions to the graph, and types": compare(ASKING, scene, tmp_path)}
@@ -110,7 +110,7 @@ def test_the_table(scene: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("any_master", "scene"), [("ours", "ours")], indirect=True)
 def test_the_same_bytes_on_our_graph(scene: str, tmp_path: Path) -> None:
-    # A line that echoes or calls is a node, which the other lines would list.
+    # A command that echoes or calls is itself a node, which the other lines would list.
     rows = [row for text in (ON_OUR_GRAPH, JOINING_OUR_GRAPH) for row in compare(text, scene, tmp_path)]
     different = unexpected(rows)
     assert not different, different
@@ -135,7 +135,7 @@ def test_publishing_and_echoing(
     echo = _start(any_master, echoing, ["rostopic", "echo", "-n1", "/t"])
     options = [word for word in words if word.startswith("-") and len(word) < 4]
     values = words[len(options) :]
-    # It waits for the topic.
+    # The command waits for the topic.
     assert echo.stderr
     assert "does not appear to be published yet" in echo.stderr.readline()
     # `pub -1` exits after three seconds, during which a busy machine may stall.
@@ -160,7 +160,7 @@ def test_publishing_and_echoing(
 @pytest.mark.parametrize("killing", [REAL, OURS])
 @pytest.mark.parametrize("killed", [REAL, OURS])
 def test_killing(any_master: str, killing: Path, killed: Path) -> None:
-    """`rosnode kill` of one stack stops the nodes of the other."""
+    """`rosnode kill` from one stack stops nodes of the other."""
     pub = _start(any_master, killed, ["rostopic", "pub", "/t", "std_msgs/Bool", "data: True"])
     assert pub.stdout
     assert pub.stdout.readline() == "publishing and latching message. Press ctrl-C to terminate\n"
@@ -193,7 +193,7 @@ def _run(uri: str, tools: Path, line: str) -> str:
 
 @contextmanager
 def _publishers(uri: str) -> Iterator[None]:
-    """Publish /fast with stamps at 20 Hz, /slow at 5 Hz."""
+    """Publish stamped messages on /fast at 20 Hz and on /slow at 5 Hz."""
     stamped = ["-s", "/fast", "geometry_msgs/PointStamped", "{header: auto, point: {x: 1.5}}"]
     words = [["-r", "20", *stamped], ["-r", "5", "/slow", "std_msgs/String", "hello"]]
     running = [_start(uri, OURS, ["rostopic", "pub", *each]) for each in words]
@@ -208,7 +208,10 @@ def _publishers(uri: str) -> Iterator[None]:
 
 
 def _register_ghosts(uri: str) -> None:
-    """Register two nodes that no longer run: at one's address nothing listens, the other's host has no address."""
+    """Register two nodes that no longer run.
+
+    Nothing listens at the first one's address; the host of the second has no address.
+    """
     with ServerProxy(uri) as master:
         for name, host in (("/dead", "localhost:9"), ("/unresolved", "no-such-host.invalid:1234")):
             master.registerPublisher(name, f"/t{name}", "std_msgs/String", f"http://{host}/")

@@ -1,4 +1,4 @@
-"""Visit all views in one session of Debian's chromium: from the menu, there and back, in the sizes of a desktop and a phone."""
+"""Visit all views in one session of Debian's chromium, from the menu, there and back, on a desktop's and on a phone's screen."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ SEEN = {
     "smach": (".smach-state", "DOCK"),
     "diagnostics": (".report", "Battery"),
 }
-"""View -> a selector and a text that it shows for the scene, in any language."""
+"""A selector for each view, and a text that the selected element shows for the scene in any language."""
 
 UNREACHABLE = """(() => {
   const bad = [], width = innerWidth, height = innerHeight;
@@ -70,7 +70,7 @@ UNREACHABLE = """(() => {
     if (e.scrollWidth > e.clientWidth) bad.push(`${e.tagName} is wider than the window`);
   return bad;
 })()"""
-"""Controls that cannot be reached: outside of the window or covered by another element."""
+"""Finds controls that cannot be reached because they are outside the window or covered by another element."""
 
 LEFT_IN_ENGLISH = """import("/js/german.js").then(({ GERMAN }) => {
   const isLeft = (text) => text && Object.hasOwn(GERMAN, text) && GERMAN[text] !== text;
@@ -158,7 +158,7 @@ def use(page: Page, view: str) -> None:
 
 
 def walk(page: Page, check: str = "[]") -> list[str]:
-    """Open each view from the menu, twice; return the faults, by view."""
+    """Open each view from the menu twice; return the faults by view."""
     wrong = []
     for _ in range(2):
         for view in VIEWS:

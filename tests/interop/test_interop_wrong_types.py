@@ -1,6 +1,6 @@
 """Call functions on names, types and message values with None, wrong types, no argument and normal values; compare with real ROS.
 
-Differences are recorded in wrong_types.json: call -> [real, ours]. RECORD=1 rewrites it.
+Differences are recorded in wrong_types.json, which maps a call to [real, ours]. RECORD=1 rewrites it.
 """
 
 from __future__ import annotations

@@ -44,8 +44,8 @@ OF = (
     "minirospy",
 )
 VALUES = (None, 3, b"x", "", "x", "/x/y", "~p", ["a"], {"a": 1}, 2.5, True, object())
-# Functions whose results differ at each call or that resolve host names; that read the terminal, wait for a service,
-# write a file or create a node; and parts of a YAML loader.
+# Functions whose results differ at each call, that resolve host names, read the terminal, wait for a service, write a
+# file or create a node; and parts of a YAML loader.
 LEFT_OUT = re.compile(
     r"local_address|get_host_name|anonymous_name|handshake_header$"
     r"|main$|^stdin_|^rosmsg_cmd|^(construct|represent)_|publish|subscriber|^call_service$"
@@ -55,7 +55,7 @@ CHANGING = re.compile(r"0x[0-9a-f]+|_\d+_\d+|\d{8,}|/(usr|work|tmp|home|root|opt
 
 
 def outcome(function, arguments):
-    """Return a call's value or that it raises; the kind of error depends on the operation that fails first."""
+    """Return a call's value, or that it raises an exception. The exception's type depends on which operation fails first."""
     out, err, sys.stdout, sys.stderr = sys.stdout, sys.stderr, io.StringIO(), io.StringIO()
     try:
         result = function(*arguments)
@@ -85,7 +85,7 @@ def main():
             calls = [(), *((value, *others) for value in VALUES)]
             calls += [(*others, value) for value in VALUES] if others else []
             if name == "load_file":
-                # Real rosparam takes a number for a file descriptor, which it closes.
+                # Real rosparam treats a number as a file descriptor, and closes it.
                 calls = [each for each in calls if not each or not isinstance(each[0], int)]
             for arguments in calls:
                 shown = CHANGING.sub("#", repr(arguments))

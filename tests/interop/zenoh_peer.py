@@ -1,4 +1,4 @@
-"""A ROS 2 node over Zenoh, by pyzeros or zenoh-ros2-sdk: executes JSON lines from stdin, and prints the results.
+"""A ROS 2 node over Zenoh, based on pyzeros or zenoh-ros2-sdk: executes JSON lines from stdin, and prints the results.
 
 Run as `zenoh_peer.py pyzeros tcp/127.0.0.1:7447` or `zenoh_peer.py sdk ...`, by a Python that has them. The operations are
 those of ros2_peer.py: subscribe, publish, serve, call, close. The implementation's own code decodes and encodes the messages.
@@ -21,7 +21,7 @@ def say(op, **fields):
 
 
 class Pyzeros:
-    """Messages by ros2_pyterfaces and cyclonedds-idl."""
+    """A node that converts messages with ros2_pyterfaces and cyclonedds-idl."""
 
     def __init__(self, endpoint):
         import pyzeros
@@ -121,7 +121,7 @@ class Pyzeros:
 
 
 class Sdk:
-    """Messages by rosbags. It connects as a peer, as rmw_zenoh does."""
+    """A node that converts messages with rosbags. It connects as a peer, as rmw_zenoh does."""
 
     TEXTS = {
         "std_msgs/String": "string data\n",
@@ -238,7 +238,7 @@ def main():
             ends.setdefault(topic, []).append(getattr(peer, op)(topic, command))
         say("done", of=op, topic=topic)
     peer.close()
-    # Threads of the libraries may still run.
+    # Exit without waiting for the libraries' threads, which may still run.
     os._exit(0)
 
 

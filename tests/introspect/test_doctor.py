@@ -39,7 +39,7 @@ AFAR = MasterLocation("robot", 11311, ["192.0.2.7"])
 
 def test_query_that_takes_too_long_times_out(monkeypatch: pytest.MonkeyPatch) -> None:
     end = threading.Event()
-    # At the start, before the first result, and before the second: the time limit has passed.
+    # The times at the start, before the first result, and before the second, when the time limit has passed.
     times = iter([0.0, 0.0, 60.0])
     monkeypatch.setattr(reach, "time", SimpleNamespace(monotonic=lambda: next(times)))
     found = in_parallel(end.wait, [0.0, 100.0], 60.0)
@@ -198,7 +198,7 @@ def test_variables(environ: dict[str, str], place: MasterLocation, status: str, 
 
 
 def test_folder_of_another_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As `sudo roscore` leaves it; the advice never covers a folder above the one in question."""
+    """`sudo roscore` leaves such a folder. The advice never covers a folder above the one in question."""
     monkeypatch.setattr(os, "access", lambda path, _: Path(path) != tmp_path)
     environ = {"ROS_HOSTNAME": "localhost", "ROS_HOME": str(tmp_path)}
     (finding,) = said(environ, HERE)
@@ -260,7 +260,7 @@ def test_packages(tmp_path: Path) -> None:
 
 
 def test_new_package_of_the_workshop_has_no_findings(tmp_path: Path) -> None:
-    """The course has students create `rpi_msgs`, which minirospy includes; a workspace has both."""
+    """In the course, students create `rpi_msgs`, which minirospy includes, so a workspace has both."""
     package(tmp_path / "rpi_msgs", "rpi_msgs", "rospy")
     paths = os.pathsep.join(map(str, (tmp_path, *built_in_roots())))
     (finding,) = check_packages(Environment.read({"ROS_PACKAGE_PATH": paths}), tmp_path)

@@ -1,4 +1,4 @@
-"""The doctor's findings on frames: from recorded observations, and from published frames."""
+"""The doctor's findings on frames, from recorded observations and from published frames."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def test_published_frames_are_examined(master: str, start: Start) -> None:
         while len((state := proxy.get_system_state()).publishers.get("/tf", ())) < 2:
             pass
         texts = ""
-        # It listens for a second and a half, in which a busy machine may deliver nothing.
+        # The doctor listens for a second and a half, in which a busy machine may deliver nothing.
         while not ("by 2 nodes" in texts and "TF_DENORMALIZED_QUATERNION" in texts):
             texts = " | ".join(finding.text for finding in check(Environment.read(), state))
     finally:

@@ -1,4 +1,4 @@
-"""The output of `rostopic echo`, byte for byte as the real one's, and messages from YAML values."""
+"""The output of `rostopic echo`, which equals the real one's byte for byte, and messages from YAML values."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from io import BytesIO
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Point32, Polygon, PoseStamped
 from rosbridge_library import msg as rosbridge
 from sensor_msgs.msg import CameraInfo, Image, JointState
@@ -48,6 +49,18 @@ def test_fields_and_arrays() -> None:
     assert echo(PoseStamped(), "header/stamp") == "\nsecs: 0\nnsecs:         0\n---\n"
 
 
+def test_paths_into_strings_and_elements_that_differ() -> None:
+    reported: list[Exception] = []
+    status = DiagnosticStatus(name="abc", values=[KeyValue("k", "v"), KeyValue("k2", "v2")])
+    message = DiagnosticArray(status=[status, DiagnosticStatus(name="defg")])
+    assert echo(message, "status[:]/name[0:2]") == "\n- ab\n- de\n---\n"
+    assert echo(message, "status[:]/name[0:2]", arrays=False) == "\n- ab\n- de\n---\n"
+    assert echo(message, "status[:]/name[0:2]", strings=False) == '"<string length: 2>"\n---\n'
+    assert echo(message, "status[:]/values[:]/key") == "\n- \n  - k\n  - k2\n- []\n---\n"
+    assert echo(message, "status[:]/values[0]/key", report=reported.append) == "\n- k\n- null\n---\n"
+    assert [str(each) for each in reported] == ["values[0]: the array has 0 elements"]
+
+
 def test_notes_in_the_place_of_arrays_and_strings() -> None:
     image = Image(data=b"abc", encoding="rgb8")
     assert 'encoding: "rgb8"\n' in echo(image, arrays=False)
@@ -58,7 +71,7 @@ def test_notes_in_the_place_of_arrays_and_strings() -> None:
 
 
 def test_notes_are_as_ros_writes_them() -> None:
-    """Messages in arrays are shown completely; the note of an array of fixed length keeps its bracket."""
+    """Messages in arrays are printed completely; the note for an array with a fixed length keeps its bracket."""
     info = CameraInfo()
     assert 'K: "<array type: float64[9, length: 9>"\n' in echo(info, arrays=False)
     markers = MarkerArray([Marker(ns="n", text="t")])

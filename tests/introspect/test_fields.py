@@ -1,10 +1,11 @@
-"""Field paths: parsed, followed into messages, and typed."""
+"""Field paths: parsing them, following them into messages, and their types."""
 
 from __future__ import annotations
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point32, PolygonStamped, PoseStamped
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import JointState, LaserScan
 
 from minirospy.base.errors import NotFoundError, UsageError
 from minirospy.introspect.fields import Step, field_type, field_value, parse_path
@@ -44,6 +45,45 @@ def test_values_are_found() -> None:
     assert value("polygon/points[:]/y") == [2, 5]
     assert value("polygon/points[1:]") == [Point32(4, 5, 6)]
     assert value("header/stamp/secs") == 0
+
+
+def test_strings_have_indices_and_slices() -> None:
+    joints = JointState(name=["alpha", "beta", ""])
+    joints.header.frame_id = "map"
+
+    def value(path: str) -> object:
+        return field_value(joints, parse_path(path))
+
+    assert value("header/frame_id[0:2]") == "ma"
+    assert value("header/frame_id[-1]") == "p"
+    assert value("header/frame_id[::-1]") == "pam"
+    assert value("name[0]") == "alpha"
+    assert value("name[1:]") == ["beta", ""]
+    with pytest.raises(IndexError, match=r"frame_id\[3\]: the string has 3 characters"):
+        value("header/frame_id[3]")
+
+
+def test_elements_without_the_rest_of_a_path_are_none_and_reported() -> None:
+    values = [KeyValue("k", "v"), KeyValue("k2", "v2")]
+    message = DiagnosticArray(
+        status=[DiagnosticStatus(name="abc", values=values), DiagnosticStatus(name="d")]
+    )
+    reported: list[Exception] = []
+
+    def value(path: str) -> object:
+        return field_value(message, parse_path(path), reported.append)
+
+    assert value("status[:]/values[1]/key") == ["k2", None]
+    assert [str(each) for each in reported] == ["values[1]: the array has 0 elements"]
+    assert value("status[:]/values[:]/key[:1]") == [["k", "k"], []]
+    assert value("status[:]/name[1]") == ["b", None]
+    assert value("status[:]/nope") == [None, None]
+    assert len(reported) == 4
+    # Without a report, and for the first step, the error is raised.
+    with pytest.raises(IndexError):
+        field_value(message, parse_path("status[:]/values[1]/key"))
+    with pytest.raises(IndexError):
+        value("status[5]/name")
 
 
 def test_missing_field_is_reported() -> None:

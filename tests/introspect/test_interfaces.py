@@ -1,4 +1,4 @@
-"""Types as packages define them."""
+"""Types that packages define."""
 
 from __future__ import annotations
 

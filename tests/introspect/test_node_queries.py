@@ -1,4 +1,4 @@
-"""Queries of nodes: each node is queried once, and nodes that do not answer do not delay others."""
+"""Queries to nodes: each node is queried once, and nodes that do not respond do not delay others."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ LIMIT = 60.0
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait for silent nodes. A test of a limit sets it after this."""
+    """Raise the time limit for silent nodes. A test of the limit sets it after this fixture."""
     for name in ("QUERY_SECONDS", "AGAIN_SECONDS", "REFUSED_SECONDS"):
         monkeypatch.setattr(node_queries, name, LIMIT)
 
 
 class Nodes:
-    """Nodes that answer with their name in capitals; those in ``silent`` answer when released, those in ``dead`` never."""
+    """Nodes that respond with their name in capitals. Those in ``silent`` respond when released, those in ``dead`` never."""
 
     def __init__(self) -> None:
         self.queried: list[str] = []
@@ -45,7 +45,7 @@ class Nodes:
 
 
 def queried(scene: Callable[[Nodes, NodeQueries[str, str]], Awaitable[None]]) -> None:
-    """Run a scene with nodes and queries of them."""
+    """Run a scene with nodes and queries to them."""
 
     async def run() -> None:
         nodes = Nodes()
@@ -167,7 +167,7 @@ def test_a_node_that_refuses_is_queried_again_soon(monkeypatch: pytest.MonkeyPat
         await loop.advance(0)
         assert queries.found == {"a": "A"}
 
-        # Many nodes that refuse are not queried more often than silent ones.
+        # Many nodes that refuse connections are not queried more often than silent ones.
         dead = [f"dead{number}" for number in range(1000)]
         nodes.dead.update(dead)
         await queries.look(dead, 0.0)

@@ -49,7 +49,7 @@ def node(master: str) -> Iterator[ToolNode]:
         )
         tool._loop.run(tool._node.serve(server))
         yield tool
-    gc.collect()  # objects that user code does not close are closed on deletion
+    gc.collect()  # objects that user code does not close are closed when they are deleted
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
@@ -165,7 +165,7 @@ def test_rosmsg() -> None:
     assert rosmsg.get_srv_text("std_srvs/SetBool") == "bool data\n---\nbool success\nstring message\n"
     assert "std_msgs/Bool" in rosmsg.list_msgs("std_msgs")
     assert rosmsg.list_srvs("std_srvs") == ["std_srvs/Empty", "std_srvs/SetBool", "std_srvs/Trigger"]
-    with pytest.raises(rosmsg.ROSMsgException, match="not found"):
+    with pytest.raises(rosmsg.ROSMsgException, match="Cannot locate"):
         rosmsg.get_msg_text("std_msgs/Nope")
 
 

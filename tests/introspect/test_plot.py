@@ -36,6 +36,14 @@ def test_strings_and_arrays_can_be_left_out() -> None:
     assert plot_row(joints, 1) == "1,0,0,,a,b c,1.0"
     assert plot_row(joints, 1, strings=False) == "1,0,0,1.0"
     assert plot_row(joints, 1, arrays=False) == "1,0,0,"
+    # The value of a path is not a field of a message.
+    assert plot_row(joints.name, 1, strings=False, arrays=False) == "1,a,b c"
+    assert plot_row([joints], 1, strings=False) == "1,0,0,1.0"
+
+
+def test_missing_value_keeps_its_column() -> None:
+    assert plot_header(["k", None, "v"]) == "%time,field0,field1,field2"
+    assert plot_row(["k", None, "v"], 1) == "1,k,,v"
 
 
 def test_times_from_an_origin() -> None:

@@ -36,7 +36,7 @@ def test_processes_that_have_ended_are_left_out() -> None:
 def test_process_with_a_reused_id_starts_from_zero() -> None:
     loads = ProcessLoads()
     loads.look([os.getpid()])
-    # As psutil does if the process id now belongs to another process.
+    # psutil reports another creation time if the process id now belongs to another process.
     loads.known[os.getpid()]._create_time = 1.0  # type: ignore[attr-defined]
     loads.known[os.getpid()]._ident = (os.getpid(), 1.0)  # type: ignore[attr-defined]
     assert loads.look([os.getpid()])[os.getpid()].cpu is None

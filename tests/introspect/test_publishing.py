@@ -13,7 +13,7 @@ SECOND = 10**9
 
 
 class Hand:
-    """A clock that each sleep advances; at the sleep ``jump`` it is set back to ``to`` instead."""
+    """A clock that each sleep advances, except that the sleep with number ``jump`` sets it back to ``to``."""
 
     def __init__(self, jump: int, to: int) -> None:
         self.time = 100 * SECOND

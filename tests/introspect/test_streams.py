@@ -25,7 +25,7 @@ from minirospy.runtime.transport.loop import LoopThread
 
 @pytest.fixture
 def simulated_time(master: str) -> Iterator[ToolNode]:
-    """Run a node that latches /clock at 100 s, with /use_sim_time set."""
+    """Run a node that latches 100 s on /clock, with /use_sim_time set."""
     proxy = MasterProxy(master, "/test")
     proxy.set_param("/use_sim_time", True)
     proxy.close()

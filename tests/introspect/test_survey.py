@@ -21,7 +21,7 @@ PLACE = MasterLocation("localhost", 11311, ["127.0.0.1"])
 
 
 def answer(stats: object, pid: int = 5) -> NodeAnswer:
-    """Return the answer of a node /a that sends /t to /b by connection 1 and to /c by connection 2."""
+    """Return the response of a node /a that sends /t to /b on connection 1 and to /c on connection 2."""
     links = (
         BusConnection(1, "/b", "o", "TCPROS", "/t"),
         BusConnection(2, "/c", "o", "TCPROS", "/t"),
@@ -48,7 +48,7 @@ def looked(seconds: float, stats: object, pid: int = 5) -> Survey:
 @pytest.mark.parametrize(
     ("before", "after"),
     [
-        # rospy and minirospy, then roscpp.
+        # The first format is rospy's and minirospy's, the second roscpp's.
         (
             [["/t", 0, [[1, 100, 10, True], [2, 0, 0, True]]]],
             [["/t", 0, [[1, 300, 20, True], [2, 8, 1, True]]]],
@@ -67,7 +67,7 @@ def test_traffic_omits_incomparable_counts() -> None:
     first = looked(10, [["/t", 0, [[1, 100, 10, True]]]])
     assert traffic(None, first) == {}
     assert traffic(first, first) == {}
-    # Another process with the same name; a counter that wrapped around; a new connection.
+    # There is no traffic for another process with the same name, a counter that wrapped around, or a new connection.
     assert traffic(first, looked(12, [["/t", 0, [[1, 300, 20, True]]]], pid=6)) == {}
     assert traffic(first, looked(12, [["/t", 0, [[1, 3, 20, True]]]])) == {}
     assert traffic(first, looked(12, [["/t", 0, [[2, 300, 20, True]]]])) == {}
@@ -89,7 +89,7 @@ def test_description_has_nodes_and_what_is_wrong_with_them() -> None:
 
 
 def test_nodes_are_queried_and_their_traffic_is_counted(master: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    # On a busy machine an answer may arrive late.
+    # On a busy machine, a response may arrive late.
     monkeypatch.setattr("minirospy.introspect.doctor.graph.CONNECT_SECONDS", 30.0)
     loop = LoopThread("test-survey")
     nodes: list[Node] = []

@@ -1,4 +1,4 @@
-"""YAML values as users type them: the fast parser agrees with the YAML library, and bad input is refused in one line."""
+"""YAML values as users type them: the fast parser agrees with the YAML library, and rejects bad input in one line."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def test_pretty() -> None:
         "b": False, "d": {"el": [], "q": {"r": 1.5}}, "e": "", "l": [1, "a: b", [2, 3]], "ml": "abc\ndef", "n": "5",
         "s": "l1\nl2\n", "u": "ünï", "y": "yes",
     }  # fmt: skip
-    # As printed by real `rosparam get -p`.
+    # Real `rosparam get -p` prints the same.
     assert format_pretty(value) == (
         "b: false\nd:\n  el: []\n  q:\n    r: 1.5\ne: \nl: - 1\n- 'a: b'\n- - 2\n  - 3\n"
         "ml: |\n  abc\n  def\nn: 5\ns: |\n  l1\n  l2\n  \nu: ünï\ny: yes"

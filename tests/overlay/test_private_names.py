@@ -57,8 +57,8 @@ def test_a_command_function_runs_its_command(master: str, capsys: pytest.Capture
 
 def test_rosmsg_commands_run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.argv", ["rosmsg", "show", "std_msgs/Bool"])
-    assert rosmsg.rosmsg_cmd_show(rosmsg.MODE_MSG, None) == 0
-    assert rosmsg.rosmsg_cmd_list(rosmsg.MODE_SRV, None, ["list"]) == 0
+    assert rosmsg.rosmsg_cmd_show(rosmsg.MODE_MSG, None) is None
+    rosmsg.rosmsg_cmd_list(rosmsg.MODE_SRV, None, ["list"])
     out = capsys.readouterr().out
     assert out.startswith("bool data\n")
     assert "std_srvs/Empty\n" in out

@@ -1,4 +1,4 @@
-"""Helpers of the actions cases: scripted endpoints of an action on its five topics, and the log lines of actionlib."""
+"""Helpers for the actions cases: scripted endpoints of an action on its five topics, and the log lines of actionlib."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from referee import eventually, show
 _NAMES = {
     value: name for name, value in vars(GoalStatus).items() if name.isupper() and isinstance(value, int)
 }
-# Log lines of rospy itself, which are not compared.
+# Log lines from rospy itself, which are not compared.
 _OTHERS = re.compile(
     r"connecting to |\[/.*failed to receive|.*topic|.*TCPROS|node|init_node|signal_shutdown|the first message"
 )
@@ -34,7 +34,7 @@ def mask(text):
 
 
 class Story:
-    """Records callbacks and log lines from all threads, in order; prints them when the case requests it."""
+    """Records callbacks and log lines from all threads in order, and prints them when the case requests it."""
 
     def __init__(self, level=logging.DEBUG):
         self._changed = threading.Condition()
@@ -92,7 +92,7 @@ class _LogLines(logging.Handler):
 
 
 class RawClient:
-    """A scripted client: sends on demand, records the messages that it receives."""
+    """A scripted client that sends on demand, and records the messages that it receives."""
 
     def __init__(self, ns, hides_pending=False):
         self._hides_pending = hides_pending
@@ -122,14 +122,14 @@ class RawClient:
         self.goal_pub.publish(message)
 
     def cancel(self, id="", stamp=None):
-        """Send a cancel request."""
+        """Send a cancel request; without ``stamp`` it has none."""
         message = GoalID(id=id)
         if stamp is not None:
             message.stamp = stamp
         self.cancel_pub.publish(message)
 
     def wait_status(self, id, status, seconds=30):
-        """Return whether the status list comes to report this status of a goal."""
+        """Return whether the status list reports this status for a goal in time."""
         with self._changed:
             return self._changed.wait_for(lambda: self.statuses.get(id) == status, seconds)
 
@@ -141,7 +141,7 @@ class RawClient:
             )
 
     def wait_gone(self, id, seconds=30):
-        """Return whether the status list comes to omit a goal."""
+        """Return whether the status list no longer contains a goal in time."""
         with self._changed:
             return self._changed.wait_for(lambda: self.arrays and id not in self.statuses, seconds)
 
@@ -199,7 +199,7 @@ class RawClient:
 
 
 class RawServer:
-    """A scripted server: records the goals and cancel requests that it receives, publishes on demand."""
+    """A scripted server that records the goals and cancel requests that it receives, and publishes on demand."""
 
     def __init__(self, ns):
         self._changed = threading.Condition()

@@ -183,7 +183,7 @@ REASONS = {
         ("ROS_LOG_DIR", "makedirs_with_parent_perms", "renew_latest_logdir"), "the inside of rospy's logging"
     ),
 }
-"""Name of real rospy -> the reason why it is not offered: only rospy itself uses it."""
+"""The reasons why names in real rospy are not offered, by name: only rospy itself uses them."""
 
 LEFT_OUT: list[tuple[str, str, str]] = []
 """(module or start of it, names or "*", the reason why they are not offered)."""
@@ -238,7 +238,7 @@ Description = dict[str, dict[str, Any]]
 
 
 def private_names(not_only_own: bool = False) -> dict[str, list[str]]:
-    """Return submodule -> its own functions and classes whose names start with an underscore, or all of its names."""
+    """Return each submodule's functions and classes whose names start with an underscore, or all of its names."""
     found = {}
     for name in submodules():
         try:
@@ -437,7 +437,7 @@ STANDARD = (
 
 
 def describe_value(value: Any) -> dict[str, Any] | None:
-    """Return the parts of a value that are compared; None if it is not of ROS."""
+    """Return the parts of a value that are compared, or None if it is not rospy's own."""
     if isinstance(value, (bool, int, float, str)):
         return {"home": "", "is": repr(value)}
     home = getattr(value, "__module__", None) or ""
@@ -457,7 +457,7 @@ def describe_value(value: Any) -> dict[str, Any] | None:
 
 
 def parameters(value: Any) -> list[list[str]] | None:
-    """Return [name, default, kind] of each parameter; None if it cannot be determined."""
+    """Return [name, default, kind] for each parameter, or None if it cannot be determined."""
     try:
         signature = inspect.signature(value)
     except (TypeError, ValueError):
@@ -479,7 +479,7 @@ def shown_default(default: Any) -> str:
 
 
 def compare(real: Any, ours: Any) -> str:
-    """Return one of: same; wider (minirospy accepts every call that real rospy accepts); differs."""
+    """Return "same", "wider" (minirospy accepts every call that real rospy accepts) or "differs"."""
     if real == ours or real is None:
         return "same"
     if not isinstance(real, list) or not isinstance(ours, list):
@@ -674,7 +674,7 @@ NOT_OFFERED = {
     "rospy.impl": "rospy's threads and sockets; ours are minirospy.runtime",
     "": "its command's inside",
 }
-"""Prefix of a module's name -> what it is."""
+"""Descriptions of modules that are not offered, by the prefix of their names."""
 
 
 def described_by(python: str, option: str = "--describe") -> dict[str, Any]:

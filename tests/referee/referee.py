@@ -1,4 +1,4 @@
-"""Functions with which the cases in this folder print. Runs under real rospy and under minirospy: only public names of rospy.
+"""Functions that the cases in this folder use to print. It runs under real rospy and minirospy, so it uses only public names.
 
 A case is a user's program; its output is the same under both, line by line, after numbers that differ between runs
 (ports, process ids, wall-clock times, temporary folders) are replaced by a word.
@@ -71,7 +71,7 @@ def printed(label: str, call: Callable[[], Any], *masks: tuple[str, str], texts:
 
 
 class Other:
-    """Another program of the same stack: it runs ``code``; ``read()`` returns its next line, ``close()`` stops it."""
+    """Another program on the same stack, which runs ``code``. ``read()`` returns its next line, ``close()`` stops it."""
 
     def __init__(self, code: str, *arguments: str, environment: dict[str, str] | None = None) -> None:
         self.process = subprocess.Popen(
@@ -108,7 +108,7 @@ class Other:
 def of_ten_looks(look: Callable[[], tuple[bool, ...]]) -> tuple[bool, ...]:
     """Return the result of ``look()``, called at most ten times until all of it is true.
 
-    For durations: they are longer on a machine that stalls now and then, but not ten times in a row.
+    This is for durations, which are longer if the machine stalls occasionally, but not ten times in a row.
     """
     for _ in range(10):
         found = look()

@@ -1,4 +1,4 @@
-"""Running a case: its program under one stack, with a master, and its output."""
+"""Runs a case's program under one stack, with a master, and returns its output."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def differences(said: str, expected: str) -> str:
 
 
 def _as_every_python(text: str) -> str:
-    """Return the text without Python's additions to its messages from 3.13 on."""
+    """Return the text without the additions to Python's messages from version 3.13 on."""
     text = text.replace(" and no __dict__ for setting new attributes", "")
-    # The source line of `python -c`, and the marks below it.
+    # Remove the source line of `python -c`, and the marks below it.
     return re.sub(r'^(\s*)(File "<string>", .*\n)(?:\1 .*\n)+', r"\1\2", text, flags=re.MULTILINE)
 
 

@@ -1,4 +1,4 @@
-"""Users' programs print the same under minirospy as under real rospy (recorded/, made by make interop)."""
+"""Users' programs print the same under minirospy as under real rospy, whose output `make interop` records in recorded/."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The definitions of ROS 2 from rosbags, with the field types named as in rclpy's classes."""
+"""The definitions of ROS 2 from rosbags, with the fields' types named as in rclpy's classes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def catalogue() -> Catalogue:
 
 @lru_cache
 def ros2_lookup(name: str) -> MessageSpec:
-    """Return the spec of ``pkg/Name`` in ROS 2. Raise KeyError."""
+    """Return the spec of ``pkg/Name`` in ROS 2. Raise KeyError if ROS 2 has no such type."""
     fields = typestore().fielddefs[name.replace("/", "/msg/")][1]
     return ros2_spec(name, {field: _text(type_) for field, type_ in fields})
 

@@ -1,4 +1,4 @@
-"""The table in docs/ros2.md: which types of msgs/ are bridged, and why others are not, by ROS 2 Jazzy's definitions."""
+"""The table in docs/ros2.md: the types in msgs/ that are bridged, and why others are not, based on ROS 2 Jazzy's definitions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.ros2.ros2_definitions import catalogue, ros2_lookup, typestore
 
 
 def table() -> str:
-    """Return the lines of the table: for each package the bridged types, and the others with the reason."""
+    """Return the lines of the table: for each package, the bridged types, and the others with the reason."""
     lines = ["| package | bridged | not bridged |", "|---|---|---|"]
     packages = {name.partition("/")[0] for name in typestore().fielddefs}
     elsewhere = []

@@ -135,7 +135,7 @@ def test_rules_name_actions_and_their_fields() -> None:
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Send no request before the server is reachable."""
+    """Raise the limits, so that no request is sent before the server can be reached."""
     monkeypatch.setattr("minirospy.ros2.reach.MAX_SECONDS", LIMIT)
 
 
@@ -154,7 +154,7 @@ def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any]) -> None:
 
 
 async def sent(side: FakeSide, number: int) -> Any:
-    """Return a goal that ROS 2 has received: its CDR, its feedback callback, its handle."""
+    """Return a goal that ROS 2 has received: its CDR, its feedback callback and its handle."""
     await until(lambda: len(side.action_clients["/fly"].goals) > number)
     return side.action_clients["/fly"].goals[number]
 
@@ -216,7 +216,7 @@ def test_a_goal_waits_until_responses_of_the_server_arrive(monkeypatch: pytest.M
         async with ActionClient(node, "/fly", FibonacciAction) as client:
             await client.wait_for_server()
             goal = client.send(FibonacciGoal(order=3))
-            # One request after the other gets no response.
+            # Requests are sent one after the other, but get no response.
             await until(lambda: len(probe.reaching) >= 3 and goal.state is GoalState.PENDING)
             assert not there.goals
             probe.answers = True
@@ -369,7 +369,7 @@ def test_types_of_actions_that_do_not_map_are_listed_with_the_reason() -> None:
 
 
 class LateServer:
-    """Replaces rclpy's action client; its server answers when the test requests it."""
+    """Replaces rclpy's action client; its server responds when the test requests it."""
 
     def __init__(self, *_: object, **__: object) -> None:
         self.answered: list[Callable[[Any], None]] = []
@@ -408,7 +408,7 @@ def test_client_of_rclpy_that_the_executor_sees_too_early_has_a_lock(monkeypatch
         _lock: threading.Lock
 
         def __init__(self, *_: object, **__: object) -> None:
-            # As in rclpy: from here on the executor's thread calls it.
+            # As in rclpy, the executor's thread may call it from here on.
             with self._lock:
                 pass
             self._lock = threading.Lock()
@@ -423,7 +423,7 @@ def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
         _logger: Any
 
         def __init__(self, *_: object, **__: object) -> None:
-            # As in rclpy: from here on the executor's thread calls it.
+            # As in rclpy, the executor's thread may call it from here on.
             self._logger.debug("a goal")
 
     monkeypatch.setitem(sys.modules, "rclpy", SimpleNamespace())
@@ -438,7 +438,7 @@ def test_server_of_rclpy_that_the_executor_sees_too_early_has_a_logger(
 
 
 def test_server_of_rclpy_is_destroyed_once_results_are_sent(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Sending a result takes several rounds of the executor: destroying the server earlier leaves its client waiting."""
+    """Sending a result takes several iterations of the executor. If the server is destroyed earlier, its client hangs."""
     monkeypatch.setattr("minirospy.ros2.rclpy_actions.CLOSE_SECONDS", LIMIT)
     order: list[str] = []
     tasks: queue.Queue[Callable[[], object] | None] = queue.Queue()

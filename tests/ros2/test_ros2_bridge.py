@@ -1,4 +1,4 @@
-"""The ROS 2 bridge with a fake backend in place of rclpy: opening, closing, forwarding; the pure parts; the command."""
+"""The ROS 2 bridge with a fake backend in place of rclpy: opening, closing and forwarding; its pure parts; the command."""
 
 from __future__ import annotations
 
@@ -234,7 +234,7 @@ class FakeSubscription:
 
 @dataclass
 class FakeProbe:
-    """Requests without effect, which are answered while ``answers`` is true."""
+    """No-op requests, which are answered while ``answers`` is true."""
 
     answers: bool = True
     is_ready: bool = True
@@ -253,7 +253,7 @@ class FakeProbe:
 
 @dataclass
 class FakeReachable:
-    """A client of ``servers``: if they can lose responses, ``prober`` reaches them; None if it is not needed."""
+    """A client of ``servers``. If these can lose responses, ``prober`` reaches them; otherwise it is None."""
 
     is_ready: bool = True
     servers: frozenset[bytes] | None = frozenset({b"1"})
@@ -265,7 +265,7 @@ class FakeReachable:
 
 @dataclass
 class FakeClient(FakeReachable):
-    """A client whose server answers with ``response``, or never."""
+    """A client whose server responds with ``response``, or never."""
 
     response: bytes | None = None
     requests: list[bytes] = field(default_factory=list)
@@ -326,7 +326,7 @@ class FakeActionServer:
     accept: Accept
     is_closed: bool = False
     closing: int = 0
-    may_close: threading.Event = field(default_factory=threading.Event)  # closing waits for it
+    may_close: threading.Event = field(default_factory=threading.Event)  # closing blocks until this is set
 
     def __post_init__(self) -> None:
         self.may_close.set()
@@ -357,7 +357,7 @@ class FakeSide:
     """A fake ROS 2 that the test controls."""
 
     domain = "0"
-    has_found_client = True  # whether a server's responses reach its clients
+    has_found_client = True  # set if a server's responses reach its clients
 
     def __init__(self) -> None:
         self.graph: dict[str, Ros2Topic] = {}
@@ -459,7 +459,7 @@ def bridged(scene: Callable[[Node, FakeSide, Ros2Bridge], Any], topics: NameFilt
 
 
 async def connected(bridge: Ros2Bridge, count: int = 1) -> None:
-    """Wait until the bridge's subscriptions are connected to ``count`` publishers: a refresh connects, too, and disconnects."""
+    """Wait until the bridge's subscriptions have ``count`` publishers; each refresh also connects, and disconnects again."""
 
     def found() -> int:
         return sum(len(each._subscription.headers) for each in bridge.topics.links.values())
@@ -536,7 +536,7 @@ def test_messages_pass_to_ros1_but_not_those_that_came_from_it() -> None:
 @pytest.mark.usefixtures("master")
 def test_messages_from_ros2_are_not_sent_back() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
-        # As another bridge to the same domain would publish it.
+        # Another bridge to the same domain would publish in this way.
         other = await node.advertise("/t", raw("std_msgs/Int8"), headers={"ros2_domain": "0"})
         side.graph["/t"] = Ros2Topic(subscribers=(Ros2End("/peer", "std_msgs/Int8"),))
         await bridge.look()
@@ -554,7 +554,7 @@ def test_messages_from_ros2_are_not_sent_back() -> None:
 
 @pytest.mark.usefixtures("master")
 def test_publishers_that_do_not_answer_keep_no_topic_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("minirospy.ros2.bridge.QUERY_SECONDS", 1.0)
+    monkeypatch.setattr("minirospy.ros2.bridge.QUERY_SECONDS", 0.1)
 
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
         topics = [f"/dead{number}" for number in range(40)]
@@ -596,7 +596,7 @@ def test_types_that_do_not_map_are_listed_with_the_reason() -> None:
 @pytest.mark.usefixtures("master")
 def test_link_that_cannot_be_opened_leaves_nothing_open() -> None:
     async def scene(node: Node, side: FakeSide, bridge: Ros2Bridge) -> None:
-        # Keep a reference: a subscription without one leaves the graph.
+        # Keep a reference, because a subscription without one leaves the graph.
         subscription = await node.subscribe_raw("/t", lambda *_: None)
         side.graph["/t"] = Ros2Topic(publishers=(STRING,))
 
@@ -698,7 +698,7 @@ def test_fast_dds_gets_room_for_images_unless_it_is_set_up_already() -> None:
 def test_without_rclpy_one_line_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # This also applies if ROS 2 is installed.
+    # Test without rclpy, even if ROS 2 is installed.
     monkeypatch.setitem(sys.modules, "rclpy", None)
     assert main([]) == 1
     said = capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Values in CDR by the fields of a type, compared with rosbags."""
+"""Values encoded in CDR by a type's fields, compared with rosbags."""
 
 from __future__ import annotations
 

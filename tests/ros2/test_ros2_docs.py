@@ -1,4 +1,4 @@
-"""The table of types in docs/ros2.md matches the rules and definitions."""
+"""The table of types in docs/ros2.md matches the rules and the definitions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""ROS 1 messages to CDR and back, compared with rosbags, another implementation."""
+"""ROS 1 messages converted to CDR and back, compared with rosbags, an independent implementation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from minirospy.ros2.rules import BUILT_IN
 from tests.core.idl.test_codec import fill, full_texts, messages, serialized
 from tests.ros2.ros2_definitions import catalogue, ros2_lookup, typestore
 
-# Excluded, and tested separately below: rosbags does not convert them, or ROS 2 lacks them.
+# These types are tested separately below, because rosbags does not convert them, or ROS 2 lacks them.
 SPECIAL = {"std_msgs/Time", "std_msgs/Duration", "sensor_msgs/BatteryState", "sensor_msgs/Range"}
 USUAL = (
     "std_msgs",
@@ -58,7 +58,7 @@ def messages_of(draw: st.DrawFn, name: str) -> Any:
 @pytest.mark.parametrize("name", OF_THE_USUAL_PACKAGES)
 def test_bytes_are_those_that_rosbags_makes(name: str) -> None:
     made = transcoder_of(name)
-    # ROS 1's definitions in addition to those of ROS 2, which has the same fields except for the header.
+    # Add ROS 1's definitions to those of ROS 2, which have the same fields except for the header.
     store = get_typestore(Stores.ROS2_JAZZY)
     ros2_name = name.replace("/", "/msg/")
 
@@ -89,7 +89,7 @@ def _has_header(name: str) -> bool:
 
 
 def as_ros2(specs: dict[str, MessageSpec]) -> dict[str, MessageSpec]:
-    """Return the specs in ROS 2's form."""
+    """Return the specs with ROS 2's names and fields."""
     times = {
         name: ros2_spec(name, {"sec": "int32", "nanosec": "uint32"})
         for name in ("builtin_interfaces/Time", "builtin_interfaces/Duration")
@@ -112,7 +112,7 @@ def transcoder_of_text(text: str) -> Transcoder:
 
 
 def cdr_of(message: Any, order: str) -> bytes:
-    """Return a message as CDR, field by field: the slow, readable oracle."""
+    """Return a message as CDR, field by field, as a slow but readable reference."""
     out = bytearray()
 
     def number(letter: str, value: Any) -> None:
@@ -219,7 +219,7 @@ def test_options_of_the_header_are_written_and_ignored() -> None:
 
 
 def test_a_large_message_is_copied_once() -> None:
-    # One slice of the source, which is not a copy, joined with the data before it.
+    # The result joins one slice of the source, which is not a copy, with the data before it.
     made = transcoder_of("sensor_msgs/Image")
     image = message_class("sensor_msgs/Image")(
         height=480, width=640, encoding="bgr8", step=1920, data=bytes(921_600)
@@ -389,7 +389,7 @@ def test_fields_are_mapped_by_name_whatever_their_order() -> None:
     mixed_ros1 = {name: reversed_spec(spec) for name, spec in specs.items()}
     lookup = specs.__getitem__
     made = transcoder(specs["p/M0"], lookup, mixed["p/M0"], mixed.__getitem__, BUILT_IN)
-    # The ROS 2 bytes equal those of a ROS 1 message with its fields in that order.
+    # The ROS 2 bytes must equal those of a ROS 1 message whose fields are in that order.
     oracle = transcoder(
         mixed_ros1["p/M0"], mixed_ros1.__getitem__, mixed["p/M0"], mixed.__getitem__, BUILT_IN
     )
@@ -413,7 +413,7 @@ def test_a_length_beyond_the_message_is_refused_before_its_elements_are_counted(
 
 
 def filled(text: str, count: int) -> bytes:
-    """Return a message of a definition with the fields of ORDERS, with arrays of ``count`` elements."""
+    """Return a message with the fields in ORDERS, and with arrays of ``count`` elements."""
     classes: Any = classes_from_text("p/M0", text)
     made = classes["p/M0"]()
     made.header.frame_id, made.header.stamp.secs = "map", 7

@@ -1,4 +1,4 @@
-"""Parameters of the ROS 2 bridge: names and values of both sides, and the services of ROS 1."""
+"""Parameters in the ROS 2 bridge: names and values on both sides, and the services in ROS 1."""
 
 from __future__ import annotations
 

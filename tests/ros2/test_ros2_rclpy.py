@@ -1,4 +1,4 @@
-"""The ROS 2 bridge in the thread of rclpy's executor, with classes in place of rclpy's."""
+"""The ROS 2 bridge in the thread of rclpy's executor, with fake classes in place of rclpy's."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_server_is_reached_by_the_parameters_of_its_own_process(monkeypatch: p
 
 
 def test_parameters_are_requested_until_the_first_response(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A node that has not discovered the client yet answers, but the response is lost."""
+    """A node that has not discovered the client yet responds, but the response is lost."""
     monkeypatch.setattr("minirospy.ros2.rclpy_parameters.AGAIN_SECONDS", 0.01)
     sent: list[tuple[bytes, Future[bytes]]] = []
 

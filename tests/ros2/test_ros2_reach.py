@@ -1,4 +1,4 @@
-"""Reaching a ROS 2 server before the actual request: the conditions, and the time limits."""
+"""Reaching a ROS 2 server before sending the actual request: the conditions and the time limits."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_requests_wait_ten_seconds_at_most_in_all() -> None:
         assert second.done()
         await asyncio.wait_for(reach.wait(), 1)
 
-        # Probing continues: responses of a server that was only busy still arrive eventually.
+        # Probing continues, because responses from a server that was only busy still arrive eventually.
         assert client.prober
         client.prober.answers = True
         await loop.advance(8)
@@ -88,7 +88,7 @@ def test_server_is_reached_after_a_silent_one_has_left() -> None:
         assert crashed
         reach.start()
         await loop.advance(10)
-        # The parameter services of a node that has left are never connected.
+        # The parameter services of a node that has left never become connected.
         other = client.prober = FakeProbe(answers=False)
         client.servers = frozenset({b"2"})
         waiting = asyncio.ensure_future(reach.wait())

@@ -1,4 +1,4 @@
-"""Services of the ROS 2 bridge with a fake backend in place of rclpy: offers, responses, refusals, and removal."""
+"""Services in the ROS 2 bridge with a fake backend in place of rclpy: offers, responses, rejections and removal."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_renamed_service_types_find_their_partner() -> None:
 
 @pytest.fixture(autouse=True)
 def _patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Send no request before the server is reachable."""
+    """Raise the limits, so that no request is sent before the server can be reached."""
     monkeypatch.setattr("minirospy.ros2.reach.MAX_SECONDS", LIMIT)
 
 
@@ -160,7 +160,7 @@ def test_the_first_call_waits_until_responses_of_the_server_arrive() -> None:
         client.prober.reaching[-1].set_result(None)
         assert await calling == b"\1\2\0\0\0ok"
 
-        # Waiting calls fail when the link is lost.
+        # Pending calls fail when the server is lost.
         client.servers = frozenset({b"2"})
         client.prober.answers = False
         calling = asyncio.ensure_future(call(node, "/set", b"\1"))
@@ -280,7 +280,7 @@ def test_a_time_limit_of_calls_that_is_no_time_is_refused(capsys: pytest.Capture
 
 @pytest.mark.usefixtures("master")
 def test_call_waits_longer_for_a_busy_server_than_a_probe(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hundreds of concurrent calls take long: none of them may fail for that reason."""
+    """Hundreds of concurrent calls take long, and none of them may fail for that reason."""
     monkeypatch.setattr(raw, "PROBE_SECONDS", 0.05)
     answer = serialize_header({"callerid": "/n", "md5sum": "0" * 32, "type": "a/B"})
 

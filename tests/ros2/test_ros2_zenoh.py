@@ -1,4 +1,4 @@
-"""The bridge over Zenoh with a session that writes rmw_zenoh's keys literally, through a router on this machine."""
+"""The bridge over Zenoh, with a session that writes rmw_zenoh's keys literally, through a router on this machine."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from tests.waiting import wait_until
 
 zenoh: Any = pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
 
-LIMIT = 60.0  # seconds after which a wait fails: far more than a busy machine takes
+LIMIT = 60.0  # seconds to wait for a state before failing: much longer than a busy machine takes
 CHATTER = f"0/chatter/std_msgs::msg::dds_::String_/{STRING_HASH}"
 SWITCH = f"0/switch/std_srvs::srv::dds_::SetBool_/{SERVICE_HASHES['std_srvs/SetBool']}"
 HELLO = bytes.fromhex("00010000 06000000 68656c6c6f00")
@@ -189,7 +189,7 @@ def test_messages_of_ros2_come_but_not_those_of_the_bridge(node: RmwNode, side: 
 def test_own_subscription_is_not_the_subscriber_that_is_waited_for(node: RmwNode, side: ZenohSide) -> None:
     side.subscribe("/chatter", "std_msgs/String", bytes, depth=7, is_reliable=True, is_latched=False)
     publisher = side.publisher("/chatter", "std_msgs/String", depth=7, is_latched=False)
-    # Its token is declared before messages reach it.
+    # Its token is declared before messages can reach it.
     node.end(1, "MS", CHATTER)
     wait_until(lambda: side.ends("/chatter").subscribers)
     assert publisher.subscribers == 0
@@ -206,10 +206,10 @@ def test_late_ros2_subscriber_receives_latched_messages(node: RmwNode, side: Zen
         publisher.publish(HELLO)
         return any(each.payload.to_bytes() == HELLO for each in there.queue)
 
-    # A subscriber that joins while the first message is in transit receives that, too.
+    # A subscriber that joins while the first message is in transit also receives that one.
     wait_until(has_passed)
     came: queue.Queue[Any] = queue.Queue()
-    # As rmw_zenoh declares a transient local subscriber.
+    # rmw_zenoh declares a transient local subscriber in this way.
     subscriber = zenoh.ext.declare_advanced_subscriber(
         node.session,
         CHATTER,
@@ -224,7 +224,7 @@ def test_late_ros2_subscriber_receives_latched_messages(node: RmwNode, side: Zen
 
 def test_kept_ros2_messages_reach_a_latched_subscription(node: RmwNode, side: ZenohSide) -> None:
     def latched(text: bytes) -> Any:
-        # As rmw_zenoh declares a transient local publisher.
+        # rmw_zenoh declares a transient local publisher in this way.
         made = zenoh.ext.declare_advanced_publisher(
             node.session,
             CHATTER,
@@ -270,7 +270,7 @@ def test_keys_of_humble_have_no_hash(node: RmwNode, side: ZenohSide) -> None:
     wait_until(lambda: publisher.subscribers)
     publisher.publish(HELLO)
     assert str(came.get(timeout=LIMIT).key_expr) == key
-    # A type that no endpoint has yet.
+    # Use a type that no endpoint has yet.
     side.serve("/switch", "std_srvs/SetBool", lambda _: Future())
     wait_until(lambda: any("dds_::SetBool_/TypeHashNotSupported" in each for each in node.tokens()))
 
@@ -358,7 +358,7 @@ def test_a_call_that_fails_without_place_for_the_reason_is_an_error(node: RmwNod
 
 
 class SlowNode:
-    """A node whose session sends nothing before ``released``; ``threads`` are the blocked ones."""
+    """A node whose session sends nothing before ``released`` is set; ``threads`` are the blocked ones."""
 
     def __init__(self) -> None:
         self.released = threading.Event()
@@ -478,7 +478,8 @@ def test_a_domain_has_no_zeros_in_front(endpoint: str, monkeypatch: pytest.Monke
     assert node.domain == "7"
 
 
-def test_without_a_router_one_line_says_what_to_start() -> None:
+def test_without_a_router_one_line_says_what_to_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("minirospy.zenoh.library.CONNECT_MS", 50)
     where = f"tcp/127.0.0.1:{free_port()}"
     with pytest.raises(BridgeError) as caught:
         ZenohNode("bridge", NetworkOptions((where,)))

@@ -1,4 +1,4 @@
-"""Actions and parameters of the bridge over Zenoh, and the topics of every robot, with a node that writes each byte itself.
+"""Actions and parameters in the bridge over Zenoh, and the topics of every robot, with a node that writes each byte itself.
 
 Its keys and messages are those of rcl_action, rmw_zenoh and the definitions of ROS 2 Kilted, whose hashes are here.
 """
@@ -55,7 +55,7 @@ SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wait longer than a machine may stall."""
+    """Raise the time limits above a machine's stalls."""
     for module, name in (("zenoh_actions", "CLOSE_SECONDS"), ("zenoh_parameters", "ANSWER_SECONDS")):
         monkeypatch.setattr(f"minirospy.ros2.{module}.{name}", LIMIT)
 
@@ -99,9 +99,9 @@ async def end_of(goal: Any) -> tuple[GoalState, list[int]]:
 
 
 class Server:
-    """A ROS 2 server of /fly: rejects a negative order, aborts 13, finishes 3 on request, and 7 when it is cancelled.
+    """A ROS 2 server of /fly. It rejects a negative order, aborts 13, finishes 3 on request, and finishes 7 when it is cancelled.
 
-    Feedback and result arrive by two routes: tests await a goal's feedback before the goal finishes.
+    Feedback and result use different routes, so tests await a goal's feedback before the goal finishes.
     """
 
     def __init__(self, node: RmwNode) -> None:
@@ -236,7 +236,7 @@ class Client:
         return code, [found[8 + 24 * each : 24 + 24 * each] for each in range(count)]
 
     def said(self, id: bytes) -> bytes:
-        """Return the next feedback of a goal."""
+        """Return the next feedback on a goal."""
         data = self.feedback.get(timeout=LIMIT).payload.to_bytes()
         assert data[4:20] == id
         return bytes(data[20:])
@@ -268,7 +268,7 @@ def test_goals_over_zenoh_reach_a_server_of_ros1(node: RmwNode, endpoint: str) -
         assert [client.said(id) for _ in range(3)] == [numbers(0), numbers(0, 1), numbers(0, 1, 2)]
         assert client.result(id) == (SUCCEEDED, numbers(0, 1, 2))
         client.until_status(id, SUCCEEDED)
-        # The result is kept for late clients, and a goal's id can be used only once.
+        # The result is stored for late clients, and a goal's id can be used only once.
         assert client.result(id) == (SUCCEEDED, numbers(0, 1, 2))
         assert not client.send(3, id)
         assert not client.send(-1)
@@ -316,7 +316,7 @@ VALUES.register(
         **get_types_from_msg("rcl_interfaces/Parameter[] parameters", "rcl_interfaces/msg/Parameters"),
     }
 )
-"""rosbags lacks the requests and responses of services, so register them."""
+"""Register the requests and responses of services, which rosbags lacks."""
 
 
 def text(value: str) -> bytes:
@@ -373,7 +373,7 @@ def test_parameters_of_ros1_are_those_of_the_bridge_over_zenoh(node: RmwNode, en
         refused = set_to("robot.speed", speed)
         assert refused[4] == 0
         assert b"does not fit into the 32 bits" in refused
-        # An invalid request is refused, and the next one is answered.
+        # An invalid request is rejected, and the next one gets a response.
         key = f"0/{BRIDGE_PREFIX}/get_parameters/rcl_interfaces::srv::dds_::GetParameters_"
         key += f"/{SERVICE_HASHES['rcl_interfaces/GetParameters']}"
         broken = called(node, key, HEADER + b"\xff\xff\xff\xff", attachment(1, 1, GID))

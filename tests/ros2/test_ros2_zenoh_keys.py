@@ -27,10 +27,10 @@ from tests.ros2.ros2_definitions import catalogue
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 SESSION = "aac3178e146ba6f1fc6e6a4085e77f21"
 NODE = f"@ros2_lv/0/{SESSION}/0/0/NN/%/%/listener"
-# The example of rmw_zenoh's docs/design.md.
+# This is the example in rmw_zenoh's docs/design.md.
 LISTENER = f"@ros2_lv/2/{SESSION}/0/10/MS/%/%/listener/%chatter/std_msgs::msg::dds_::String_/{STRING_HASH}/::,10:,:,:,,"
 
-# From the .json files next to the definitions of real ROS 2 Kilted.
+# These hashes are from the .json files next to the definitions in real ROS 2 Kilted.
 HASHES = {
     "std_msgs/Char": "RIHS01_3ad2d04dd29ba19d04b16659afa3ccaedd691914b02a64e82e252f2fa6a586a9",
 }
@@ -55,7 +55,7 @@ ACTION_HASHES = {
     "cancel_goal": "RIHS01_573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a",
     "status": "RIHS01_6c1684b00f177d37438febe6e709fc4e2b0d4248dca4854946f9ed8b30cda83e",
 }
-"""Hashes for the endpoints of an action of test_msgs/Fibonacci."""
+"""Hashes for the endpoints of an action with the type test_msgs/Fibonacci."""
 RULES = """
 - ros1_package_name: turtlesim
   ros1_message_name: Color
@@ -178,7 +178,7 @@ def test_hash_is_that_of_rmw_zenoh(size: int, digest: str) -> None:
 
 
 def test_ids_are_made_of_tokens() -> None:
-    # Computed with xxhash 4.1.0, as in pyzeros.
+    # This was computed with xxhash 4.1.0, as in pyzeros.
     assert gid_of(LISTENER).hex() == "76148a538308fe55a6c5375462ca1de6"
 
 
@@ -197,7 +197,7 @@ def test_hashes_are_those_of_rosbags() -> None:
         for package in catalogue().packages:
             for spec in catalogue().messages(package):
                 name = BUILT_IN.ros2_messages(spec.full_name)[0]
-                # rosbags uses char for its number, which ROS 2 maps to uint8: see below.
+                # rosbags treats char as a number, which ROS 2 maps to uint8; see below.
                 if (whole := name.replace("/", "/msg/")) in store.fielddefs and name != "std_msgs/Char":
                     assert found.hash(name) == store.hash_rihs01(whole), name
                     compared += 1

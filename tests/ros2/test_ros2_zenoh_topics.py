@@ -1,4 +1,4 @@
-"""Topics of every robot over Zenoh, in both directions: /tf, /tf_static, /clock, /rosout; compared with rosbags."""
+"""Topics of every robot over Zenoh, in both directions: /tf, /tf_static, /clock and /rosout, compared with rosbags."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ KEYS = {
     "/clock": "rosgraph_msgs::msg::dds_::Clock_/RIHS01_692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564",
     "/rosout": "rcl_interfaces::msg::dds_::Log_/RIHS01_e28ce254ca8abc06abf92773b74602cdbf116ed34fbaf294fb9f81da9f318eac",
 }
-"""Types and hashes of ROS 2 Kilted."""
+"""Types with their hashes in ROS 2 Kilted."""
 KEYS["/tf_static"] = KEYS["/tf"]
 TYPES = {
     "/tf": "tf2_msgs/TFMessage",
@@ -75,7 +75,7 @@ def to_ros1(data: bytes) -> bytes:
 
 
 class Ros1:
-    """The ROS 1 endpoints: a subscription to which nothing refers is closed."""
+    """The ROS 1 endpoints. References are kept, because a subscription to which nothing refers is closed."""
 
     def __init__(self, node: Node, bridge: Ros2Bridge) -> None:
         self.node = node
@@ -87,7 +87,7 @@ class Ros1:
         publisher = await self.node.advertise(topic, class_, latch=latch)
         self.kept.append(publisher)
         if not latch:
-            # A subscriber with the bridge's name may be the short connection that reads the header.
+            # A subscriber with the bridge's name may also be the short connection that reads the header.
             await until(lambda: self._is_bridged(topic))
         publisher.publish_raw(data)
         return publisher
@@ -130,7 +130,7 @@ def subscribe(node: RmwNode, topic: str, *, static: bool = False) -> queue.Queue
 
 
 def publish(node: RmwNode, topic: str, data: bytes, *, static: bool = False) -> None:
-    """Publish as rmw_zenoh does: to current subscribers, or also to later ones."""
+    """Publish as rmw_zenoh does, to current subscribers, or with ``static`` also to later ones."""
     node.end(len(node.kept), "MP", key_of(topic), STATIC if static else "::,10:,:,:,,")
     if static:
         publisher = zenoh.ext.declare_advanced_publisher(
@@ -158,7 +158,7 @@ def test_transforms_pass_both_ways_over_zenoh(node: RmwNode, endpoint: str) -> N
         ros1 = Ros1(other, bridge)
         came = await ros1.subscribe("/tf")
         await in_thread(publish, peer, "/tf", to_ros2(transforms("a", "b")))
-        # Messages of ROS 2 have no sequence number: it is zero.
+        # ROS 2 messages have no sequence number, so it is zero.
         assert await next_of(came) == transforms("a", "b")
 
         there = await in_thread(subscribe, peer, "/tf")

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_msgs.msg import UInt8MultiArray
 
 from minirospy.web import bridge as bridge_module
-from minirospy.web.server.connection import Limits
+from minirospy.web.server.client import Limits
 
 if TYPE_CHECKING:
     from tests.web.conftest import Running

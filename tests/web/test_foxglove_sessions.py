@@ -403,9 +403,12 @@ def test_simulated_time_is_sent_and_stamps_messages(master: str, run_bridge: Cal
 
     async def tick() -> None:
         await clock.wait_for_subscribers()
-        while bridge.bridge.node.now().secs != 5:
+
+        async def is_received() -> bool:
             await clock.publish(Time(5, 7))
-            await asyncio.sleep(0.01)
+            return bridge.bridge.node.now().secs == 5
+
+        await until(is_received)
 
     bridge.run(tick())
     assert client.next_binary(2) == struct.pack("<BQ", 2, 5_000_000_007)
@@ -505,9 +508,12 @@ def test_topic_subscribed_again_in_the_same_turn_goes_on(bridge: Running) -> Non
         graph.subscribe("/again", first)
         await publisher.wait_for_subscribers()
         exchange()
-        while not arrived.is_set():
+
+        async def is_received() -> bool:
             await publisher.publish(String("x"))
-            await asyncio.sleep(0.01)
+            return arrived.is_set()
+
+        await until(is_received)
         graph.unsubscribe("/again", second)
 
     bridge.run(asyncio.wait_for(wait(), 30))

@@ -28,8 +28,8 @@ from minirospy.base.errors import BridgeProtocolError
 from minirospy.base.times import Time
 from minirospy.web.rosbridge import conversion, png, protocol
 from minirospy.web.rosbridge.cbor import encode_cbor
-from minirospy.web.rosbridge.endpoint import RosbridgeEndpoint
 from minirospy.web.rosbridge.protocol import OperationError, StatusLevel, Subscribe
+from minirospy.web.rosbridge.shared import RosbridgeShared
 from minirospy.web.rosbridge.subscription import Budget, Fragments, Merged, Pacer, merge
 from tests.web.rosbridge_messages import MESSAGES
 
@@ -636,4 +636,4 @@ def test_id_that_is_a_long_list_is_refused() -> None:
 def test_only_messages_that_take_long_to_encode_are_large(
     size: int, compression: str, type_: str, quick: bool
 ) -> None:
-    assert RosbridgeEndpoint.is_quick(bytes(size), compression, type_) is quick
+    assert RosbridgeShared.is_quick(bytes(size), compression, type_) is quick

@@ -31,8 +31,8 @@ from minirospy.base.name_filter import NameFilter
 from minirospy.core.wire.tcpros import InterfaceType
 from minirospy.web.access import Access
 from minirospy.web.graph import Filters
-from minirospy.web.rosbridge import endpoint, png, protocol
-from minirospy.web.rosbridge.endpoint import RosbridgeOptions
+from minirospy.web.rosbridge import png, protocol, shared
+from minirospy.web.rosbridge.shared import RosbridgeOptions
 from tests.waiting import until, wait_until
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ def test_no_client_waits_for_the_large_message_of_another(bridge: Running) -> No
 def test_large_message_is_encoded_in_a_thread_while_others_are_served(
     bridge: Running, monkeypatch: pytest.MonkeyPatch, compression: str, fragment_size: int | None
 ) -> None:
-    encode, names = endpoint._encoded, list[str]()
+    encode, names = shared._encoded, list[str]()
     has_started, may_end = threading.Event(), threading.Event()
 
     def slow(topic: str, *arguments: Any) -> bytes:
@@ -176,11 +176,12 @@ def test_large_message_is_encoded_in_a_thread_while_others_are_served(
             may_end.wait(30)
         return encode(topic, *arguments)
 
-    monkeypatch.setattr(endpoint, "_encoded", slow)
+    monkeypatch.setattr(shared, "_encoded", slow)
     latched(bridge, "/large", String("a" * 100_000))
     latched(bridge, "/small", String("b"))
     fields = {"compression": compression, "fragment_size": fragment_size}
-    client, other = bridge.rosbridge(), bridge.rosbridge()
+    # They do not read all fragments, and so no close frame either.
+    client, other = (bridge.rosbridge(close_timeout=0.1) for _ in range(2))
     client.send(op="subscribe", topic="/large", **fields)
     assert has_started.wait(30)
     client.send(op="subscribe", topic="/small")
@@ -204,14 +205,14 @@ def test_large_message_is_encoded_in_a_thread_while_others_are_served(
 def test_client_may_leave_while_its_large_message_is_encoded(
     bridge: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    encode, has_started, may_end = endpoint._encoded, threading.Event(), threading.Event()
+    encode, has_started, may_end = shared._encoded, threading.Event(), threading.Event()
 
     def slow(*arguments: Any) -> bytes:
         has_started.set()
         may_end.wait(30)
         return encode(*arguments)
 
-    monkeypatch.setattr(endpoint, "_encoded", slow)
+    monkeypatch.setattr(shared, "_encoded", slow)
     latched(bridge, "/large", String("a" * 100_000))
     client = bridge.rosbridge()
     client.send(op="subscribe", topic="/large")
@@ -230,7 +231,7 @@ def test_large_service_calls_and_answers_are_converted_in_a_thread(bridge: Runni
     server.send(op="set_level", level="info")
     server.synchronize()
     names: list[str] = []
-    in_thread = bridge.bridge.rosbridge.in_thread
+    in_thread = bridge.bridge.rosbridge.shared.in_thread
 
     async def noting(work: Callable[[], Any]) -> Any:
         def noted() -> Any:
@@ -239,7 +240,7 @@ def test_large_service_calls_and_answers_are_converted_in_a_thread(bridge: Runni
 
         return await in_thread(noted)
 
-    bridge.bridge.rosbridge.in_thread = noting  # type: ignore[method-assign, assignment]
+    bridge.bridge.rosbridge.shared.in_thread = noting  # type: ignore[method-assign, assignment]
     client.send(op="call_service", service="/list", id="c")
     call = server.next("call_service")
     topics = [f"/topic{number}" for number in range(30_000)]

@@ -40,7 +40,7 @@ def test_publication_closed_while_it_is_registered_ends_cleanly(bridge: Running,
 def test_silent_nodes_do_not_delay_queries_of_others(
     bridge: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("minirospy.web.foxglove.channels.TYPE_SECONDS", 1.0)
+    monkeypatch.setattr("minirospy.web.foxglove.channels.TYPE_SECONDS", 0.1)
     bridge.publisher(bridge.node("talker"), "/chatter", String)
     with socket.create_server(("127.0.0.1", 0), backlog=200) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"

@@ -28,7 +28,8 @@ from minirospy.web.access import Access, Grant
 from minirospy.web.server import owners
 from minirospy.web.server.account import Account
 from minirospy.web.server.admission import Rank
-from minirospy.web.server.connection import Connection, Limits
+from minirospy.web.server.client import Limits
+from minirospy.web.server.connection import Connection
 from minirospy.web.server.pipe import Endpoints
 from minirospy.web.server.rate import ConnectionRate
 from minirospy.web.server.turns import FairTurns
@@ -788,7 +789,7 @@ def test_stuck_client_among_ten_loses_its_own_messages_alone(run_bridge: Callabl
     small = bridge.publisher(bridge.node("small"), "/small", String)
     clients = [bridge.client() for _ in range(9)]
     # This client subscribes and does not read.
-    stuck = bridge.client(max_queue=1)
+    stuck = bridge.client(max_queue=1, close_timeout=0.1)
     for client in (*clients, stuck):
         client.subscribe("/image", 1)
         client.subscribe("/small", 2)
@@ -822,7 +823,7 @@ def test_stuck_client_among_ten_loses_its_own_messages_alone(run_bridge: Callabl
 def test_disconnected_client_leaves_no_messages_in_memory(run_bridge: Callable[..., Running]) -> None:
     bridge = run_bridge(limits=Limits(silent_seconds=1000.0))
     publisher = bridge.publisher(bridge.node("camera"), "/image", UInt8MultiArray, queue_size=1000)
-    stuck = bridge.client(max_queue=1)
+    stuck = bridge.client(max_queue=1, close_timeout=0.1)
     stuck.subscribe("/image")
     bridge.run(publisher.wait_for_subscribers())
     (connection,) = bridge.bridge.listeners["foxglove"].connections

@@ -1,6 +1,6 @@
-"""The environment for tests of Windows' CPython under Wine.
+"""The environment for tests with Windows' CPython under Wine.
 
-`make windows` sets Wine up; without it these tests are skipped.
+`make windows` sets up Wine; without it, these tests are skipped.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def start(place: Path, environ: dict[str, str]) -> Iterator[Start]:
     yield start
     for run in runs:
         run.process.kill()
-    # Wine may keep a killed client's connection open: its virtual board would wait for it.
+    # Wine may keep a killed client's connection open, and its virtual board would wait for it.
     WINDOWS.stop_server()
     for run in runs:
         run.close()

@@ -1,4 +1,4 @@
-"""Helpers of the Windows tests: programs that run in Wine, the commands, and the files of a node."""
+"""Helpers for the Windows tests: programs that run in Wine, the commands, and a node's files."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
+from tests.waiting import wait_until
 from tests.windows.windows import Windows
 
 WINDOWS = Windows()
 
-SECONDS = 240.0  # a process takes seconds to start under Wine, and several times as many on a busy machine
+# seconds; a process takes some to start under Wine, and several times as many on a busy machine
+SECONDS = 240.0
 
 MANIFEST = """<package><name>pkg</name><version>1.0.0</version><description>d</description>
 <maintainer email="a@b.c">m</maintainer><license>BSD</license></package>"""
@@ -30,7 +31,7 @@ while not rospy.is_shutdown():
     rospy.sleep(0.05)
 """
 
-ESCAPED = r"Gr\xF6\xDFe"  # as rostopic prints it, in YAML
+ESCAPED = r"Gr\xF6\xDFe"  # the string as rostopic prints it in YAML
 
 WAIT = """#!/usr/bin/env python
 import rospy
@@ -52,7 +53,7 @@ class Run:
         self._reader.start()
 
     def until(self, *words: str) -> str:
-        """Read until all words were printed; return the output so far."""
+        """Read until all words have been printed; return the output so far."""
         end = time.monotonic() + SECONDS
         while not all(word in self.said for word in words):
             try:
@@ -65,7 +66,7 @@ class Run:
         return self.said
 
     def reaches(self, words: str) -> bool:
-        """Read until the words were printed; return False if the program exits before."""
+        """Read until the words have been printed; return False if the program exits before that."""
         while words not in self.said:
             line = self._lines.get(timeout=SECONDS)
             if not line:
@@ -92,7 +93,7 @@ class Run:
         """Kill the program."""
         self.process.kill()
         self.process.wait()
-        # The pipe is closed by its last process, including those that a launcher has started.
+        # The pipe is closed when its last process exits, including those that a launcher has started.
         self._reader.join(SECONDS)
         if self._reader.is_alive():
             pytest.fail(f"what it started still has its output:\n{self.said}")
@@ -110,11 +111,8 @@ Start = Callable[..., Run]
 
 
 def no_process_left() -> None:
-    """Wait until no Windows Python runs any more."""
-    end = time.monotonic() + SECONDS
-    while left := WINDOWS.processes():
-        assert time.monotonic() < end, [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in left]
-        time.sleep(0.2)
+    """Wait until no Windows Python is running."""
+    wait_until(lambda: not WINDOWS.processes(), SECONDS, "Windows processes run", pause=0.2)
 
 
 def command(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Windows' CPython under Wine: commands, nodes on both sides, launch files, workspaces, and leftovers of a killed launcher."""
+"""Windows' CPython under Wine: commands, nodes on both sides, launch files, workspaces, and killed launchers."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_first_evening_of_the_course(start: Start, environ: dict[str, str], plac
     assert run("minirospy", "board", "get", "2") == "1\n"
     server.close()
 
-    # A node with the same name.
+    # Start a node with the same name.
     start(command("rosrun"), "rpi_feros", "led_actuator.py")
     while "/button_state" not in run("rostopic", "list"):
         pass
@@ -61,7 +61,7 @@ def test_first_evening_of_the_course(start: Start, environ: dict[str, str], plac
 def test_nodes_of_linux_and_windows_exchange_messages(
     start: Start, environ: dict[str, str], place: Path, master: str
 ) -> None:
-    """With a master on Linux, in both directions; the string has an umlaut."""
+    """The master runs on Linux. Messages are sent in both directions; the string has an umlaut."""
     write_files(place, {"talker.py": TALKER})
     linux = {**os.environ, "ROS_MASTER_URI": master, "PYTHONUTF8": "1"}
     with subprocess.Popen([sys.executable, "talker.py", "_place:=Linux"], cwd=place, env=linux) as talker:
@@ -79,7 +79,7 @@ def test_nodes_of_linux_and_windows_exchange_messages(
 
 
 def test_launch_file_with_line_ends_of_windows(start: Start, place: Path, environ: dict[str, str]) -> None:
-    """All files have CRLF; a node respawns, another is required."""
+    """All files have CRLF; one node respawns, and another one is required."""
     stop = (
         "import sys, rospy\nrospy.init_node('x', anonymous=True)\nprint('stopped', flush=True)\nsys.exit(4)\n"
     )
@@ -98,7 +98,7 @@ def test_launch_file_with_line_ends_of_windows(start: Start, place: Path, enviro
     write_files(place / "pkg", {name: text.replace("\n", "\r\n") for name, text in files.items()})
     run = start(command("roslaunch"), "pkg", "a.launch")
     said = run.until("waiting", "process[a-2]", "[b-3] restarting process")
-    # The code page of the output has umlauts, and no arrows.
+    # The code page of the output contains umlauts, but no arrows.
     assert "waiting: Größe" in said
     assert r"Größe \u2192 1" in said
     run.close()
@@ -143,7 +143,7 @@ def test_bag(start: Start, place: Path, environ: dict[str, str]) -> None:
 
 @pytest.mark.parametrize("launcher", ["roslaunch", "rosrun", "minirospy"])
 def test_nothing_outlives_a_launcher_that_is_ended_by_force(launcher: str, start: Start, place: Path) -> None:
-    """Also while the launcher starts: kill it at different moments, also as its command's .exe."""
+    """The launcher is killed at different moments, also while it starts, and also as its command's .exe."""
     write_files(
         place / "pkg",
         {
@@ -158,7 +158,7 @@ def test_nothing_outlives_a_launcher_that_is_ended_by_force(launcher: str, start
         "minirospy": (["demo"], ["Starting", "pressed"]),
     }[launcher]
     for moment in moments:
-        # A board with a name outlives the process that started it; the demo's own must not.
+        # A board with a name outlives the process that started it, but the demo's own board must not.
         run = start(command(launcher), *words, MINIROSPY_BOARD="")
         run.until(moment)
         run.close()

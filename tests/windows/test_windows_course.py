@@ -1,4 +1,4 @@
-"""The workshop's first evening and later pages on Windows' CPython under Wine, with nodes of real ROS on the other side."""
+"""The workshop's first evening and later pages on Windows' CPython under Wine, with real ROS nodes on the other side."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ print("ready", flush=True)
 while not is_over.wait(0.5):
     cancel.publish(GoalID())
 """
-"""Cancels any goal repeatedly, until a result arrives."""
+"""Cancels all goals repeatedly until a result arrives."""
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def typed(environ: dict[str, str], place: Path) -> Typed:
 
 
 class Typed:
-    """Runs commands as in a student's other terminal, and returns their output."""
+    """Runs commands as in a second terminal of a student, and returns their output."""
 
     def __init__(self, environ: dict[str, str], folder: Path) -> None:
         self._environ = environ
@@ -52,7 +52,7 @@ class Typed:
         return said
 
     def wait_for_led(self, pin: int, level: int) -> None:
-        """Wait until an LED of the board has this level."""
+        """Wait until an LED on the board has this level."""
         while self("minirospy", "board", "get", str(pin)) != f"{level}\n":
             pass
 
@@ -90,7 +90,8 @@ def test_each_press_calls_the_service(start: Start, typed: Typed) -> None:
     client = start(listing("button_service_client.py"))
     while "/button_monitor" not in typed("rosnode", "list"):
         pass
-    # It watches the button a moment after it has registered, and ignores presses that follow within half a second.
+    # It starts to watch the button shortly after it has registered, and ignores presses that follow within half a
+    # second.
     while "Successfully changed LED state." not in client.available():
         typed("minirospy", "board", "press", "11")
         typed("minirospy", "board", "release", "11")
@@ -137,7 +138,10 @@ def test_recorded_messages_are_played(start: Start, place: Path, typed: Typed) -
 @pytest.mark.skipif(not (REAL_BIN / "rosmaster").exists(), reason="real ROS 1 is not installed: make interop")
 @pytest.mark.parametrize("direction", ["from Windows", "to Windows"])
 def test_nodes_of_real_ros_and_windows(direction: str, place: Path, environ: dict[str, str]) -> None:
-    """With rosmaster: four types, one of them an image of 6 MB, and a service; the bytes on both sides are equal."""
+    """The master is rosmaster.
+
+    Four types, one of them a 6 MB image, and a service are used; the bytes on both sides are equal.
+    """
     with running_master("rospy") as uri:
         here = {**environ, "ROS_MASTER_URI": uri}
 

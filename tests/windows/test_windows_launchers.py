@@ -1,4 +1,4 @@
-"""Killing launchers many times; and Ctrl-C in a console, as Wine delivers it."""
+"""Killing launchers many times, and Ctrl-C in a console, as Wine delivers it."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ if sys.platform != "win32":
 
 @pytest.mark.timeout(3000)
 def test_fifty_launches_ended_by_force_leave_no_process(start: Start) -> None:
-    """Run `minirospy demo`, five at a time; kill it while it starts, when its nodes work, and in between."""
+    """Run `minirospy demo`, five at a time; kill it while it starts, when its nodes are running, and in between."""
     killed = 0
     moments = itertools.cycle(MOMENTS)
     while killed < LAUNCHES:
         # Each has a separate board.
         runs = [start(command("minirospy"), "demo", MINIROSPY_BOARD="") for _ in range(TOGETHER)]
         for run in runs:
-            # On a very busy machine a demo may give up before its nodes work: that one does not count.
+            # On a very busy machine, a demo may give up before its nodes are running; it then does not count.
             killed += run.reaches(next(moments))
             run.close()
         no_process_left()

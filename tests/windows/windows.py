@@ -24,7 +24,9 @@ ROOT = Path(__file__).parents[2]
 FOLDER = Path(os.environ.get("MINIROSPY_WINDOWS", ROOT / "build" / "windows"))
 
 VERSION = "3.12"
-"""The newest for which there is a numpy that Wine 8 can load (1.26): later ones call functions that its ucrtbase lacks."""
+"""The newest version for which there is a numpy that Wine 8 can load (1.26); later ones call functions that Wine's ucrtbase
+lacks.
+"""
 
 PYTHON = r"C:\Python312"
 
@@ -59,15 +61,15 @@ class Windows:
         return (self.folder / "ready").exists()
 
     def setup(self) -> None:
-        """Set up Python with its packages, once, and install the wheel of this checkout."""
+        """Set up Python with its packages, once, and install this checkout's wheel."""
         if not self.is_ready:
             shutil.rmtree(self.folder, ignore_errors=True)
             self.folder.mkdir(parents=True)
-            # Otherwise a Wine without a screen waits for an answer to its questions.
+            # Without this, a Wine without a screen would wait for an answer to its questions.
             self._checked([_wine(), "wineboot", "-i"])
             self._checked([_wine(), "winecfg", "-v", "win10"])
             self._unpack_python()
-            # All in one call: a second call would replace numpy by its newest version.
+            # Install all of them in one call, because a second call would replace numpy by its newest version.
             wheels = [*WHEELS, *TEST_WHEELS]
             self._checked([*_PIP, "install", "-q", "--target", str(self.packages), *_FOR_WINDOWS, *wheels])
             (self.folder / "ready").touch()
@@ -83,8 +85,7 @@ class Windows:
     ) -> subprocess.Popen[bytes]:
         """Start a Windows program: ``.py`` files and options are run with python.exe.
 
-        Its streams are pipes; stdin is empty, or with ``has_input`` for the caller to close; or they are ``console``, a
-        Linux terminal.
+        Its streams are pipes, or ``console``, a Linux terminal. stdin is empty; with ``has_input`` the caller must close it.
         """
         command = (
             [_wine(), *words]
@@ -92,11 +93,12 @@ class Windows:
             else [_wine(), rf"{PYTHON}\python.exe", *words]
         )
         if console is not None:
-            # Make it the terminal of a new session, so that Ctrl-C in it is a signal for the programs that run there.
+            # Make this the terminal of a new session, so that Ctrl-C in it sends a signal to the programs that run
+            # there.
             command = ["setsid", "--ctty", *command]
         process = subprocess.Popen(
             command,
-            # Neither a file nor /dev/null: Python for Windows accepts neither as a standard stream in Wine.
+            # Do not use a file or /dev/null, because Python for Windows accepts neither as a standard stream in Wine.
             stdin=subprocess.PIPE if console is None else console,
             stdout=subprocess.PIPE if console is None else console,
             stderr=subprocess.STDOUT,
@@ -124,7 +126,7 @@ class Windows:
         return process.returncode, printed.decode("cp1252", "replace").replace("\r\n", "\n")
 
     def copy_tests(self) -> Path:
-        """Copy the tests of this checkout, without the package, since the installed one is tested. Return their folder."""
+        """Copy this checkout's tests without the package, because the installed one is tested. Return their folder."""
         folder = self.drive / "checkout"
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
@@ -135,12 +137,12 @@ class Windows:
         return folder
 
     def start_server(self) -> None:
-        """Start Wine's server and its services, which otherwise keep the streams of the first program open."""
+        """Start Wine's server and its services, which would otherwise keep the streams of the first program open."""
         self._quietly([_server(), "-p"])
         self._quietly([_wine(), "cmd", "/c", "exit"])
 
     def stop_server(self) -> None:
-        """Stop the server, and all programs of this Windows."""
+        """Stop the server, and all programs in this Windows installation."""
         self._quietly([_server(), "-k"])
 
     def path(self, path: Path) -> str:
@@ -181,7 +183,7 @@ class Windows:
             **kept,
             "WINEPREFIX": self._prefix,
             "WINEDEBUG": "-all",
-            # No windows that ask whether to download a browser, and no entries in Linux menus.
+            # Do not show windows that ask whether to download a browser, and create no entries in Linux menus.
             "WINEDLLOVERRIDES": "mscoree,mshtml,winemenubuilder.exe=",
             "WINEPATH": rf"{PYTHON};{PYTHON}\Scripts",
             **more,
@@ -215,7 +217,7 @@ class Windows:
         for path_file in self.python.glob("*._pth"):
             # The file would isolate Python from PYTHONPATH and from the script's folder.
             path_file.unlink()
-        # Wine 8 crashes in it; `platform` works without.
+        # Wine 8 crashes in this module, and `platform` works without it.
         (self.python / "_wmi.pyd").unlink()
 
     def _install_wheel(self) -> None:
@@ -258,9 +260,9 @@ _FOR_WINDOWS = ["--platform", "win_amd64", "--python-version", VERSION, "--only-
 
 
 def _printed_until_exit(process: subprocess.Popen[bytes], timeout: float) -> bytes:
-    """Return a process's output until it exits: the end of the stream may arrive late.
+    """Return a process's output until it exits, because the end of the stream may arrive late.
 
-    In Wine, unlike in Windows, child processes inherit its stderr: a virtual board, which outlives it.
+    In Wine, unlike in Windows, child processes inherit its stderr, for example a virtual board, which outlives it.
     """
     assert process.stdout
     file = process.stdout.fileno()
@@ -293,7 +295,7 @@ def _server() -> str:
 
 
 def main(words: list[str]) -> int:
-    """Run the command line's action."""
+    """Perform the action given on the command line."""
     windows = Windows()
     if words == ["setup"]:
         windows.setup()

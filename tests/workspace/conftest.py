@@ -23,7 +23,7 @@ class Scene:
     def package(
         self, name: str, cmake: str = "", depends: str = "", files: dict[str, str] | None = None
     ) -> Path:
-        """Write a package: the text of its CMakeLists.txt, its dependencies, its files."""
+        """Write a package, given the text of its CMakeLists.txt, its dependencies and its files."""
         folder = self.source / name
         folder.mkdir(parents=True)
         tags = "".join(f"<depend>{depend}</depend>" for depend in depends.split())

@@ -1,4 +1,4 @@
-"""The batch files as text: they were run in cmd.exe by hand; these checks cover the faults found there."""
+"""The batch files as text. They were run in cmd.exe by hand; these checks cover the faults that were found."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ def test_every_label_is_there(name: str) -> None:
     labels = set(re.findall(r"^:(\w+)", text, re.MULTILINE))
     called = re.findall(r"(?:goto |call :)(\w+)(?!\w*%)", text)
     assert set(called) <= labels | {"minirospy_"}
-    # Labels that are built from an argument.
+    # Some labels are built from an argument.
     if "minirospy_%~1" in text:
         assert {"minirospy_put", "minirospy_take"} <= labels
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_nothing_before_a_redirection_is_taken_for_its_number(name: str) -> None:
-    # `echo in C:\ws2>&2` writes `in C:\ws` to handle 2: so text that may end in a digit comes last.
+    # `echo in C:\ws2>&2` writes `in C:\ws` to handle 2, so text that may end in a digit must be last.
     for line in ALL[name].splitlines():
         assert not re.search(r"[%\w]>&2", line), line
 
 
 def test_the_own_folder_has_no_backslash_at_its_end() -> None:
-    # %~dp0 ends in a backslash: PYTHONPATH would contain C:\my ws\devel\\lib.
+    # %~dp0 ends in a backslash, so PYTHONPATH would contain C:\my ws\devel\\lib.
     assert "%~dp0\\" not in FILES["setup.bat"]
     assert 'in ("%~dp0.") do call :minirospy_workspace put "%%~fP"' in FILES["setup.bat"]
 

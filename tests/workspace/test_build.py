@@ -1,4 +1,4 @@
-"""catkin_make: plans, order, generated modules, relays, and one-line errors."""
+"""catkin_make: plans, build order, generated modules, relays, and one-line errors."""
 
 from __future__ import annotations
 
@@ -234,7 +234,7 @@ def test_the_ways_to_write_a_setup(scene: Scene, text: str) -> None:
 
 
 def test_programs_are_in_devel(scene: Scene) -> None:
-    """Scripts of setup.py are on PATH, as in catkin; scripts installed as Python programs are found by real rosrun."""
+    """Scripts in setup.py are on PATH, as in catkin; real rosrun finds scripts that are installed as Python programs."""
     lines = (
         "#!/usr/bin/env python3\nimport helper, sys\nprint(__name__, __file__, helper.VALUE, sys.argv[1:])\n"
     )
@@ -504,8 +504,6 @@ def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
         (folder / "setup.py").write_text(line)
         assert mistakes(scene).text == text
 
-    (folder / "CMakeLists.txt").unlink()
-    assert mistakes(scene).text == "package [p] has no CMakeLists.txt"
     (folder / "package.xml").write_text("<package>\n<name>p</nam></package>")
     error = mistakes(scene)
     assert isinstance(error, ManifestError)
@@ -524,7 +522,7 @@ def test_mistakes_in_files_of_a_package(scene: Scene) -> None:
     ],
 )
 def test_a_dependency_that_package_xml_lacks(scene: Scene, depends: str, cmake: str, text: str) -> None:
-    """As in catkin, exported dependencies must be declared."""
+    """Exported dependencies must be declared, as in catkin."""
     folder = scene.package("p", cmake, depends)
     error = mistakes(scene)
     assert error.file == str(folder / "CMakeLists.txt")
@@ -534,7 +532,7 @@ def test_a_dependency_that_package_xml_lacks(scene: Scene, depends: str, cmake: 
 
 
 def test_missing_package_with_a_similar_name_is_a_warning(scene: Scene) -> None:
-    """As in catkin, other packages of the workspace and the rest of this one are built."""
+    """The workspace's other packages and the rest of this one are built, as in catkin."""
     folder = scene.package("p", "find_package(catkin REQUIRED COMPONENTS\n std_msg)")
     scene.messages("q", {"msg/A.msg": "int8 a\n"})
 
@@ -619,7 +617,7 @@ def test_warnings(scene: Scene) -> None:
 
 
 def test_message_that_is_used_but_not_listed_is_found(scene: Scene) -> None:
-    """Found by its own package and by others, also if it uses another one; as in ROS, which generates no class for it."""
+    """Its own package and others find it, even if it uses another such message. ROS does the same, but generates no class."""
     first = (
         "find_package(catkin REQUIRED COMPONENTS rospy message_generation)\nadd_message_files(FILES A.msg)\n"
     )
@@ -643,7 +641,7 @@ def test_message_that_is_used_but_not_listed_is_found(scene: Scene) -> None:
     said = python(scene, "import p.msg, q.msg; print(p.msg.A().b[1].c.x, q.msg.A([p.msg.D(3)]).many[0].D)")
     assert said == "0 3\n"
 
-    # It counts as a source of the other messages.
+    # The message counts as a source of those that use it, so that a change to it is detected.
     assert not scene.build()["p"].changed
     (folder / "msg" / "C.msg").write_text("int8 y\n")
     assert scene.build()["p"].changed
@@ -653,7 +651,7 @@ def test_message_that_is_used_but_not_listed_is_found(scene: Scene) -> None:
 def test_large_package_reads_each_definition_a_few_times(
     scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Robot arm drivers have hundreds of services: the steps grow with their number, not with its square."""
+    """Robot arm drivers have hundreds of services, so the number of steps must be proportional to theirs, not to its square."""
     files = {f"srv/S{number}.srv": "---\n" for number in range(30)}
     files |= {f"action/A{number}.action": "---\n---\n" for number in range(10)}
     scene.messages("arm", files, "std_msgs actionlib_msgs")
@@ -696,7 +694,7 @@ def test_package_xml_that_catkin_would_refuse_is_a_warning(scene: Scene) -> None
 def test_cmake_lists_that_catkin_would_refuse_is_a_warning(
     scene: Scene, cmake: str, line: int, text: str
 ) -> None:
-    """It builds here, and warns the author before a robot with real ROS refuses it."""
+    """The package builds here, but its author is warned before a robot with real ROS rejects it."""
     parts = {
         "find": "find_package(catkin REQUIRED COMPONENTS message_generation)",
         "add": "add_message_files(FILES A.msg)",
@@ -715,7 +713,7 @@ def test_cmake_lists_that_catkin_would_refuse_is_a_warning(
 
 
 def test_a_package_of_another_build_is_left_out(scene: Scene) -> None:
-    """A ROS 2 package in the same repository has no CMakeLists.txt, or one of ament."""
+    """A ROS 2 package in the same repository has no CMakeLists.txt, or one for ament."""
     folder = scene.package("p", "ament_package(")
     file = folder / "package.xml"
     file.write_text(
@@ -723,20 +721,39 @@ def test_a_package_of_another_build_is_left_out(scene: Scene) -> None:
             "</package>", "<export><build_type>ament_cmake</build_type></export></package>"
         )
     )
-    report = scene.build()["p"]
-    assert report.warnings == (f"{file}:1: left out: it is built by [ament_cmake], not by catkin",)
-    assert report.made == ""
+    for _ in range(2):
+        report = scene.build()["p"]
+        assert report.warnings == (f"{file}:1: left out: it is built by [ament_cmake], not by catkin",)
+        assert report.made == ""
+        (folder / "CMakeLists.txt").unlink(missing_ok=True)
+
+
+def test_package_without_cmake_lists_is_left_out(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
+    folder = scene.package("copied", "")
+    (folder / "CMakeLists.txt").unlink()
+    warning = (
+        f"{folder / 'package.xml'}:1: package [copied] is left out: it has no CMakeLists.txt, of which `catkin_create_pkg` "
+        "writes an example"
+    )
+    reports = scene.build()
+    assert (reports["copied"].warnings, reports["copied"].made) == ((warning,), "")
+    assert reports["led_msgs"].made == "1 message"
+    assert python(scene, "import led_msgs.msg; print(led_msgs.msg.Led(number=1).number)") == "1\n"
+
+    assert catkin_make(["-C", str(scene.root)]) == 0
+    assert capsys.readouterr().err == f"WARNING: {warning}\n"
 
 
 def test_nothing_to_generate_is_no_error(scene: Scene) -> None:
-    """As in catkin: some third-party packages still have such a line."""
+    """catkin does the same, because some third-party packages still have such a line."""
     folder = scene.package("p", "find_package(catkin REQUIRED)\ngenerate_messages()")
     (warning,) = scene.build()["p"].warnings
     assert warning.startswith(f"{folder / 'CMakeLists.txt'}:4: generate_messages(): nothing to generate")
 
 
 def test_an_empty_list_of_files_is_empty(scene: Scene) -> None:
-    """FILES without a name adds none; without FILES, the complete folder is used."""
+    """FILES without a name adds no files; without FILES, the complete folder is used."""
     scene.package(
         "p",
         "add_message_files(DIRECTORY msg FILES A.msg)\nadd_service_files(DIRECTORY srv FILES ${NONE})\n"
@@ -790,7 +807,7 @@ def test_built_packages_are_usable_despite_a_faulty_one(
 
 
 def test_variables_of_cmake(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    """-DNAME=VALUE is visible in CMakeLists.txt; some names are catkin's own."""
+    """-DNAME=VALUE is visible in CMakeLists.txt; some names are reserved for catkin."""
     scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
     scene.package("p", 'option(LAMP "with a lamp" OFF)\nif(LAMP)\ncatkin_python_setup()\nendif()')
     words = ["-C", str(scene.root)]
@@ -845,7 +862,7 @@ def test_typed_wrong(
 
 
 def test_in_the_wrong_folder(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    """In src, in a subfolder of it, in devel: the error names the right folder."""
+    """In src, in a subfolder of src, and in devel, the error names the right folder."""
     scene.messages("led_msgs", {"msg/Led.msg": "int64 number\n"})
     assert catkin_make(["-C", str(scene.root)]) == 0
     for below in ("src", "src/led_msgs/msg", "devel"):
@@ -864,7 +881,7 @@ def test_not_in_the_package(scene: Scene, capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_ctrl_c_in_a_setup(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    """`catkin_make && roslaunch ...` stops; the next build does the rest."""
+    """`catkin_make && roslaunch ...` stops; the next build completes the rest."""
     folder = scene.package("tools", "catkin_python_setup()", "", {"setup.py": "raise KeyboardInterrupt\n"})
     words = ["-C", str(scene.root)]
     for command in (catkin_make, catkin_make_isolated):
@@ -888,6 +905,80 @@ def test_tests_are_run(scene: Scene, capfd: pytest.CaptureFixture[str]) -> None:
     (scene.source / "p" / "test" / "test_led.py").write_text("def test_led():\n    assert False\n")
     assert catkin_make(["-C", str(scene.root), "run_tests_p"]) == 1
     assert "Summary: 1 tests, 0 errors, 1 failures, 0 skipped" in capfd.readouterr().out
+
+
+def test_src_of_a_folder_above_is_no_workspace(scene: Scene) -> None:
+    """~/src is not the workspace of ~/project; it is that of ~/src/project."""
+    for name in ("project", "src/project"):
+        (scene.root / name).mkdir()
+    assert find_workspace(scene.root / "src" / "project") == find_workspace(scene.root) == scene.root
+    with pytest.raises(BuildError, match="not in a workspace"):
+        find_workspace(scene.root / "project")
+
+
+def test_a_macro_of_a_package_does_not_replace_catkins(scene: Scene) -> None:
+    """As dynamic_reconfigure in a workspace: its macro would run CMake's add_custom_command."""
+    scene.package(
+        "p",
+        "include(cmake/own.cmake)\nfind_package(catkin REQUIRED COMPONENTS message_generation)\n"
+        "add_message_files(FILES A.msg)\nall_of_them()",
+        "message_generation",
+        {
+            "msg/A.msg": "int8 a\n",
+            "cmake/own.cmake": "macro(generate_messages)\n add_custom_command(OUTPUT x COMMAND y)\nendmacro()\n"
+            "macro(all_of_them)\n generate_messages()\nendmacro()\n",
+        },
+    )
+    assert scene.build()["p"].made == "1 message"
+
+
+def test_files_that_cmake_makes_are_not_installed(scene: Scene) -> None:
+    scene.package(
+        "p",
+        "configure_file(a.in ${CATKIN_DEVEL_PREFIX}/a)\ninstall(FILES ${CATKIN_DEVEL_PREFIX}/a DESTINATION x)\n"
+        "install(FILES $<TARGET_FILE:p> ${PROJECT_BINARY_DIR}/b DESTINATION x)",
+    )
+    assert catkin_make(["-C", str(scene.root), "install"]) == 0
+
+
+def test_downloads(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    source = scene.root / "data.txt"
+    source.write_text("some data")
+    md5 = "1e50210a0202497fb79bc38b6ade6c34"
+    url = source.as_uri()
+    scene.package(
+        "p",
+        f"catkin_download(p_data {url} FILENAME a.txt MD5 {md5})\n"
+        f"catkin_download_test_data(p_test {url} DESTINATION ${{CATKIN_DEVEL_PREFIX}}/share/p MD5 {md5})\n"
+        f"catkin_download(p_none {url}.none)",
+    )
+    made, tested = scene.root / "build" / "p" / "a.txt", scene.devel / "share" / "p" / "data.txt"
+    assert catkin_make(["-C", str(scene.root)]) == 0
+    said = capsys.readouterr().out
+    assert f"Downloading {url} to {made}... done.\n" in said
+    assert f"Downloading {url}.none to {made.with_name('data.txt.none')}... failed (" in said
+    assert made.read_text() == "some data"
+    assert not tested.exists()
+
+    made.write_text("changed")
+    assert catkin_make(["-C", str(scene.root), "run_tests"]) == 0
+    assert (made.read_text(), tested.read_text()) == ("some data", "some data")
+
+    capsys.readouterr()
+    assert catkin_make(["-C", str(scene.root)]) == 0
+    assert f"to {made}..." not in capsys.readouterr().out
+
+    source.write_text("other data")
+    made.unlink()
+    assert catkin_make(["-C", str(scene.root)]) == 1
+    assert f"{url} has another MD5 sum than {md5}" in capsys.readouterr().err
+
+
+def test_download_that_is_required(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = scene.package("p", f"catkin_download(p_data {scene.root.as_uri()}/none REQUIRED)")
+    assert catkin_make(["-C", str(scene.root)]) == 1
+    line = f"{folder / 'CMakeLists.txt'}:3: cannot download {scene.root.as_uri()}/none: "
+    assert line in capsys.readouterr().err
 
 
 def test_install(scene: Scene) -> None:
@@ -951,7 +1042,7 @@ def test_install(scene: Scene) -> None:
 
 
 def test_missing_files_are_errors_of_install_only(scene: Scene, capsys: pytest.CaptureFixture[str]) -> None:
-    """As in CMake: a package whose install rules list files that do not exist builds."""
+    """As in CMake, a package whose install rules list missing files can still be built."""
     folder = scene.package("p", "install(DIRECTORY lanch\n DESTINATION share)", "", {"launch/x.launch": ""})
     assert catkin_make(["-C", str(scene.root)]) == 0
     assert catkin_make(["-C", str(scene.root), "install"]) == 1

@@ -12,7 +12,7 @@ from minirospy.workspace.manifest import Manifest, parse_manifest
 
 
 def manifest(name: str, *tags: str) -> Manifest:
-    """Return a package.xml of format 2; a tag is like ``exec:other`` for ``<exec_depend>other</exec_depend>``."""
+    """Return a package.xml in format 2; a tag such as ``exec:other`` stands for ``<exec_depend>other</exec_depend>``."""
     needs = [
         (f"{kind}_depend".strip("_"), other)
         for kind, _, other in (tag.partition(":") for tag in tags)

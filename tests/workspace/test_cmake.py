@@ -101,7 +101,7 @@ def test_brackets_that_do_not_close_are_searched_for_once_a_level() -> None:
     text = Text("set(" + "[=[ [[ #[==[ \n" * 1000 + "]==] \n")
     words = [match["word"] for match, _ in cmake._tokens(text, "CMakeLists.txt") if match["word"]]
     assert words[:3] == ["set", "[=[", "[["]
-    # Every "[==[" is closed behind it all: the first one is a comment up to there.
+    # Every "[==[" is closed only at the end, so the first one is a comment up to that point.
     assert len(words) == 3
     assert Text.searches == 3
 

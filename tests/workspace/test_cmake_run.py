@@ -1,4 +1,4 @@
-"""The evaluation of CMakeLists.txt: conditions, loops, variables, and included files."""
+"""The evaluation of CMakeLists.txt: conditions, loops, variables and included files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def run(folder: Path, text: str, **variables: str) -> list[Command]:
 
 
 def said(folder: Path, text: str, **variables: str) -> list[str]:
-    """Return the arguments of each `f(...)` that is run, joined."""
+    """Return the arguments of each `f(...)` that is run, joined to a string."""
     return [" ".join(each.arguments) for each in run(folder, text, **variables) if each.name == "f"]
 
 
@@ -101,7 +101,7 @@ def test_commands_that_set_a_variable(tmp_path: Path, text: str, value: str) -> 
 )
 def test_conditions(tmp_path: Path, condition: str, holds: bool) -> None:
     text = (
-        "find_package(catkin REQUIRED COMPONENTS rospy)\nfind_package(Boost)\nfind_package(rostest)\n"
+        "find_package(catkin REQUIRED COMPONENTS rospy)\nfind_package(Boost QUIET)\nfind_package(rostest)\n"
         "set(SET text)\nset(OFFED off)\nset(N 1)\n"
         f"set(LIST one two)\nif({condition})\n f(yes)\nelse()\n f(no)\nendif()"
     )
@@ -133,16 +133,16 @@ def test_loop_over_too_many_numbers_is_refused(tmp_path: Path, stop: str) -> Non
 
 
 def test_macros(tmp_path: Path) -> None:
-    """A macro's body runs only when it is called; a call knows its arguments."""
+    """A macro's body runs only when it is called, and the call passes its arguments."""
     text = (
-        "macro(Twice A)\n f(${A} ${ARGN} ${ARGC})\n return()\n f(never)\nendmacro()\n"
+        "macro(Twice A)\n f(${A} ${ARGN} ${ARGC})\nendmacro()\n"
         "function(unused)\n f(unused)\nendfunction()\ntwice(a b c)\nTWICE(d)\nf(${A}.)"
     )
     assert said(tmp_path, text) == ["a b c 3", "d 1", "."]
 
 
 def test_macro_sets_the_variable_that_an_argument_names(tmp_path: Path) -> None:
-    """A macro's arguments are not variables: `${NAME}` remains the argument even after a set() of that name."""
+    """A macro's arguments are not variables, so `${NAME}` remains the argument even after a set() of that name."""
     text = (
         'macro(Find NAME KIND)\n set(NAME "")\n set(INNER ${KIND})\n'
         " foreach(P IN ITEMS ${ARGN})\n  if(${KIND} STREQUAL k)\n   list(APPEND NAME x${P})\n  endif()\n endforeach()\n"
@@ -171,6 +171,43 @@ def test_subdirectory_sets_variables_of_its_parent(tmp_path: Path) -> None:
 def test_return_ends_the_file(tmp_path: Path) -> None:
     (tmp_path / "more.cmake").write_text("f(more)\nreturn()\nf(never)")
     assert said(tmp_path, "include(more.cmake)\nf(a)\nif(1)\n return()\nendif()\nf(b)") == ["more", "a"]
+
+
+def test_return_in_a_macro_ends_its_caller(tmp_path: Path) -> None:
+    """As in CMake, whose macros are text: in a function it ends the function, else the file."""
+    text = (
+        "macro(leave)\n f(leaves)\n return()\nendmacro()\nfunction(g)\n leave()\n f(never)\nendfunction()\n"
+        "g()\nf(goes on)\nforeach(I 1 2)\n leave()\nendforeach()\nf(never)"
+    )
+    assert said(tmp_path, text) == ["leaves", "goes on", "leaves"]
+
+
+def test_own_module_of_find_package(tmp_path: Path) -> None:
+    (tmp_path / "cmake").mkdir()
+    (tmp_path / "cmake" / "FindFoo.cmake").write_text(
+        "set(FOO_LIB x)\nmacro(of_foo)\n f(macro)\nendmacro()\n"
+        "find_package_handle_standard_args(Foo DEFAULT_MSG FOO_LIB)"
+    )
+    text = (
+        "list(APPEND CMAKE_MODULE_PATH ${CMAKE_CURRENT_SOURCE_DIR}/cmake)\nfind_package(Foo QUIET)\n"
+        "f(${Foo_FOUND} ${FOO_FOUND} ${FOO_LIB})\nof_foo()\nfind_package(Bar QUIET)\nf(${Bar_FOUND}.)"
+    )
+    variables = {"CMAKE_CURRENT_SOURCE_DIR": tmp_path.as_posix()}
+    assert said(tmp_path, text, **variables) == ["TRUE TRUE x", "macro", "."]
+
+
+@pytest.mark.parametrize(
+    "search", ["find_package(Eigen3)", "pkg_check_modules(EIGEN3 eigen3)", "pkg_search_module(EIGEN3 eigen3)"]
+)
+def test_missing_library_does_not_end_the_file(tmp_path: Path, search: str) -> None:
+    """Nothing is compiled with it: what the file says about Python counts."""
+    text = f"{search}\nif(NOT EIGEN3_FOUND)\n return()\nendif()\nf(goes on)"
+    assert said(tmp_path, text) == ["goes on"]
+
+
+def test_ros_2_is_not_found(tmp_path: Path) -> None:
+    text = "find_package(ament_cmake)\nif(ament_cmake_FOUND)\n f(ros2)\nelse()\n f(ros1)\nendif()"
+    assert said(tmp_path, text) == ["ros1"]
 
 
 def test_other_files(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def test_a_new_package(
 def test_name_against_the_conventions_is_a_warning(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """As in catkin_create_pkg, which has the same text."""
+    """catkin_create_pkg prints the same text."""
     monkeypatch.chdir(tmp_path)
     assert catkin_create_pkg(["MyPkg"]) == 0
     assert capsys.readouterr().err.startswith(

@@ -1,4 +1,4 @@
-"""workspace/elsewhere: the table of compiled packages, and where its texts appear."""
+"""workspace/elsewhere: the table of compiled packages, and where its texts are printed."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_unknown_names_have_no_advice() -> None:
 
 
 def test_packages_of_the_table_are_not_included() -> None:
-    # rqt_gui and rviz have programs of minirospy; their Python modules are those of Qt's windows.
+    # minirospy has programs of rqt_gui and rviz, but their Python modules belong to Qt windows.
     assert set(TABLE) & set(Packages.below(*built_in_roots()).names()) == {"rqt_gui", "rviz"}
 
 

@@ -1,4 +1,4 @@
-"""workspace/manifest: package.xml of formats 1, 2 and 3."""
+"""workspace/manifest: package.xml in formats 1, 2 and 3."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-""".cfg files of dynamic_reconfigure in a workspace: the modules that catkin_make generates."""
+"""dynamic_reconfigure's .cfg files in a workspace: the modules that catkin_make generates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""workspace/packages: locations of packages, and their programs."""
+"""workspace/packages: the locations of packages, and their programs."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_programs(tmp_path: Path) -> None:
     (scripts / "tool").write_text("#!/usr/bin/env python3\n")
     (scripts / "notes.txt").write_text("no program")
     found = packages(tmp_path)
-    # Python runs in this interpreter, with or without the executable bit.
+    # Python programs run with this interpreter, with or without the executable bit.
     assert found.find_executable("pkg", "node.py") == [sys.executable, str(scripts / "node.py")]
     assert found.find_executable("pkg", "tool") == [sys.executable, str(scripts / "tool")]
     assert "node.py" in found.executables("pkg")

@@ -1,4 +1,4 @@
-"""The PowerShell script as text: most machines that run these tests have no PowerShell."""
+"""The PowerShell script as text, because most machines that run these tests have no PowerShell."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_every_command_is_completed() -> None:
 
 
 def completed(*words: str, index: int | None = None) -> list[str]:
-    """Return the completions of the last word, with the call that ros.ps1 makes."""
+    """Return the completions of the last word, from the same call as in ros.ps1."""
     call = re.search(r"minirospy complete (\S+) \$index @words", ROS_PS1.read_text())
     assert call
     place = str(index or len(words) - 1)

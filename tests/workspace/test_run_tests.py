@@ -1,4 +1,4 @@
-"""`catkin_make run_tests`, `catkin test`: run the tests of CMakeLists.txt, with results in catkin's folders."""
+"""`catkin_make run_tests` and `catkin test`: run the tests listed in CMakeLists.txt, with results in catkin's folders."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_a_plan_has_what_the_files_name(scene: Scene) -> None:
 def test_folders_of_tests_are_the_working_directory(
     scene: Scene, capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """As in catkin's nosetests; a single file runs in the package's build folder."""
+    """catkin's nosetests does the same; a single file runs in the package's build folder."""
     record = (
         f"import os\ndef test_it():\n    open({str(tmp_path / 'log')!r}, 'a').write(os.getcwd() + '\\n')\n"
     )

@@ -1,4 +1,4 @@
-"""devel/setup.bash and similar files in real shells: variables, chains of workspaces, the workshop's chapter."""
+"""devel/setup.bash and similar files in real shells: variables, chains of workspaces, and the workshop's chapter."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def run(shell: str, script: str, home: Path, **variables: str) -> str:
 
 
 def variables(shell: str, script: str, home: Path, **given: str) -> dict[str, str]:
-    """Return the variables after a script."""
+    """Return the environment variables after a script has run."""
     said = run(shell, f"{script}\nenv", home, **given)
     found = dict(line.split("=", 1) for line in said.splitlines() if "=" in line)
     return {name: found[name] for name in NAMES if name in found}
@@ -70,7 +70,7 @@ def test_the_variables(scene: Scene, shell: str, ending: str) -> None:
     }
     once = f". '{scene.devel}/setup.{ending}'"
     assert variables(shell, once, scene.root) == expected
-    # Sourcing it twice adds nothing twice.
+    # Sourcing it twice adds nothing a second time.
     assert variables(shell, f"{once}\n{once}", scene.root) == expected
 
 
@@ -133,7 +133,7 @@ def test_workspaces_stand_on_one_another(scene: Scene, shell: str, ending: str) 
     above = type(scene)(scene.root / "above")
     above.build()
     write_set_up(above.devel, (above.source,), {"CMAKE_PREFIX_PATH": str(scene.devel)})
-    # A build in a shell that has not sourced the first workspace keeps it.
+    # The chain keeps the first workspace after a build in a shell that has not sourced it.
     write_set_up(above.devel, (above.source,), {})
     both = variables(shell, f". '{above.devel}/setup.{ending}'", scene.root)
     assert both["CMAKE_PREFIX_PATH"] == f"{above.devel}:{scene.devel}"

@@ -1,4 +1,4 @@
-"""workspace/shell: the functions and TAB in real shells; a shell that is not installed is skipped."""
+"""workspace/shell: the functions and TAB in real shells. A shell that is not installed is skipped."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Result(NamedTuple):
 
 @cache
 def dotfiles() -> Path:
-    """Return the folder of zsh's completion cache: shared by all tests, as filling it takes a second."""
+    """Return the folder of zsh's completion cache, which all tests share because filling it takes a second."""
     folder = tempfile.TemporaryDirectory()
     atexit.register(folder.cleanup)
     return Path(folder.name)
@@ -290,7 +290,7 @@ def test_the_stack_has_no_such_number(shell: Shell) -> None:
 
 
 def bash_tab(bash: Shell, line: str, words: list[str] | None = None, at: int | None = None) -> list[str]:
-    """Return bash's completions for TAB at the end of ``line``, or ``at``; ``words``: as bash splits the line."""
+    """Return bash's completions for TAB at the end of ``line``, or at ``at``. ``words`` is the line as bash splits it."""
     words = line.split(" ") if words is None else words
     current = len(words if at is None else line[:at].split(" ")) - 1
     done = bash.run(
@@ -337,7 +337,7 @@ def test_bash_inserts_a_message(bash: Shell) -> None:
 
 
 def test_bash_completes_at_the_cursor(bash: Shell) -> None:
-    # The cursor is before another word: no space is added.
+    # The cursor is before another word, so no space is added.
     assert bash_tab(bash, "rosrun my_robot ta --rate 5", at=len("rosrun my_robot ta")) == ["talker.py"]
     assert bash_tab(bash, "rosrun my_robot talker.py", at=len("rosrun my_robot ta")) == ["talker.py"]
 
@@ -347,7 +347,7 @@ def test_bash_completes_behind_a_break(bash: Shell) -> None:
     words = ["roslaunch", "my_robot", "all.launch", "name", ":="]
     assert bash_tab(bash, line, words) == ["a\\ robot "]
     assert bash_tab(bash, line + '"a r', [*words, '"a r']) == ['a robot"']
-    # For users who removed the colon from COMP_WORDBREAKS.
+    # Some users have removed the colon from COMP_WORDBREAKS.
     assert bash_tab(bash, line, [*words[:-2], "name:", "="]) == ["a\\ robot "]
     assert bash_tab(bash, line, [*words[:-2], "name:="]) == ["name:=a\\ robot "]
     assert bash_tab(bash, "rosparam load --x=", ["rosparam", "load", "--x", "="]) == []
@@ -388,7 +388,7 @@ def zsh_or_skip(tmp_path: Path) -> Shell:
 
 def test_zsh_tab(tmp_path: Path) -> None:
     zsh = zsh_or_skip(tmp_path)
-    # Outside of its line editor zsh has no compadd: replace it by one that prints.
+    # Outside its line editor, zsh has no compadd, so replace it by a function that prints.
     script = """
     compadd() { for last; do :; done; for each in "${(@P)last}"; do print -r -- "$*:$each"; done }
     tab() { words=("$@"); CURRENT=${#words}; _ros_complete_zsh }
@@ -434,7 +434,7 @@ def test_fish_tab(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["bash", "zsh", "fish"])
 def test_tab_at_the_keyboard(name: str, tmp_path: Path) -> None:
-    """Run a shell in a terminal: press TAB and read the line."""
+    """Run a shell in a terminal, press TAB, and read the line."""
     import pty
     import select
 
@@ -460,7 +460,7 @@ def test_tab_at_the_keyboard(name: str, tmp_path: Path) -> None:
     try:
         source = SHELL / ("ros.fish" if name == "fish" else "ros.bash")
         ready = "math 6 x 7" if name == "fish" else "echo $((6 * 7))"
-        # Wait for the output, not its echo: from then on the line editor reads.
+        # Wait for the output, not its echo; from then on, the line editor reads.
         os.write(keyboard, f"source {source}\n{ready}\n".encode())
         read_until(b"42")
         message = rb"data:\ false" if name == "fish" else b'"data: false"'

@@ -308,10 +308,8 @@ def _list_text(values: Sequence[object], indent: str, options: _Options) -> str:
         return "[" + ", ".join(_number_or_text(value, width) for value in values) + "]"
     if isinstance(first, str):
         return "".join(f"\n{indent}{line}" for line in _items(values))
-    if isinstance(first, TVal) or is_message(first):
-        inner = indent + "  "
-        return "".join(f"\n{indent}- {strify_message(value, inner, *options)}" for value in values)
-    return "".join(f"\n{indent}- {strify_message(value, '', *options)}" for value in values)
+    inner = indent + "  "
+    return "".join(f"\n{indent}- {strify_message(value, inner, *options)}" for value in values)
 
 
 def _time_text(value: TVal, indent: str, offset: Time | None, width: int | None) -> str:
@@ -333,6 +331,8 @@ def _number_or_text(value: object, width: int | None) -> str:
     """Return an item as text; the list's first item is a number, but the list may also contain strings."""
     if isinstance(value, str):
         return repr(value) if width is None else _quoted(value)
+    if value is None:
+        return "None"
     return _number(value, width)
 
 

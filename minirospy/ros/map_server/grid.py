@@ -44,7 +44,7 @@ class MapError(MinirospyError):
 
 
 class Mode(Enum):
-    """How gray levels are converted to occupancies."""
+    """The conversion of gray levels to occupancies."""
 
     TRINARY = "trinary"
     SCALE = "scale"

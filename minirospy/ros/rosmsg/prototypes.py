@@ -6,6 +6,7 @@ or list with more than four entries.
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import os
 import sys
@@ -222,26 +223,36 @@ def prototype(args: Sequence[str]) -> str | None:
 def _instance(mode: str, name: str) -> object:
     """Return a message or a service's request with default values."""
     from minirospy.ros.roslib.roslib.message import get_message_class, get_service_class
-    from minirospy.ros.rosmsg.rosmsg import MODE_MSG, MODE_SRV, rosmsg_search
 
     if "/" not in name:
-        found = list(rosmsg_search(None, mode, name)) if mode in (MODE_MSG, MODE_SRV) else []
-        if mode not in (MODE_MSG, MODE_SRV):
-            raise ValueError(f"Unknown mode for iterate_packages: {mode}")
-        if len(found) != 1:
-            raise RosMsgProtoException(f"{'Ambiguous' if found else 'Unknown'} message name {name}")
-        (name,) = found
-    if mode == MODE_SRV:
+        name = _only_type(mode, name)
+    if mode == ".srv":
         service = get_service_class(name)
         if service is None:
             raise RosMsgProtoException(f"Unknown service class: {name}")
         return service._request_class()
-    if mode != MODE_MSG:
+    if mode != ".msg":
         raise RosMsgProtoException(f"Invalid mode: {mode}")
     message = get_message_class(name)
     if message is None:
         raise RosMsgProtoException(f"Unknown message class: {name}")
     return message()
+
+
+def _only_type(mode: str, name: str) -> str:
+    """Return the full name of the only type that is called ``name``."""
+    from minirospy.base.errors import NotFoundError
+    from minirospy.introspect.interfaces import Interfaces, Kind
+    from minirospy.workspace.packages import Packages
+
+    if mode not in (".msg", ".srv"):
+        raise ValueError(f"Unknown mode for iterate_packages: {mode}")
+    found: list[str] = []
+    with contextlib.suppress(NotFoundError):
+        found = list(Interfaces(Packages(), Kind(mode[1:])).find(name))
+    if len(found) != 1:
+        raise RosMsgProtoException(f"{'Ambiguous' if found else 'Unknown'} message name {name}")
+    return found[0]
 
 
 def _option_parser() -> Any:

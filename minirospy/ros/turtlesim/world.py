@@ -39,7 +39,7 @@ class WorldError(MinirospyError):
 
 
 class Velocity(NamedTuple):
-    """Metres per second forward and to the left, radians per second to the left."""
+    """A turtle's velocity: metres per second forward and to the left, radians per second to the left."""
 
     forward: float = 0.0
     left: float = 0.0

@@ -94,6 +94,8 @@ class Registrations:
 
         self._known: dict[_Key, _Part | None] = {}
         """The object registered with the master; None if the call failed or has no response yet."""
+        self._taken: set[_Key] = set()
+        """Services that another node has registered since: the master's entry is that node's."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
         self.watching: asyncio.Task[None] | None = None
@@ -144,16 +146,20 @@ class Registrations:
         self._answered = asyncio.get_running_loop().time()
         return answer
 
-    async def _look(self, method: str, name: str) -> None:
-        """Look up this node, or one of its services. Raise MasterUnreachableError or RpcError if the look-up fails."""
+    async def _look(self, method: str, name: str) -> object:
+        """Look up this node, or one of its services; return its address.
+
+        Raise MasterUnreachableError or RpcError if the look-up fails.
+        """
         try:
-            await asyncio.wait_for(self.call(method, name), _LOOK_SECONDS)
+            found: object = await asyncio.wait_for(self.call(method, name), _LOOK_SECONDS)
         except asyncio.TimeoutError as error:
             self._is_master_silent = True
             raise MasterUnreachableError(self._environment.master_uri) from error
         if self._closed:
             # Before Python 3.12 asyncio.wait_for may lose a cancellation that arrives together with the response.
             raise asyncio.CancelledError
+        return found
 
     def request_again(self, topic: str) -> None:
         """Register a subscription again, because the master's last list of publishers may be outdated."""
@@ -195,6 +201,7 @@ class Registrations:
             part = self._wanted(key)
             if part is not None and self._known.get(key) is not part:
                 self._known[key] = None
+                self._taken.discard(key)
                 await self._register(part, again=again)
                 self._known[key] = part
             elif part is None and key in self._known:
@@ -251,12 +258,15 @@ class Registrations:
             if not (self._known or any(self._tables.values())):
                 continue
 
-            known = [key for key, part in self._known.items() if part]
+            known = [key for key, part in self._known.items() if part and key not in self._taken]
             asked = next((key for key in known if key[0] == "Service"), known[0] if known else None)
             has_forgotten = False
             try:
                 if asked and asked[0] == "Service":
-                    await self._look("lookupService", asked[1])
+                    if await self._look("lookupService", asked[1]) != self.service_uri:
+                        # As in ROS, the node that registered it last has it; this entry shows nothing about this node.
+                        self._taken.add(asked)
+                        continue
                 else:
                     await self._look("lookupNode", self._name)
             except MasterUnreachableError as error:
@@ -291,6 +301,8 @@ class Registrations:
         """Register everything that the master is missing. Raise MasterUnreachableError if it does not respond."""
         keys = [(kind, name) for kind, table in self._tables.items() for name in table]
         for key in dict.fromkeys([*keys, *self._known]):
+            if key in self._taken and self._wanted(key):
+                continue
             # A registration that the master never accepts must not block the others.
             try:
                 await self.update(key, again=again)

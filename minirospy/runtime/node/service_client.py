@@ -123,6 +123,10 @@ class ServiceClient:
         """Abort a call in progress in another thread."""
         sockets.hang_up(self._sock)
 
+    def detach(self) -> socket.socket:
+        """Return the open socket, which from now on belongs to the caller."""
+        return self._sock
+
     def close(self) -> None:
         """Close the connection. Idempotent."""
         with contextlib.suppress(OSError):

@@ -334,6 +334,9 @@ class Subscription:
         # Links to publishers that have left the master's list, each with the timer that closes it.
         self._leaving: dict[str, tuple[InLink, asyncio.TimerHandle]] = {}
         self.on_connected: list[Callable[[], object]] = []  # called on the loop when a publisher is connected
+        self.on_ended: list[
+            Callable[[], object]
+        ] = []  # called on the loop when the connection to a publisher has ended
         self._closed = False
 
     @property
@@ -412,10 +415,17 @@ class Subscription:
         link = self._links.pop(uri, None)
         if link:
             link.close()
+            self._notify_ended()
         if uri in self._leaving:
             link, timer = self._leaving.pop(uri)
             timer.cancel()
             link.close()
+            self._notify_ended()
+
+    def _notify_ended(self) -> None:
+        if not self._closed:
+            for notify in self.on_ended.copy():
+                notify()
 
     def start_connecting(self, action: Connect) -> None:
         if action.uri in self._leaving:
@@ -568,8 +578,10 @@ class Subscription:
         if link.uri in self._leaving:
             _, timer = self._leaving.pop(link.uri)
             timer.cancel()
+            self._notify_ended()
             return
         del self._links[link.uri]
+        self._notify_ended()
         if link.returned:
             # The closed connection belonged to the publisher's previous registration; connect to its current one
             # immediately.

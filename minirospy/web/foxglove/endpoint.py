@@ -6,7 +6,7 @@ import asyncio
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from minirospy.base.clock import time_of_clock_message
 from minirospy.base.environment import DISTRO
@@ -16,14 +16,14 @@ from minirospy.web.foxglove import protocol, serializing
 from minirospy.web.foxglove.assets import Assets
 from minirospy.web.foxglove.channels import Channels, Services
 from minirospy.web.foxglove.parameters import Parameters
-from minirospy.web.foxglove.protocol import Channel, GraphTables, PlaybackControl, PlaybackState
+from minirospy.web.foxglove.protocol import Channel, GraphTables, Playback, PlaybackState
 from minirospy.web.foxglove.session import FoxgloveSession
 from minirospy.web.graph import Arrival, SharedGraph
 
 if TYPE_CHECKING:
-    from minirospy.web.server.connection import WebClient
+    from minirospy.web.server.client import WebClient
 
-__all__ = ["CAPABILITIES", "FoxgloveEndpoint", "FoxgloveOptions", "Playback"]
+__all__ = ["CAPABILITIES", "FoxgloveEndpoint", "FoxgloveOptions"]
 
 _log = logging.getLogger(__name__)
 
@@ -32,21 +32,6 @@ CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "services"
 
 _FOR_WRITERS = {"clientPublish", "services", "playbackControl"}
 _DROP_REPORT_SECONDS = 2.0
-
-
-class Playback(Protocol):
-    """A player that clients may control."""
-
-    @property
-    def range(self) -> tuple[int, int]:
-        """Return the start and end of the recording, in nanoseconds."""
-
-    def now(self) -> int:
-        """Return the current playback time, used as messages' timestamp."""
-
-    def state(self) -> PlaybackState: ...
-
-    def control(self, control: PlaybackControl) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -135,12 +120,6 @@ class FoxgloveEndpoint:
         if self.playback:
             found.append("playbackControl")
         return [each for each in found if client.may_write or each not in _FOR_WRITERS]
-
-    def send_graph(self, session: FoxgloveSession) -> None:
-        """Send the whole graph to a client."""
-        snapshot = self.graph.snapshot
-        tables = GraphTables(snapshot.publishers, snapshot.subscribers, snapshot.services)
-        session.send(serializing.connection_graph_update(tables, (), ()))
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
         """Replace a channel whose publisher uses a definition that differs from the installed type's."""

@@ -18,7 +18,7 @@ from minirospy.web.foxglove.endpoint import CAPABILITIES
 from minirospy.web.graph import Filters
 from minirospy.web.node_parameters import access_of, address_of, private_parameters, texts, value
 from minirospy.web.serve import announce, exit_status, run
-from minirospy.web.server.connection import Limits
+from minirospy.web.server.client import Limits
 
 __all__ = ["main", "options_of"]
 

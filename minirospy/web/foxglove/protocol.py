@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 __all__ = [
     "MESSAGE_ENCODING",
@@ -25,6 +25,7 @@ __all__ = [
     "GetParameters",
     "GraphTables",
     "Parameter",
+    "Playback",
     "PlaybackCommand",
     "PlaybackControl",
     "PlaybackState",
@@ -235,6 +236,21 @@ class PlaybackControl:
     speed: float
     seek: int | None
     request_id: str
+
+
+class Playback(Protocol):
+    """A player that clients may control."""
+
+    @property
+    def range(self) -> tuple[int, int]:
+        """Return the start and end of the recording, in nanoseconds."""
+
+    def now(self) -> int:
+        """Return the current playback time, used as messages' timestamp."""
+
+    def state(self) -> PlaybackState: ...
+
+    def control(self, control: PlaybackControl) -> None: ...
 
 
 Event = (

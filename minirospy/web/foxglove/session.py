@@ -7,7 +7,7 @@ import logging
 import sys
 from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from minirospy.base.errors import (
     BridgeError,
@@ -18,15 +18,26 @@ from minirospy.base.errors import (
 )
 from minirospy.core.wire.tcpros import ANY, InterfaceType
 from minirospy.web.foxglove import parsing, protocol, serializing
-from minirospy.web.foxglove.protocol import Channel, Event, Parameter, StatusLevel
-from minirospy.web.graph import Arrival, Publication
+from minirospy.web.foxglove.protocol import (
+    Channel,
+    Event,
+    GraphTables,
+    Parameter,
+    Playback,
+    PlaybackState,
+    StatusLevel,
+)
+from minirospy.web.graph import Arrival, Publication, SharedGraph
 from minirospy.web.server.files import FileAnswer
 
 if TYPE_CHECKING:
-    from minirospy.web.foxglove.endpoint import FoxgloveEndpoint
-    from minirospy.web.server.connection import WebClient
+    from minirospy.core.wire.header import Header
+    from minirospy.web.foxglove.assets import Assets
+    from minirospy.web.foxglove.channels import Channels, Services
+    from minirospy.web.foxglove.parameters import Parameters
+    from minirospy.web.server.client import WebClient
 
-__all__ = ["FoxgloveSession"]
+__all__ = ["FoxgloveServer", "FoxgloveSession"]
 
 _log = logging.getLogger(__name__)
 
@@ -47,10 +58,33 @@ _VALUE_FACTOR = 4
 _TIME = "time"  # key of time messages in a client's queue, so that only the newest one is kept
 
 
+class FoxgloveServer(Protocol):
+    """The endpoint, as the sessions of its clients use it."""
+
+    graph: SharedGraph
+    assets: Assets
+    playback: Playback | None
+    channels: Channels
+    services: Services
+    parameters: Parameters
+
+    def capabilities_of(self, client: WebClient) -> list[str]:
+        """Return a client's capabilities."""
+
+    def definition_differs(self, channel: Channel, header: Header) -> None:
+        """Replace a channel whose publisher's messages have another definition than the installed type."""
+
+    def playback_changed(self, state: PlaybackState) -> None:
+        """Send a player's state to all clients."""
+
+    def left(self, session: FoxgloveSession) -> None:
+        """Remove a client."""
+
+
 class FoxgloveSession:
     """One client's state. The client's connection calls it on the loop."""
 
-    def __init__(self, endpoint: FoxgloveEndpoint, client: WebClient) -> None:
+    def __init__(self, endpoint: FoxgloveServer, client: WebClient) -> None:
         self.client = client
         self.wants_graph = False
         self._endpoint = endpoint
@@ -334,7 +368,9 @@ class FoxgloveSession:
     def _subscribe_graph(self, _: protocol.SubscribeConnectionGraph) -> None:
         self._require("connectionGraph", "subscribing to the graph")
         self.wants_graph = True
-        self._endpoint.send_graph(self)
+        snapshot = self._graph.snapshot
+        tables = GraphTables(snapshot.publishers, snapshot.subscribers, snapshot.services)
+        self.send(serializing.connection_graph_update(tables, (), ()))
 
     def _unsubscribe_graph(self, _: protocol.UnsubscribeConnectionGraph) -> None:
         if not self.wants_graph:

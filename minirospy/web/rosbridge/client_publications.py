@@ -17,7 +17,7 @@ from minirospy.web.rosbridge.topic import MAX_IDS
 from minirospy.web.rosbridge.types import message_class
 
 if TYPE_CHECKING:
-    from minirospy.web.rosbridge.session import RosbridgeSession
+    from minirospy.web.rosbridge.operation import OperationSession
 
 __all__ = ["ClientPublications"]
 
@@ -40,7 +40,7 @@ class _Published:
 class ClientPublications:
     """The topics that one client publishes. Called with the client's operations in order."""
 
-    def __init__(self, session: RosbridgeSession) -> None:
+    def __init__(self, session: OperationSession) -> None:
         self.latched_size = 0
         """Total bytes of the stored messages of latched topics."""
         self._session = session
@@ -83,7 +83,7 @@ class ClientPublications:
         if published.latched > _LARGE_LATCHED:
             published.publication.close()
         else:
-            self._session.endpoint.release(published.publication)
+            self._session.shared.release(published.publication)
 
     def publish(self, event: protocol.Publish) -> Work | None:
         if not self._session.is_allowed("topics", event.topic, "topic, cancelling publish to"):
@@ -113,7 +113,7 @@ class ClientPublications:
         return self._publish_when_joined(published.publication, body)
 
     async def _publish_large(self, published: _Published, event: protocol.Publish) -> None:
-        body = await self._session.endpoint.in_thread(lambda: self._body(published, event))
+        body = await self._session.shared.in_thread(lambda: self._body(published, event))
         self._count_latched(published, body)
         await self._publish_when_joined(published.publication, body)
 

@@ -16,7 +16,7 @@ from minirospy.web.rosbridge.protocol import OperationError, StatusLevel
 from minirospy.web.rosbridge.services import ClientService, Response, call
 
 if TYPE_CHECKING:
-    from minirospy.web.rosbridge.session import RosbridgeSession
+    from minirospy.web.rosbridge.operation import OperationSession
 
 __all__ = ["ClientServices"]
 
@@ -29,7 +29,7 @@ _MAX_SERVICES = 200  # maximum services that one client offers
 class ClientServices:
     """The calls and services of one client. Called with the client's operations in order."""
 
-    def __init__(self, session: RosbridgeSession) -> None:
+    def __init__(self, session: OperationSession) -> None:
         self.calls_size = 0
         """Bytes of memory used by the calls in progress."""
         self._session = session
@@ -38,10 +38,10 @@ class ClientServices:
 
     def close(self) -> None:
         """Stop offering the client's services. Its calls are tasks of the session, which cancels them."""
-        endpoint = self._session.endpoint
-        for name, service in list(endpoint.services.items()):
-            if service.session is self._session:
-                endpoint.close_service(service, f"the client that offers {name} has disconnected")
+        shared = self._session.shared
+        for name, service in list(shared.services.items()):
+            if service.owner is self._session:
+                shared.close_service(service, f"the client that offers {name} has disconnected")
 
     def call_service(self, event: protocol.CallService) -> None:
         if not self._session.is_allowed("services", event.service, "service, cancelling service call for"):
@@ -65,12 +65,12 @@ class ClientServices:
         try:
             self._session.require_write("calling services")
             check_name("service", event.service)
-            in_thread = self._session.endpoint.in_thread if is_large else None
+            in_thread = self._session.shared.in_thread if is_large else None
             response = await call(self._session.graph, event.service, event.arguments, in_thread)
             messages = await self._encoded(event, response)
         except REFUSALS as error:
             messages = self._failed(event, str(error))
-            self._session.endpoint.log.warning(
+            self._session.shared.log.warning(
                 "[Client %s] call_service %s: %s", self._session.client.name, event.service, error
             )
         except Exception as error:  # noqa: BLE001 - the client waits for the answer, whatever happened here
@@ -80,20 +80,20 @@ class ClientServices:
 
     async def _encoded(self, event: protocol.CallService, response: Response) -> list[str | bytes]:
         """Return the messages that contain a response; a large response is encoded in a thread."""
-        endpoint = self._session.endpoint
-        size = event.fragment_size or endpoint.options.fragment_size
+        shared = self._session.shared
+        size = event.fragment_size or shared.options.fragment_size
 
         def encode(dump: Callable[[object], str]) -> list[str | bytes]:
             values = conversion.values(response.message())
             fields = protocol.service_response(event.service, values, event.id, result=True)
             return protocol.encode_messages(fields, event.compression, size, dump)
 
-        if endpoint.is_quick(response.data):
+        if shared.is_quick(response.data):
             return encode(dump_json)
-        return await endpoint.encode(lambda: encode(dump_json_in_pieces))
+        return await shared.encode(lambda: encode(dump_json_in_pieces))
 
     def _failed(self, event: protocol.CallService, text: str) -> list[str | bytes]:
-        size = event.fragment_size or self._session.endpoint.options.fragment_size
+        size = event.fragment_size or self._session.shared.options.fragment_size
         fields = protocol.service_response(event.service, text, event.id, result=False)
         return protocol.encode_messages(fields, event.compression, size)
 
@@ -105,20 +105,20 @@ class ClientServices:
         self._session.require_write("offering services")
         check_name("service", event.service)
         if (
-            sum(each.session is self._session for each in self._session.endpoint.services.values())
+            sum(each.owner is self._session for each in self._session.shared.services.values())
             >= _MAX_SERVICES
         ):
             raise BridgeError(f"a client may offer {_MAX_SERVICES} services")
         return self._offer(event)
 
     async def _offer(self, event: protocol.AdvertiseService) -> None:
-        if event.service in self._session.endpoint.services:
+        if event.service in self._session.shared.services:
             self._session.status(
                 StatusLevel.WARNING, f"Duplicate service advertised. Overwriting {event.service}.", event.id
             )
-        await self._session.endpoint.free_service(event.service, "Duplicate advertiser.")
-        self._session.endpoint.services[event.service] = ClientService(
-            self._session, self._session.graph, event.service, event.type
+        await self._session.shared.free_service(event.service, "Duplicate advertiser.")
+        self._session.shared.services[event.service] = ClientService(
+            self._session, self._session.send, self._session.graph, event.service, event.type
         )
         self._session.status(StatusLevel.INFO, f"Advertised service {event.service}.", event.id)
 
@@ -129,7 +129,7 @@ class ClientServices:
                 f"Service {event.service} has not been advertised via rosbridge, can't unadvertise.", event.id
             )
         why = f"Service {event.service} was unadvertised with a service call in progress"
-        closing = self._session.endpoint.close_service(service, why)
+        closing = self._session.shared.close_service(service, why)
         self._session.status(StatusLevel.INFO, f"Unadvertised service {event.service}.", event.id)
         return _ended(closing)
 
@@ -138,13 +138,13 @@ class ClientServices:
         if service is None:
             raise OperationError(f"Service {event.service} has not been advertised via rosbridge.", event.id)
         if self._session.is_large:
-            return service.answered_large(event, self._session.endpoint.in_thread)
+            return service.answered_large(event, self._session.shared.in_thread)
         service.answered(event)
         return None
 
     def _own_service(self, name: str) -> ClientService | None:
-        service = self._session.endpoint.services.get(name)
-        return service if service and service.session is self._session else None
+        service = self._session.shared.services.get(name)
+        return service if service and service.owner is self._session else None
 
 
 async def _ended(task: asyncio.Task[None]) -> None:

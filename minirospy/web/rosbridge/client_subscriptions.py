@@ -14,7 +14,7 @@ from minirospy.web.rosbridge.topic import ClientTopic
 from minirospy.web.rosbridge.types import message_class
 
 if TYPE_CHECKING:
-    from minirospy.web.rosbridge.session import RosbridgeSession
+    from minirospy.web.rosbridge.operation import OperationSession
 
 __all__ = ["ClientSubscriptions"]
 
@@ -22,7 +22,7 @@ __all__ = ["ClientSubscriptions"]
 class ClientSubscriptions:
     """One client's subscriptions, by topic. Called with the client's operations in order."""
 
-    def __init__(self, session: RosbridgeSession) -> None:
+    def __init__(self, session: OperationSession) -> None:
         self._session = session
         self._subscribed: dict[str, ClientTopic] = {}
 
@@ -70,7 +70,7 @@ class ClientSubscriptions:
             if len(self._subscribed) >= MAX_TOPICS:
                 raise BridgeError(f"a client may subscribe to {MAX_TOPICS} topics")
             topic = self._subscribed[event.topic] = ClientTopic(
-                self._session, self._session.endpoint, event.topic
+                self._session, self._session.shared, event.topic
             )
         topic.add(event)
         self._session.status(StatusLevel.INFO, f"Subscribed to {event.topic}", event.id)

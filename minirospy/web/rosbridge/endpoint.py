@@ -1,81 +1,21 @@
-"""The server for the rosbridge protocol: the state that all of its clients share."""
+"""The server for the rosbridge protocol: opens a session for each client."""
 
 from __future__ import annotations
 
-import asyncio
-import logging
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
-from minirospy.base.errors import BridgeError
-from minirospy.core.idl.protocols import Message
 from minirospy.introspect.snapshot import Changes
-from minirospy.runtime.transport.rate_limited_logger import RateLimitedLogger
-from minirospy.web.graph import Arrival, Publication, SharedGraph
-from minirospy.web.json_text import dump_json, dump_json_in_pieces
-from minirospy.web.rosbridge import conversion, png
-from minirospy.web.rosbridge.cbor import encode_cbor
-from minirospy.web.rosbridge.services import ClientService
+from minirospy.web.graph import SharedGraph
 from minirospy.web.rosbridge.session import RosbridgeSession
-from minirospy.web.rosbridge.types import ArrivingTypes
+from minirospy.web.rosbridge.shared import RosbridgeOptions, RosbridgeShared
 
 if TYPE_CHECKING:
-    from minirospy.web.server.connection import WebClient
+    from minirospy.web.server.client import WebClient
 
-__all__ = ["RosbridgeEndpoint", "RosbridgeOptions"]
+__all__ = ["RosbridgeEndpoint"]
 
 _SUBPROTOCOL = "rosbridge_v2"
-_LOG_LINES = 20
-
-# maximum bytes of a message that is encoded immediately; 8,000 numbers take 8 ms
-_MAX_QUICK_BODY = 64 * 1024
-# maximum bytes of an image that is encoded immediately; in base64 it takes 3 ms
-_MAX_QUICK_IMAGE = 1024 * 1024
-_IMAGES = {
-    "sensor_msgs/Image",
-    "sensor_msgs/CompressedImage",
-}  # types whose only array is the data, in base64 or typed
-
-_T = TypeVar("_T")
-
-
-@dataclass(frozen=True)
-class RosbridgeOptions:
-    """``fragment_timeout`` and ``unregister_timeout`` are in seconds.
-
-    ``fragment_size`` is the maximum number of characters in a message to clients; None disables fragments.
-    """
-
-    fragment_timeout: float = 600.0
-    unregister_timeout: float = 10.0
-    fragment_size: int | None = None
-    authenticate: bool = False
-
-
-class _LargeWork:
-    """Runs work on large messages in one thread, one piece of work at a time."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name  # name of the thread
-        self._thread: ThreadPoolExecutor | None = None  # created for the first work
-        self._is_busy = asyncio.Lock()
-
-    async def __call__(self, work: Callable[[], _T]) -> _T:
-        """Run ``work`` in the thread, and return its result."""
-        # Do not queue work in the executor: if a client leaves while its work waits here, the message is freed
-        # immediately.
-        async with self._is_busy:
-            if self._thread is None:
-                self._thread = ThreadPoolExecutor(1, self._name)
-            return await asyncio.get_running_loop().run_in_executor(self._thread, work)
-
-    def close(self) -> None:
-        """Stop the thread after the work in progress. Idempotent."""
-        if self._thread:
-            self._thread.shutdown(wait=False, cancel_futures=True)
-            self._thread = None
 
 
 class RosbridgeEndpoint:
@@ -88,23 +28,9 @@ class RosbridgeEndpoint:
         on_clients: Callable[[Sequence[RosbridgeSession]], object] = lambda _: None,
     ) -> None:
         """Create the endpoint. ``on_clients`` is called with the open sessions whenever a client connects or disconnects."""
-        self.graph = graph
-        self.options = options or RosbridgeOptions()
         self.sessions: list[RosbridgeSession] = []
-        self.services: dict[str, ClientService] = {}
-        """The services that clients offer, by name."""
-        self._closing: dict[str, asyncio.Task[None]] = {}
-        self.log = RateLimitedLogger(logging.getLogger(graph.node.log.name), _LOG_LINES)
-
-        self.in_thread = _LargeWork("rosbridge-large")
-        """Runs work on large messages from clients, which wait for each other."""
-        self.encode = _LargeWork("rosbridge-encode")
-        """Runs work on large messages to clients."""
-        self._types = ArrivingTypes()
-        self._encoded: dict[str, tuple[Arrival, dict[str, bytes]]] = {}
+        self.shared = RosbridgeShared(graph, options)
         self._on_clients = on_clients
-
-    # --- Endpoint
 
     def select(self, offered: Sequence[str]) -> str | None:
         """Return the sub-protocol to use, or None."""
@@ -112,128 +38,25 @@ class RosbridgeEndpoint:
 
     def open(self, client: WebClient) -> RosbridgeSession:
         """Start serving a client."""
-        session = RosbridgeSession(self, client)
+        session = RosbridgeSession(self.shared, client, self._left)
         if not self.sessions:
-            self.graph.watch(_ignore)
+            self.shared.graph.watch(_ignore)
         self.sessions.append(session)
         self._on_clients(self.sessions)
         return session
 
     def close(self) -> None:
         """Stop the threads after the work in progress. Idempotent."""
-        self.in_thread.close()
-        self.encode.close()
+        self.shared.close()
 
-    # --- for sessions
-
-    def left(self, session: RosbridgeSession) -> None:
+    def _left(self, session: RosbridgeSession) -> None:
         """Remove a client that has disconnected."""
         self.sessions.remove(session)
         if not self.sessions:
-            self.graph.unwatch(_ignore)
-            self._encoded.clear()
+            self.shared.graph.unwatch(_ignore)
+            self.shared.forget_messages()
         self._on_clients(self.sessions)
-
-    def release(self, publication: Publication) -> None:
-        """Release a publication after a delay, within which clients may advertise it again."""
-        asyncio.get_running_loop().call_later(self.options.unregister_timeout, publication.close)
-
-    def close_service(self, service: ClientService, why: str) -> asyncio.Task[None]:
-        """Start to close a client's service; return the task."""
-        name = service.name
-        del self.services[name]
-        task = self._closing[name] = self.graph.spawn(service.close(why))
-        task.add_done_callback(lambda _: self._closing.pop(name))
-        return task
-
-    async def free_service(self, name: str, why: str) -> None:
-        """Close the service that a client offers with this name, and wait until the name is free."""
-        while name in self.services or name in self._closing:
-            if name in self.services:
-                self.close_service(self.services[name], why)
-            await asyncio.wait([self._closing[name]])
-
-    def forget_topic(self, topic: str) -> None:
-        """Discard the encodings of a topic's last message."""
-        self._encoded.pop(topic, None)
-
-    def class_of(self, arrival: Arrival) -> type[Message] | None:
-        """Return the class for a received message, or None if its definition is unknown."""
-        return self._types.of(arrival.header)
-
-    @staticmethod
-    def is_quick(body: bytes | memoryview, compression: str = "none", type_: str = "") -> bool:
-        """Return whether a message can be encoded in a few milliseconds."""
-        if type_ in _IMAGES and compression != "png":
-            return len(body) <= _MAX_QUICK_IMAGE
-        return len(body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
-
-    def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
-        """Return a message as clients receive it, encoded once for all of them. Raise BridgeError if that is not possible."""
-        found = self._encodings(topic, arrival)
-        made = found.get(compression)
-        if made is None:
-            made = found[compression] = _encoded(topic, class_, arrival, compression, dump_json)
-        return made
-
-    async def encoded_large(
-        self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str
-    ) -> bytes:
-        """Return the same as :meth:`encoded`, but encode in a thread, so that only clients of this message wait."""
-        found = self._encodings(topic, arrival)
-
-        def encode() -> bytes:
-            # The encoding may have been created for another client in the meantime.
-            return found.get(compression) or _encoded(
-                topic, class_, arrival, compression, dump_json_in_pieces
-            )
-
-        if compression not in found:
-            found[compression] = await self.encode(encode)
-        return found[compression]
-
-    def _encodings(self, topic: str, arrival: Arrival) -> dict[str, bytes]:
-        """Return the existing encodings of a message, by compression."""
-        known = self._encoded.get(topic)
-        if known is None or known[0] is not arrival:
-            known = self._encoded[topic] = arrival, {}
-        return known[1]
 
 
 def _ignore(_: Changes) -> None:
     """Do nothing, because sessions look at the graph when they need it."""
-
-
-def _encoded(
-    topic: str,
-    class_: type[Message] | None,
-    arrival: Arrival,
-    compression: str,
-    dump: Callable[[object], str],
-) -> bytes:
-    if compression == "cbor-raw":
-        secs, nsecs = divmod(arrival.nanoseconds, 1_000_000_000)
-        raw = {"secs": secs, "nsecs": nsecs, "bytes": bytes(arrival.body)}
-        return encode_cbor({"op": "publish", "topic": topic, "msg": raw})
-
-    message = _message(topic, class_, arrival)
-    if compression == "cbor":
-        return encode_cbor({"op": "publish", "topic": topic, "msg": conversion.cbor_values(message)})
-    fields = {"op": "publish", "topic": topic, "msg": conversion.values(message)}
-    text = dump(fields)
-    if compression == "png":
-        text = dump({"op": "png", "data": png.encode(text)})
-    return text.encode()
-
-
-def _message(topic: str, class_: type[Message] | None, arrival: Arrival) -> Message:
-    if class_ is None:
-        raise BridgeError(
-            f"messages of [{topic}] are of type [{arrival.header.get('type')}], which is not installed here"
-        )
-    message = class_()
-    try:
-        message.deserialize(bytes(arrival.body))
-    except Exception as error:  # any exception that a third-party message class raises on invalid bytes
-        raise BridgeError(f"a message of [{topic}] does not fit [{message._type}]: {error}") from error
-    return message

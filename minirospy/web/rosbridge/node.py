@@ -15,9 +15,9 @@ from minirospy.base.name_filter import NameFilter
 from minirospy.web.bridge import ROSBRIDGE_PORT, Bridge, BridgeOptions
 from minirospy.web.graph import Filters
 from minirospy.web.node_parameters import access_of, address_of, globs, number, private_parameters, value
-from minirospy.web.rosbridge.endpoint import RosbridgeOptions
+from minirospy.web.rosbridge.shared import RosbridgeOptions
 from minirospy.web.serve import announce, exit_status, run
-from minirospy.web.server.connection import Limits
+from minirospy.web.server.client import Limits
 
 __all__ = ["main", "options_of", "refuse"]
 

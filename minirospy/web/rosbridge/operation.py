@@ -1,8 +1,10 @@
-"""Common parts of the handlers for clients' operations: results, limits and errors to report."""
+"""Common parts of the handlers for clients' operations: their view of the session, results, limits and errors to report."""
 
 from __future__ import annotations
 
-from collections.abc import Coroutine
+import asyncio
+from collections.abc import Coroutine, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
 
 from minirospy.base.errors import (
     BridgeError,
@@ -13,7 +15,22 @@ from minirospy.base.errors import (
 )
 from minirospy.introspect.graph import why_illegal
 
-__all__ = ["MAX_TOPICS", "MAX_WAITING_BYTES", "REFUSALS", "Work", "check_name", "type_conflict"]
+if TYPE_CHECKING:
+    from minirospy.web.graph import SharedGraph
+    from minirospy.web.rosbridge.protocol import StatusLevel
+    from minirospy.web.rosbridge.shared import RosbridgeShared
+    from minirospy.web.rosbridge.subscription import Budget
+    from minirospy.web.server.client import WebClient
+
+__all__ = [
+    "MAX_TOPICS",
+    "MAX_WAITING_BYTES",
+    "REFUSALS",
+    "OperationSession",
+    "Work",
+    "check_name",
+    "type_conflict",
+]
 
 MAX_TOPICS = 1000  # maximum topics that one client publishes, and maximum topics that it subscribes to
 # Per client: maximum bytes of operations queued behind a blocked one, and also of latched messages
@@ -24,6 +41,55 @@ REFUSALS = (MinirospyError, ServiceException, ROSSerializationException, Message
 
 Work = Coroutine[object, object, None]
 """The rest of an operation that must wait for something."""
+
+
+class OperationSession(Protocol):
+    """The session of the client whose operation is executed, as the handlers use it."""
+
+    @property
+    def client(self) -> WebClient: ...
+
+    @property
+    def shared(self) -> RosbridgeShared: ...
+
+    @property
+    def graph(self) -> SharedGraph: ...
+
+    @property
+    def budget(self) -> Budget:
+        """Return the budget of bytes for messages on topics whose rate the client limits."""
+
+    @property
+    def operation_size(self) -> int:
+        """Return the number of bytes of memory that the current operation takes."""
+
+    @property
+    def is_large(self) -> bool:
+        """Return whether the current operation's message is large, so that a thread creates the ROS message."""
+
+    def send(self, fields: Mapping[str, object]) -> None:
+        """Send a message that does not belong to a topic."""
+
+    def send_encoded(self, messages: Sequence[str | bytes]) -> None:
+        """Send messages that are already JSON or CBOR."""
+
+    def status(self, level: StatusLevel, text: str, id_: object = None) -> None:
+        """Send a status message, if the client has requested this level."""
+
+    def count(self) -> None:
+        """Report the memory used for the client to the server's account."""
+
+    def spawn(self, work: Work) -> asyncio.Task[None]:
+        """Start a task that is cancelled when the session ends."""
+
+    async def type_of(self, topic: str) -> str:
+        """Return a topic's type in the graph. Raise BridgeError if it has none."""
+
+    def is_allowed(self, kind: str, name: str, what: str) -> bool:
+        """Return whether a name matches the globs; if not, send a warning with rosbridge's message."""
+
+    def require_write(self, what: str) -> None:
+        """Raise BridgeError if the client's token is read-only."""
 
 
 def check_name(kind: str, name: str) -> None:

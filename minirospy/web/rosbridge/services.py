@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeVar
 
 from minirospy.aio.handle import serialized
@@ -17,7 +17,6 @@ from minirospy.web.rosbridge.types import service_class
 
 if TYPE_CHECKING:
     from minirospy.aio.services import Service
-    from minirospy.web.rosbridge.session import RosbridgeSession
 
 __all__ = ["ClientService", "InThread", "Response", "call"]
 
@@ -76,13 +75,21 @@ async def call(
 class ClientService:
     """A service that a client offers: forwards calls from the graph to the client, and its responses back."""
 
-    def __init__(self, session: RosbridgeSession, graph: SharedGraph, name: str, type_: str) -> None:
-        """Offer the service.
+    def __init__(
+        self,
+        owner: object,
+        send: Callable[[Mapping[str, object]], None],
+        graph: SharedGraph,
+        name: str,
+        type_: str,
+    ) -> None:
+        """Offer the service. ``owner`` is the client's session, and ``send`` sends a message to the client.
 
         Raise BridgeError if the type is unknown, ServiceException if this node already offers the service.
         """
-        self.session = session
+        self.owner = owner
         self.name = name
+        self._send = send
         self._graph = graph
         self._class = service_class(type_)
         self._ids = itertools.count(1)
@@ -142,7 +149,7 @@ class ClientService:
     async def _handle(self, request: Message) -> Message:
         id_ = f"service_request:{self.name}:{next(self._ids)}"
         future = self._waiting[id_] = asyncio.get_running_loop().create_future()
-        self.session.send(protocol.service_call(self.name, conversion.values(request), id_))
+        self._send(protocol.service_call(self.name, conversion.values(request), id_))
         try:
             response: Message = await future
             return response

@@ -24,8 +24,8 @@ from minirospy.web.rosbridge.protocol import Event, OperationError, StatusLevel
 from minirospy.web.rosbridge.subscription import Budget, Fragments
 
 if TYPE_CHECKING:
-    from minirospy.web.rosbridge.endpoint import RosbridgeEndpoint
-    from minirospy.web.server.connection import WebClient
+    from minirospy.web.rosbridge.shared import RosbridgeShared
+    from minirospy.web.server.client import WebClient
 
 __all__ = ["RosbridgeSession"]
 
@@ -55,19 +55,23 @@ class RosbridgeSession:
     later operations wait too, except for service calls.
     """
 
-    def __init__(self, endpoint: RosbridgeEndpoint, client: WebClient) -> None:
+    def __init__(
+        self, shared: RosbridgeShared, client: WebClient, on_end: Callable[[RosbridgeSession], None]
+    ) -> None:
+        """``on_end`` is called with the session once its client has disconnected."""
         self.client = client
-        self.endpoint = endpoint
-        self.graph = endpoint.graph
-        self.connected = endpoint.graph.node.now()  # time when the client connected, for /connected_clients
+        self.shared = shared
+        self.graph = shared.graph
+        self.connected = shared.graph.node.now()  # time when the client connected, for /connected_clients
         self.budget = Budget()  # for messages on topics whose rate the client limits
         self.operation_size = 0  # bytes of memory of the current operation
         # True if the current operation's message is large: a thread then creates the ROS message, too
         self.is_large = False
+        self._on_end = on_end
         self._level = StatusLevel.ERROR  # maximum level of the status messages that the client receives
-        self._is_authenticated = not endpoint.options.authenticate
+        self._is_authenticated = not shared.options.authenticate
         # received fragments of incomplete messages
-        self._fragments = Fragments(endpoint.options.fragment_timeout)
+        self._fragments = Fragments(shared.options.fragment_timeout)
         self._publications = ClientPublications(self)
         self._subscriptions = ClientSubscriptions(self)
         self._services = ClientServices(self)
@@ -114,13 +118,13 @@ class RosbridgeSession:
         self._fragments.clear()
         for task in list(self._tasks):
             task.cancel()
-        self.endpoint.left(self)
+        self._on_end(self)
 
     # --- for services and topics
 
     def send(self, fields: Mapping[str, object]) -> None:
         """Send a message that does not belong to a topic's stream."""
-        self.send_encoded(protocol.encode_messages(fields, "none", self.endpoint.options.fragment_size))
+        self.send_encoded(protocol.encode_messages(fields, "none", self.shared.options.fragment_size))
 
     def send_encoded(self, messages: Sequence[str | bytes]) -> None:
         """Send messages: strings as JSON, bytes as CBOR."""
@@ -136,7 +140,7 @@ class RosbridgeSession:
             self.client.send_text(str(protocol.encode(protocol.status(level, text, id_))))  # type: ignore[arg-type]
         if level is not StatusLevel.INFO:
             shown = text if id_ is None else f"[id: {id_}] {text}"
-            self.endpoint.log.warning("[Client %s] %s", self.client.name, shown)
+            self.shared.log.warning("[Client %s] %s", self.client.name, shown)
 
     # --- one operation after the other
 
@@ -210,7 +214,7 @@ class RosbridgeSession:
 
     async def _carry_out_large(self, data: str | bytes) -> None:
         try:
-            event = await self.endpoint.in_thread(lambda: protocol.parse(protocol.decode_in_pieces(data)))
+            event = await self.shared.in_thread(lambda: protocol.parse(protocol.decode_in_pieces(data)))
         except BridgeError as error:
             self._unreadable(error)
             return
@@ -234,7 +238,7 @@ class RosbridgeSession:
 
     def _carry_out(self, event: Event) -> _Pending | None:
         if not self._is_authenticated and not isinstance(event, protocol.Auth):
-            self.endpoint.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
+            self.shared.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
             self.client.close(_POLICY, "authentication is required first")
             return None
         try:
@@ -281,7 +285,7 @@ class RosbridgeSession:
         if await authenticate(self.graph.node, event):
             self._is_authenticated = True
             return
-        self.endpoint.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
+        self.shared.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
         self.client.close(_POLICY, "not authenticated")
 
     # --- for handlers of operations

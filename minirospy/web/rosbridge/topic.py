@@ -13,8 +13,8 @@ from minirospy.web.rosbridge.protocol import StatusLevel
 from minirospy.web.rosbridge.subscription import Merged, Pacer, merge
 
 if TYPE_CHECKING:
-    from minirospy.web.rosbridge.endpoint import RosbridgeEndpoint
-    from minirospy.web.rosbridge.session import RosbridgeSession
+    from minirospy.web.rosbridge.operation import OperationSession
+    from minirospy.web.rosbridge.shared import RosbridgeShared
 
 __all__ = ["MAX_IDS", "ClientTopic"]
 
@@ -25,11 +25,11 @@ MAX_IDS = 100
 class ClientTopic:
     """The single subscription to the graph for all of a client's subscriptions to one topic."""
 
-    def __init__(self, session: RosbridgeSession, endpoint: RosbridgeEndpoint, name: str) -> None:
+    def __init__(self, session: OperationSession, shared: RosbridgeShared, name: str) -> None:
         self.name = name
         self._session = session
-        self._endpoint = endpoint
-        self._topic = endpoint.graph.node.resolve(name)
+        self._shared = shared
+        self._topic = shared.graph.node.resolve(name)
         self._subscriptions: dict[object, protocol.Subscribe] = {}
         self._merged: Merged | None = None
         self._pacer: Pacer[Arrival] = Pacer(session.budget, lambda arrival: len(arrival.body))
@@ -49,10 +49,10 @@ class ClientTopic:
             raise BridgeError(f"a client may subscribe to a topic {MAX_IDS} times")
         self._subscriptions[event.id] = event
         self._update()
-        self._endpoint.graph.subscribe(self._topic, self._arrived)
+        self._shared.graph.subscribe(self._topic, self._arrived)
         if not is_first:
             # This was a second subscription, made only because each subscription receives the latched messages.
-            self._endpoint.graph.unsubscribe(self._topic, self._arrived)
+            self._shared.graph.unsubscribe(self._topic, self._arrived)
 
     def remove(self, id_: object) -> None:
         """Remove a subscription, or all subscriptions if ``id_`` is None."""
@@ -66,8 +66,8 @@ class ClientTopic:
     def close(self) -> None:
         """Unsubscribe."""
         self._is_closed = True
-        self._endpoint.graph.unsubscribe(self._topic, self._arrived)
-        self._endpoint.forget_topic(self.name)
+        self._shared.graph.unsubscribe(self._topic, self._arrived)
+        self._shared.forget_topic(self.name)
         self._session.client.discard(self.name)
         self._pacer.clear()
         if self._timer:
@@ -108,12 +108,12 @@ class ClientTopic:
         assert self._merged
         compression = self._merged.compression
         try:
-            class_ = None if compression == "cbor-raw" else self._endpoint.class_of(arrival)
-            if not self._endpoint.is_quick(arrival.body, compression, class_._type if class_ else ""):
+            class_ = None if compression == "cbor-raw" else self._shared.class_of(arrival)
+            if not self._shared.is_quick(arrival.body, compression, class_._type if class_ else ""):
                 self._session.client.hold_work(is_held=True)
                 self._session.spawn(self._send_large(arrival, class_, self._merged))
                 return
-            data = self._endpoint.encoded(self.name, class_, arrival, compression)
+            data = self._shared.encoded(self.name, class_, arrival, compression)
         except BridgeError as error:
             self._report(error)
             return
@@ -123,11 +123,9 @@ class ClientTopic:
     async def _send_large(self, arrival: Arrival, class_: type[Message] | None, merged: Merged) -> None:
         """Send a message that takes long to encode; the session's other messages wait until it is sent."""
         try:
-            data = await self._endpoint.encoded_large(self.name, class_, arrival, merged.compression)
+            data = await self._shared.encoded_large(self.name, class_, arrival, merged.compression)
             size = self._fragment_size(merged, data)
-            texts = (
-                await self._endpoint.encode(lambda: self._fragments(data, size, arrival)) if size else None
-            )
+            texts = await self._shared.encode(lambda: self._fragments(data, size, arrival)) if size else None
             if not self._is_closed:
                 self._queue(data, texts, merged)
         except BridgeError as error:
@@ -137,7 +135,7 @@ class ClientTopic:
 
     def _fragment_size(self, merged: Merged, data: bytes) -> int | None:
         """Return the size in characters of a message's fragments, or None if it is sent as a whole."""
-        size = merged.fragment_size or self._endpoint.options.fragment_size
+        size = merged.fragment_size or self._shared.options.fragment_size
         is_cut = size and len(data) > size and not merged.compression.startswith("cbor")
         return size if is_cut else None
 

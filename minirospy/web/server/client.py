@@ -7,26 +7,22 @@ import struct
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
-from minirospy.web.access import Credentials, Grant, Refusal
-from minirospy.web.server.account import MAX_BYTES, Account
+from minirospy.web.access import Grant
+from minirospy.web.server.account import MAX_BYTES
 from minirospy.web.server.files import FileAnswer
 from minirospy.web.server.queue import DEFAULT_LIMIT, Piece, SendQueue
-from minirospy.web.server.turns import FairTurns
-
-if TYPE_CHECKING:
-    from minirospy.web.server.connection import Connection
 
 __all__ = [
     "PLAIN_HEADERS",
+    "ClientConnection",
     "Endpoint",
     "Exchange",
     "HttpHandler",
     "HttpRequest",
     "Limits",
     "Session",
-    "Site",
     "WebClient",
     "frame_head",
     "response_head",
@@ -115,35 +111,39 @@ HttpHandler = Callable[["Exchange"], None]
 """Responds to a request immediately or later, with the methods of the exchange."""
 
 
-class Site(Protocol):
-    """The contents that a listener serves."""
+class ClientConnection(Protocol):
+    """The connection to a client, as :class:`WebClient` and :class:`Exchange` use it."""
 
     @property
-    def limits(self) -> Limits: ...
+    def is_open(self) -> bool: ...
 
     @property
-    def endpoints(self) -> Sequence[Endpoint]: ...
+    def queue(self) -> SendQueue: ...
 
-    @property
-    def turns(self) -> FairTurns: ...
+    def answer(self, pieces: tuple[Piece, ...]) -> None: ...
 
-    def check(self, credentials: Credentials, *, is_page: bool) -> Grant | Refusal: ...
+    def answer_file(self, answer: FileAnswer) -> None: ...
 
-    def page(self, path: str) -> HttpHandler | None: ...
+    def stream(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool) -> None: ...
 
-    def admit(self, connection: Connection, grant: Grant) -> Refusal | None: ...
+    def session_holds(self, count: int) -> None: ...
 
-    @property
-    def account(self) -> Account: ...
+    def in_turn(self, work: Callable[[], None], message: Piece) -> None: ...
 
-    def left(self, connection: Connection) -> None: ...
+    def hold_jobs(self, *, are_held: bool) -> None: ...
+
+    def hold(self, *, is_held: bool) -> None: ...
+
+    def close_websocket(self, code: int, reason: str) -> None: ...
+
+    def close_when_sent(self) -> None: ...
 
 
 class WebClient:
     """One WebSocket client, as the session of its protocol sees it."""
 
     def __init__(
-        self, connection: Connection, request: HttpRequest, grant: Grant, subprotocol: str | None
+        self, connection: ClientConnection, request: HttpRequest, grant: Grant, subprotocol: str | None
     ) -> None:
         self.request = request
         self.grant = grant
@@ -246,7 +246,7 @@ class WebClient:
 class Exchange:
     """One HTTP request and its response."""
 
-    def __init__(self, connection: Connection, request: HttpRequest, grant: Grant) -> None:
+    def __init__(self, connection: ClientConnection, request: HttpRequest, grant: Grant) -> None:
         self.request = request
         self.grant = grant
         self.on_end: Callable[[], None] = lambda: None

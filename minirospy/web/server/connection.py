@@ -15,14 +15,15 @@ import time
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from websockets.exceptions import NegotiationError
 from websockets.frames import CloseCode, Frame
 
 from minirospy.base.escape import escaped
-from minirospy.web.access import Grant, Refusal
+from minirospy.web.access import Credentials, Grant, Refusal
 from minirospy.web.json_text import size_in_memory
+from minirospy.web.server.account import Account
 from minirospy.web.server.admission import Rank
 from minirospy.web.server.client import (
     Endpoint,
@@ -31,7 +32,6 @@ from minirospy.web.server.client import (
     HttpRequest,
     Limits,
     Session,
-    Site,
     WebClient,
     frame_head,
 )
@@ -42,6 +42,7 @@ from minirospy.web.server.output import Output
 from minirospy.web.server.pipe import LARGE_READ, SMALL_READ
 from minirospy.web.server.queue import Piece, SendQueue
 from minirospy.web.server.request import RequestHead, read_head, refusal_response
+from minirospy.web.server.turns import FairTurns
 from minirospy.web.server.websocket import Message, Ping, WebSocket
 
 if TYPE_CHECKING:
@@ -49,17 +50,7 @@ if TYPE_CHECKING:
 
     from minirospy.web.server.pipe import Endpoints, Pipe
 
-__all__ = [
-    "Connection",
-    "Endpoint",
-    "Exchange",
-    "HttpHandler",
-    "HttpRequest",
-    "Limits",
-    "Session",
-    "Site",
-    "WebClient",
-]
+__all__ = ["Connection", "Site", "Traffic"]
 
 _log = logging.getLogger(__name__)
 
@@ -81,6 +72,30 @@ class Traffic:
     received_bytes: int = 0
     held_back: int = 0
     since: float = field(default_factory=time.monotonic)
+
+
+class Site(Protocol):
+    """The contents that a listener serves."""
+
+    @property
+    def limits(self) -> Limits: ...
+
+    @property
+    def endpoints(self) -> Sequence[Endpoint]: ...
+
+    @property
+    def turns(self) -> FairTurns: ...
+
+    def check(self, credentials: Credentials, *, is_page: bool) -> Grant | Refusal: ...
+
+    def page(self, path: str) -> HttpHandler | None: ...
+
+    def admit(self, connection: Connection, grant: Grant) -> Refusal | None: ...
+
+    @property
+    def account(self) -> Account: ...
+
+    def left(self, connection: Connection) -> None: ...
 
 
 class _Phase(IntEnum):

@@ -18,8 +18,8 @@ from minirospy.runtime.transport.limits import is_file_limit
 from minirospy.web.access import Access, Credentials, Grant, Refusal
 from minirospy.web.server.account import Account
 from minirospy.web.server.admission import Rank, displaced, rank_of
-from minirospy.web.server.client import PLAIN_HEADERS, response_head
-from minirospy.web.server.connection import Connection, Endpoint, HttpHandler, Limits
+from minirospy.web.server.client import PLAIN_HEADERS, Endpoint, HttpHandler, Limits, response_head
+from minirospy.web.server.connection import Connection
 from minirospy.web.server.owners import is_own_user
 from minirospy.web.server.pipe import PipeEvents, PlainPipe, TlsPipe
 from minirospy.web.server.rate import ConnectionRate

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
@@ -25,6 +26,21 @@ server.start()
 client = actionlib.SimpleActionClient("server", TestAction)
 assert client.wait_for_server(rospy.Duration(30))
 second = rospy.Duration(30)
+"""
+SERVER_THAT_DIES = """
+import time, actionlib, rospy
+from actionlib.msg import TestAction
+rospy.init_node("other_server", argv=[], disable_rosout=True)
+def got(handle):
+    if handle.get_goal().goal == 3:
+        handle.set_accepted()
+    print("got", handle.get_goal().goal, flush=True)
+    while handle.get_goal().goal == 4:  # holds the lock, so that no list with this goal is published
+        time.sleep(1)
+server = actionlib.ActionServer("other", TestAction, got, auto_start=False)
+server.start()
+print("ready", flush=True)
+rospy.spin()
 """
 END = """
 rospy.signal_shutdown("")
@@ -79,7 +95,7 @@ reported.wait(30)
         assert "ValueError: bad done callback" in said
 
     def test_cancel_of_all_does_not_overtake_a_goal(self) -> None:
-        """A goal of a third-party client waits a moment before it is accepted, and a cancel request waits longer."""
+        """A goal from a third-party client is accepted after a short delay; a cancel request is delayed longer."""
         said = run("""
 from types import SimpleNamespace
 import minirospy.ros.actionlib.actionlib.server as module
@@ -121,7 +137,7 @@ print(client.gh.get_comm_state() == actionlib.CommState.DONE, client.get_state()
         assert said == "True 3\n"
 
     def test_statuses_of_many_goals_are_published_less_often(self) -> None:
-        """With few goals each change publishes the list; with 600 goals, lists are at least 60 ms apart."""
+        """With few goals, each change publishes the list; with 600 goals, lists are at least 60 ms apart."""
         said = run("""
 from types import SimpleNamespace
 import minirospy.ros.actionlib.actionlib.server as module
@@ -150,7 +166,7 @@ print(max(sizes))
     def test_timeouts_run_on_simulated_time(self) -> None:
         said = run("""
 import minirospy.base.clock
-from minirospy.client.session import current_session
+import socket
 clock = current_session().clock = minirospy.base.clock.SimulatedClock(10**9)
 client.send_goal(TestGoal(3))
 answers = []
@@ -171,7 +187,7 @@ print(client.wait_for_result())
         assert said == "True\n[False]\nTrue\n"
 
     def test_goal_and_cancel_callbacks_never_meet_a_lock_crosswise(self) -> None:
-        """A goal arrives while another finishes: actionlib takes its two locks in opposite orders."""
+        """A goal arrives while another one finishes. actionlib would acquire its two locks in opposite orders."""
         said = run("""
 def ask():
     own = actionlib.SimpleActionClient("server", TestAction)
@@ -240,3 +256,49 @@ print(client.wait_for_server(second), client.send_goal_and_wait(TestGoal(4), sec
         os.kill(process.pid, signal.SIGINT)
         output, errors = process.communicate(timeout=30)
         assert (output, errors, process.returncode) == ("", "", 0)
+
+    @pytest.mark.parametrize("how", ["kill", "terminate"])
+    @pytest.mark.parametrize("goal", [3, 4])
+    def test_goal_is_lost_when_its_server_dies(self, how: str, goal: int) -> None:
+        """A server that does not answer at all (goal 4) dies before it lists the goal."""
+        said = run(f"""
+import subprocess, sys
+from minirospy.ros.actionlib.actionlib import client as client_module
+client_module.SERVER_SECONDS = 0.2
+other = subprocess.Popen([sys.executable, "-c", {SERVER_THAT_DIES!r}], stdout=subprocess.PIPE, text=True)
+assert other.stdout.readline() == "ready\\n"
+client = actionlib.SimpleActionClient("other", TestAction)
+assert client.wait_for_server(second)
+ended = []
+client.send_goal(TestGoal({goal}), lambda state, result: ended.append((state, result)))
+assert other.stdout.readline() == "got {goal}\\n"
+other.{how}()
+other.wait()
+print(client.wait_for_result(), client.get_state() == GoalStatus.LOST, client.get_result(), ended)
+""")
+        first, second = said.splitlines()
+        assert first == "True True None [(9, None)]"
+        assert re.search(
+            r"\[ERROR\] .*: The action server \[/other\] has died or is unreachable: goal /case-\S+ is LOST$",
+            second,
+        )
+
+    def test_goals_go_on_when_a_connection_to_their_server_breaks(self) -> None:
+        said = run("""
+from minirospy.ros.actionlib.actionlib import client as client_module
+import socket
+client_module.SERVER_SECONDS = 0.2
+client.send_goal(TestGoal(3))
+while client.get_state() != GoalStatus.ACTIVE:
+    time.sleep(0.01)
+checked = threading.Event()
+check = client.action_client._check_server
+client.action_client._check_server = lambda goals, last: (check(goals, last), checked.set())
+subscription = client.action_client.status_sub.impl.subscription
+subscription.links[0].sock.shutdown(socket.SHUT_RDWR)
+assert checked.wait(60)
+print(client.get_state() == GoalStatus.ACTIVE)
+client.cancel_goal()
+print(client.wait_for_result(second), client.get_state() == GoalStatus.PREEMPTED)
+""")
+        assert said == "True\nTrue True\n"

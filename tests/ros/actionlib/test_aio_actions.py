@@ -1,4 +1,4 @@
-"""Actions of asyncio programs: each final state of a goal, with minirospy's client and server and with the rospy API's."""
+"""Actions in asyncio programs: each final state of a goal, with minirospy's client and server and with the rospy API's."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from minirospy import Node
 from minirospy.base.errors import ROSException, ROSInterruptException
 from minirospy.core.graph.goals import GoalState
 from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, GoalError, ServerGoal
+from minirospy.ros.actionlib.actionlib.aio import client as client_module
 from minirospy.ros.actionlib.actionlib.aio import server as server_module
 from minirospy.ros.actionlib.actionlib.spec import ActionException
 from tests.waiting import until
@@ -30,7 +31,7 @@ Goal = ServerGoal[msg.TestGoal, msg.TestFeedback]
 
 
 async def execute(goal: Goal) -> Any:
-    """Goal 1 succeeds with feedback, 2 raises, 3 runs until it is cancelled, 4 aborts with a result."""
+    """Execute a goal: 1 succeeds with feedback, 2 raises an exception, 3 runs until it is cancelled, 4 aborts with a result."""
     if goal.request.goal == 3:
         await asyncio.sleep(SECONDS)
     if goal.request.goal == 2:
@@ -48,7 +49,7 @@ def run(
     work: Callable[[Goal], Awaitable[Any]] = execute,
     **options: Any,
 ) -> None:
-    """Run a test's coroutine with a client and a server of two nodes."""
+    """Run a test's coroutine with a client and a server on two nodes."""
 
     async def bounded() -> None:
         async with (
@@ -67,7 +68,7 @@ async def _done(work: Awaitable[None]) -> None:
 
 
 async def started(goal: Any) -> None:
-    """Return when the server executes the goal."""
+    """Wait until the server executes the goal."""
     await until(lambda: goal.state is GoalState.ACTIVE)
 
 
@@ -170,7 +171,7 @@ def test_a_newer_goal_takes_the_place_of_the_one_that_runs() -> None:
 
 
 def test_concurrent_goals_each_end() -> None:
-    """Includes a goal that is preempted before its execution starts."""
+    """One of the goals is preempted before its execution starts."""
 
     async def main(client: Client, server: Server) -> None:
         await client.wait_for_server()
@@ -266,13 +267,13 @@ def test_a_cancel_that_comes_before_its_goal(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_cancel_of_all_does_not_overtake_a_goal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A goal of a third-party client waits a moment before it is accepted, and a cancel request waits longer."""
+    """A goal from a third-party client is accepted after a short delay; a cancel request is delayed longer."""
 
     async def main(_: Client, server: Server) -> None:
         pauses: list[float] = []
 
         async def sleep(seconds: float) -> None:
-            # Both have arrived by now; the one with the shorter pause is done before the other continues.
+            # Both have arrived by now. The one with the shorter pause is processed before the other continues.
             pauses.append(seconds)
             await until(
                 lambda: not (len(pauses) < 2 or (seconds == max(pauses) and "other-1" not in server.goals))
@@ -322,6 +323,57 @@ def test_a_server_that_ends_aborts_and_one_that_forgot_loses() -> None:
             await goal
 
     run(forgetful)
+
+
+SERVER = """
+import asyncio
+import minirospy
+from actionlib import msg
+from minirospy.ros.actionlib.actionlib.aio import ActionServer
+
+async def execute(goal):
+    print("got", goal.request.goal, flush=True)
+    await asyncio.sleep(1000)
+
+async def main():
+    async with minirospy.Node("other") as node, ActionServer(node, "other", msg.TestAction, execute):
+        print("ready", flush=True)
+        await node.spin()
+
+asyncio.run(main())
+"""
+
+
+def test_goal_is_lost_when_its_server_dies(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(client_module, "SERVER_SECONDS", 0.2)
+
+    async def main() -> None:
+        server = await asyncio.create_subprocess_exec(
+            sys.executable, "-c", SERVER, stdout=asyncio.subprocess.PIPE
+        )
+        assert server.stdout
+        async with (
+            Node("client", rosout=False) as node,
+            ActionClient(node, "other", msg.TestAction) as client,
+        ):
+            assert await server.stdout.readline() == b"ready\n"
+            goal = client.send(msg.TestGoal(3))
+            assert await server.stdout.readline() == b"got 3\n"
+            server.kill()
+            with pytest.raises(GoalError, match="lost: the server has died or is unreachable"):
+                await goal
+            await server.wait()
+            assert goal.state is GoalState.LOST
+            # A goal that has not been sent waits for the next server.
+            waiting = client.send(msg.TestGoal(1))
+            await asyncio.sleep(0.5)
+            assert not waiting.done
+        text = f"The action server [/other] has died or is unreachable: goal {goal.id} is LOST"
+        assert caplog.messages.count(text) == 1
+
+    asyncio.run(asyncio.wait_for(main(), SECONDS))
 
 
 def test_a_goal_waits_for_its_server() -> None:

@@ -1,4 +1,4 @@
-"""axclient.py and axserver.py with pipes: a form of the goal's type, the progress, the final state."""
+"""axclient.py and axserver.py with pipes: a form for the goal's type, the progress, and the final state."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def test_a_person_serves(master: str) -> None:
     assert said.endswith("Succeeded: well done\nresult: 7\n")
     assert status == 0
     process.stdin.close()
-    # For the next goal, no user answers.
+    # No user input exists for the next goal.
     said, _, status = ask("", "/ask", "{goal: 6}")
 
     assert "Aborted: the person who answered has left\n" in said

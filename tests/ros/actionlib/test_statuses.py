@@ -1,4 +1,4 @@
-"""StatusList compared with the generated class: the same bytes, the same statuses."""
+"""StatusList compared with the generated class: bytes and statuses are equal."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ OPTIONS: dict[str, dict[str, object]] = {
     "old deadzone": {"deadzone": 8000},
     "negative": {"deadzone": -1, "autorepeat_rate": -1},
 }
-# Each step: events that are sent together, and the number of resulting messages.
+# Each step consists of events that are sent together, and the number of resulting messages.
 STEPS = (
     ([(AXIS | INIT, 0, 20000), (AXIS | INIT, 3, -32767), (BUTTON | INIT, 0, 0), (BUTTON | INIT, 2, 1)], 1),
     ([(BUTTON, 0, 1)], 1),

@@ -1,8 +1,7 @@
 """Drive joy_node with a simulated device, and teleop_node with states; print the messages that they publish.
 
-`drive.py JOY_NODE TELEOP_NODE [PYTHON [NAME...]]`: programs of either stack; NAME: only these cases. drive.txt is the
-output for the
-real programs (joy 1.15.1 and teleop_twist_joy 0.1.3, which Debian does not have, built from source).
+Usage: `drive.py JOY_NODE TELEOP_NODE [PYTHON [NAME...]]`, with either stack's programs; NAME selects cases. drive.txt is
+the output with the real programs (joy 1.15.1 and teleop_twist_joy 0.1.3, which Debian does not have, built from source).
 """
 
 from __future__ import annotations
@@ -75,7 +74,7 @@ def has_opened(process: subprocess.Popen[bytes], path: str) -> bool:
     except FileNotFoundError:
         return True
     for each in files:
-        # The file may be closed meanwhile.
+        # The file may have been closed in the meantime.
         with contextlib.suppress(FileNotFoundError):
             if os.readlink(f"/proc/{process.pid}/fd/{each}") == path:
                 return True
@@ -85,7 +84,7 @@ def has_opened(process: subprocess.Popen[bytes], path: str) -> bool:
 def follow_joystick(master: int, path: str, subscriber: rospy.Subscriber, states: queue.Queue[Joy]) -> None:
     while not subscriber.get_num_connections():
         time.sleep(0.02)
-    # joy_node opens the device twice: earlier events are lost.
+    # joy_node opens the device twice, so earlier events are lost.
     time.sleep(1)
     for events, count in STEPS:
         os.write(master, b"".join(struct.pack("<IhBB", 0, value, kind, at) for kind, at, value in events))
@@ -117,7 +116,7 @@ def follow_teleop(
     for axes, buttons in STATES:
         publisher.publish(Joy(axes=axes, buttons=buttons))
         try:
-            # On a busy machine a message may take long.
+            # On a busy machine, a message may take long.
             twist = twists.get(timeout=10)
         except queue.Empty:
             print("  nothing")

@@ -1,4 +1,4 @@
-"""joystick, twist_joy: the messages equal those of the real nodes (drive.txt); and their other rules."""
+"""joystick, twist_joy: the messages equal those of the real nodes (drive.txt); other rules."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_axes_wait_for_each_other_and_buttons_do_not() -> None:
 
 def test_state_is_repeated_while_idle() -> None:
     joystick = Joystick(JoystickOptions(autorepeat_rate=10), 0.0)
-    # A second for the first events, then the rate's period.
+    # The first events are due after a second, then the rate's period applies.
     assert joystick.deadline == pytest.approx(1.1)
     assert joystick.is_due(1.1)
     assert joystick.deadline == pytest.approx(1.2)

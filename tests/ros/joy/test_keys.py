@@ -1,4 +1,4 @@
-"""teleop_twist_keyboard: the meaning of keys, and the program in a terminal."""
+"""teleop_twist_keyboard: the effect of keys, and the program in a terminal."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ def test_motion_is_repeated_stamped_and_ends_without_keys(master: str) -> None:
                 assert message.header.frame_id == "base"
                 assert message.header.stamp.secs > 0
                 motions.append(message.twist.angular.z)
-                # Published once for the key, and more often by the rate.
+                # The motion is published once for the key, and more often at the rate.
                 if motions.count(1.0) > 2 and motions[-1] == 0:
                     break
 

@@ -49,7 +49,7 @@ class Pad:
     def unplug(self) -> None:
         if self._is_open:
             self._is_open = False
-            # The next pseudo-terminal of any process may get the same name.
+            # Remove the link, because the next pseudo-terminal of any process may get the same name.
             self._link.unlink(missing_ok=True)
             os.close(self._slave)
             os.close(self._master)
@@ -103,7 +103,7 @@ def test_pad_drives_a_robot_and_may_be_plugged_in_again(start: Start, tmp_path: 
             if status.message == "OK":
                 break
         moving = asyncio.ensure_future(first_motion(twists))
-        # Repeat until teleop_node, which publishes before it subscribes, has a state.
+        # Repeat until teleop_node, which publishes before it subscribes, has received a state.
         while not moving.done():
             second = await press(pad, states)
             assert second.header.frame_id == str(link)
@@ -121,7 +121,7 @@ def test_pad_drives_a_robot_and_may_be_plugged_in_again(start: Start, tmp_path: 
             again.unplug()
 
     async def press(pad: Pad, states: object) -> Joy:
-        """Press button 0 until a state shows it: events are lost while the device is being opened."""
+        """Press button 0 until a state shows it, because events are lost while the device is being opened."""
         waiting = asyncio.ensure_future(first(states))
         while not waiting.done():
             pad.send(EVENT_AXIS, 1, -32767)
@@ -193,7 +193,7 @@ def test_programs_publish_the_same_as_real_ones(master: str) -> None:
 
 
 class FakeStick:
-    """A joystick of pygame."""
+    """A simulated pygame joystick."""
 
     def __init__(self) -> None:
         self.axes, self.buttons, self.hats = [0.5, -1.0], [0, 1], [(0, 1)]

@@ -1,4 +1,4 @@
-"""Maps of many kinds; recorded.json has the messages that the real map_server publishes for them (make_recorded.py)."""
+"""Maps of many kinds. recorded.json contains the messages that the real map_server publishes for them (make_recorded.py)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ USUAL = "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 
 
 class Case(NamedTuple):
-    """A map: the lines of its YAML file after `image:`, and the image's file."""
+    """A map, given by the lines of its YAML file after `image:`, and the image's file."""
 
     name: str
     image: str

@@ -1,7 +1,7 @@
 """Write recorded.json, the results of the real map_server and map_saver: `python make_recorded.py map_server map_saver`.
 
-Both programs are from ROS's navigation (1.17.3), which Debian does not have: built from source, with Debian's libraries.
-A master must run at ROS_MASTER_URI.
+Both programs are from ROS's navigation (1.17.3), which Debian does not have; they are built from source, with Debian's
+libraries. A master must run at ROS_MASTER_URI.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ def test_cropped_map_is_that_of_the_real_program(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text(f"image: a.pgm\n{FIELDS}")
     assert crop(tmp_path, "a.yaml").returncode == 0
     assert (tmp_path / "cropped.pgm").read_bytes() == b"P5\n2 2\n255\n" + bytes((254, 0, 205, 254))
-    # Written by the real crop_map from the same files.
+    # The real crop_map has written this from the same files.
     assert (tmp_path / "cropped.yaml").read_text() == REAL
     assert crop(tmp_path, "a.yaml", "b.yaml").returncode == 0
     assert (tmp_path / "b.pgm").is_file()

@@ -1,4 +1,4 @@
-"""Maps of cases.py: the same occupancies as those of the real map_server (recorded.json)."""
+"""The maps in cases.py have the same occupancies as in the real map_server (recorded.json)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from tests.ros.map_server.cases import FIELDS, GREYS, GRIDS, USUAL, Case, Grid, 
 
 RECORDED = json.loads((Path(__file__).parent / "recorded.json").read_text(encoding="utf-8"))
 SAVED = json.loads((Path(__file__).parent / "saved.json").read_text(encoding="utf-8"))
-# Accepted by minirospy, refused by the real one: a comment after the size.
+# minirospy accepts these, but the real program rejects them: they have a comment after the size.
 WIDER = {"usual: plain15.pgm", "raw: plain15.pgm"}
 OWN_WORDS = {
     name: tag
@@ -44,7 +44,7 @@ OWN_WORDS = {
     )
     for name in names
 }
-"""Cases in which the real program fails with `bad conversion`, and never prints its own text, which names the field."""
+"""Cases in which the real program fails with `bad conversion`, and never prints its own message, which names the field."""
 
 
 @pytest.fixture(scope="module")
@@ -165,7 +165,7 @@ def test_saved_files_are_byte_by_byte_those_of_the_real_program(grid: Grid) -> N
     image = pgm_of_grid(grid.data, grid.width, grid.height, resolution, options.occupied, options.free)
     assert image.decode("latin-1") == real["pgm"]
     yaw = yaw_of_quaternion(*grid.orientation)
-    # The one difference: the real program's output for 0, 0, 0, 0 cannot be parsed.
+    # This is the only difference: the real program's output for 0, 0, 0, 0 cannot be parsed.
     expected = real["yaml"].replace("-nan", "0.000000")
     assert yaml_of_map("saved.pgm", resolution, (*grid.position, yaw)) == expected
 

@@ -1,4 +1,4 @@
-"""bondpy: the state machine, and endpoints in one process; tests/interop uses endpoints of real ROS."""
+"""bondpy: the state machine, and endpoints in one process. tests/interop uses real ROS's endpoints."""
 
 from __future__ import annotations
 

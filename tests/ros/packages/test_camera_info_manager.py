@@ -1,4 +1,4 @@
-"""camera_info_manager: URLs, files, the service; tests/referee and tests/interop compare the contents."""
+"""camera_info_manager: URLs, files and the service. tests/referee and tests/interop compare the contents."""
 
 from __future__ import annotations
 
@@ -223,7 +223,7 @@ def test_zoom_changes_the_calibration(master: str, tmp_path: Path) -> None:
         timeout=60,
         check=False,
     )
-    # As computed by ROS's package, except for zoom 3, for which it uses three quarters of the farther calibration.
+    # ROS's package computes the same, except for zoom 3, for which it uses three quarters of the farther calibration.
     assert [line for line in done.stdout.splitlines() if not line.startswith("[INFO]")] == [
         "CameraInfoMissingError Calibration missing, loadCameraInfo() needed.",
         "[808.573, 360.0, 827.023, 288.0, 1.0] 720 576 [0.5]",

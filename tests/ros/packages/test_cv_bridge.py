@@ -34,7 +34,7 @@ def test_bytes_between_rows_are_left_out(encoding: str, size: int, big: bool) ->
         encoding=encoding,
         step=5 * size + 3,
         is_bigendian=big,
-        # The last row may omit its padding.
+        # The last row may lack its padding.
         data=b"xxx".join(rows),
     )
     np.testing.assert_array_equal(bridge.imgmsg_to_cv2(padded), bridge.imgmsg_to_cv2(packed))

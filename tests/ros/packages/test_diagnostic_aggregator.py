@@ -1,4 +1,4 @@
-"""diagnostic_aggregator: its programs publish the same messages as the real ones; drive.txt has those for the same statuses."""
+"""diagnostic_aggregator: its programs publish the same messages as the real ones for the same statuses (drive.txt)."""
 
 from __future__ import annotations
 

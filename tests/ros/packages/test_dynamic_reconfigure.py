@@ -64,7 +64,7 @@ def failure(call):
 
 
 def run(body: str) -> list[str]:
-    """Run a program with a lamp's configuration; return its output lines."""
+    """Run a program with the configuration of a lamp; return its output lines."""
     done = subprocess.run(
         [sys.executable, "-c", LAMP + body], capture_output=True, text=True, timeout=100, check=False
     )

@@ -98,7 +98,7 @@ def test_jpeg_is_close_and_smaller_with_less_quality(encoding: str) -> None:
 
 
 def recorded_source(encoding: str) -> Image:
-    """Return the image that the real plug-ins compressed for the recording."""
+    """Return the image from which the real plug-ins made the recording."""
     dtype, channels = BRIDGE.encoding_to_dtype_with_channels(encoding)
     v, u = np.mgrid[:48, :64]
     if dtype == "float32":
@@ -113,7 +113,7 @@ def recorded_source(encoding: str) -> Image:
 
 @pytest.mark.parametrize("row", RECORDED, ids=lambda row: row["format"])
 def test_messages_of_the_real_plug_ins_are_read_as_they_read_them(row: dict[str, Any]) -> None:
-    """Debian's republish and the plug-ins of image_transport_plugins 1.15 (noetic) made and read the recording."""
+    """The recording was made and read by Debian's republish and the plug-ins of image_transport_plugins 1.15 (noetic)."""
     message = CompressedImage(format=row["format"], data=bytes.fromhex(row["data"]))
     source = recorded_source(row["encoding"])
     assert hashlib.sha256(source.data).hexdigest() == row["source"]

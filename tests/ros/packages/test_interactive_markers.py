@@ -1,4 +1,4 @@
-"""interactive_markers in cases in which ROS's server raises, and after the clock jumped back.
+"""interactive_markers in cases in which ROS's server raises an exception, and after the clock has jumped back.
 
 tests/referee/cases/interactive_markers_server.py compares the other messages with real ROS.
 """

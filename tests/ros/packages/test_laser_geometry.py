@@ -1,4 +1,4 @@
-"""laser_geometry: faults, the cache of directions, and clouds of a moving laser. tests/referee compares the bytes."""
+"""laser_geometry: faults, the cache of directions, and clouds from a moving laser. tests/referee compares the bytes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_scan_with_too_few_intensities_is_refused() -> None:
 
 
 def buffer(*poses: tuple[float, float, float, float]) -> tf2_ros.Buffer:
-    """Return a buffer with poses of the laser, each (seconds, x, y, angle)."""
+    """Return a buffer with poses of the laser, each given as (seconds, x, y, angle)."""
     made = tf2_ros.Buffer(debug=False)
     for seconds, x, y, angle in poses:
         transform = TransformStamped()

@@ -1,4 +1,4 @@
-"""message_filters: the search compared with ROS's loops, and the synchronizers in cases in which ROS's hang."""
+"""message_filters: the search compared with ROS's loops, and the synchronizers in cases in which ROS's would hang."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def queue_of(stamps: list[int]) -> StampQueue:
 
 
 def found_by_loops(queues: list[list[int]], stamp: int, slop: int, index: int | None) -> list[int] | None:
-    """Return the result of ROS's algorithm: every combination in turn, the stamps of each queue by their distance."""
+    """Return the result of ROS's algorithm, which tries every combination, with each queue's stamps ordered by distance."""
     near = [
         [stamp]
         if at == index
@@ -57,7 +57,7 @@ def test_search_finds_the_same_as_loops(
 
 
 def test_search_of_many_topics_without_a_match_ends() -> None:
-    # 50 stamps on either side, of which none fits those of the other side: 100 ** 12 combinations.
+    # There are 50 stamps on either side, none of which fits those on the other side: 100 ** 12 combinations.
     sides = [queue_of([*range(50), *range(151, 201)]) for _ in range(12)]
     sides.append(queue_of([*range(50)]))
     sides.append(queue_of([*range(151, 201)]))

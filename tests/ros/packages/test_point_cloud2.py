@@ -52,7 +52,7 @@ def clouds(draw: st.DrawFn) -> PointCloud2:
 
 
 def slowly(cloud: PointCloud2, *, skip_nans: bool) -> list[tuple[float, ...]]:
-    """Return the points as ROS reads them: each with struct."""
+    """Return the points as ROS reads them, each with struct."""
     fmt, end = ">" if cloud.is_bigendian else "<", 0
     for field in sorted(cloud.fields, key=lambda each: each.offset):
         fmt += "x" * (field.offset - end) + FORMATS[field.datatype] * field.count

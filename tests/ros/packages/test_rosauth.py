@@ -1,4 +1,4 @@
-"""rosauth: which requests its node accepts, and with which settings it refuses to start."""
+"""rosauth: which requests its node accepts, and with which settings it does not start."""
 
 from __future__ import annotations
 

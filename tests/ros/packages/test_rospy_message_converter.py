@@ -1,4 +1,4 @@
-"""rospy_message_converter: every message converts to a dict and back; wrong values are refused."""
+"""rospy_message_converter: every message converts to a dict and back; wrong values are rejected."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_every_type_goes_to_json_and_back() -> None:
     names = [spec.full_name for package in catalogue.packages for spec in catalogue.messages(package)]
     assert len(names) > 200
     for name in names:
-        # The contents of a message of zeros, ones and twos.
+        # Fill the message with zeros, ones and twos.
         message = message_class(name)().deserialize(wire(message_class(name)()))
         for as_bytes in (True, False):
             text = convert_ros_message_to_json(message, as_bytes)

@@ -1,4 +1,4 @@
-"""smach and smach_ros: as the real packages, and errors in cases in which those hang or stay locked.
+"""smach and smach_ros behave as the real packages, but raise errors in cases in which those hang or stay locked.
 
 The programs in smach_programs/ ran under the real packages (2.5.2); the .txt files are their output.
 """
@@ -129,7 +129,7 @@ def test_construction_that_raises_leaves_nothing_open(logged: list[str]) -> None
     assert "Error raised during SMACH container construction" in logged[0]
     with pytest.raises(smach.InvalidStateError, match="no container is opened"):
         smach.StateMachine.add("A", state_of(lambda ud: "done", "done"))
-    # Another thread can open a container, since no lock is held.
+    # Another thread can open a container, because no lock is held.
     thread = threading.Thread(target=lambda: smach.StateMachine(["done"]).open())
     thread.start()
     thread.join(30)
@@ -280,13 +280,13 @@ def test_userdata_takes_no_more_memory_than_it_has_bytes() -> None:
 
 def test_array_whose_bytes_would_be_pointers_is_refused() -> None:
     numpy = pytest.importorskip("numpy")
-    # The state clears the object flag: numpy would then follow the array's bytes as pointers.
+    # The state clears the object flag; numpy would then follow the array's bytes as pointers.
     state = (3, "|", None, ("a",), {"a": (numpy.dtype("O"), 0)}, 8, 1, 0)
     dtype = b"cnumpy\ndtype\n(U\x02V8\x89\x88tR" + pickle.dumps(state, 2)[2:-1] + b"b"
     array = b"cnumpy.core.numeric\n_frombuffer\n(U\x08AAAAAAAA" + dtype + b"K\x01\x85U\x01CtR"
     with pytest.raises(ValueError, match="not userdata: an array of"):
         unpickle_userdata(base64.b64encode(b"\x80\x02}U\x01a" + array + b"s.").decode())
-    # A state must not make an array larger than its memory, or its size negative, either.
+    # A state must neither make an array larger than its memory nor its size negative.
     for size in (800, -1):
         other = (3, "|", None, None, None, size, 1, 0)
         dtype = b"cnumpy\ndtype\n(U\x02S8\x89\x88tR" + pickle.dumps(other, 2)[2:-1] + b"b"
@@ -296,7 +296,7 @@ def test_array_whose_bytes_would_be_pointers_is_refused() -> None:
 
 def test_array_in_the_memory_of_another_is_refused() -> None:
     numpy = pytest.importorskip("numpy")
-    # A second state of the other array would free it.
+    # Setting the state of the other array a second time would free its memory.
     one = pickle.dumps(numpy.zeros(100), 2)[2:-1]
     dtype = b"cnumpy\ndtype\n(U\x02f8\x89\x88tR"
     array = b"cnumpy.core.numeric\n_frombuffer\n(" + one + dtype + b"Kd\x85U\x01CtR"

@@ -1,4 +1,4 @@
-"""sound_play: its client's requests, and its node with players that record how they are called."""
+"""sound_play: its client's requests, and its node, with players that record their calls."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ True
 
 @pytest.fixture
 def players(tmp_path: Path) -> tuple[Path, Path]:
-    """Return a folder with players that write a line for each call, and the file to which they write."""
+    """Return a folder with players that write a line for each call, and the file that they write."""
     log = tmp_path / "log"
     log.touch()
     folder = tmp_path / "bin"

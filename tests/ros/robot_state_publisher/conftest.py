@@ -1,4 +1,4 @@
-"""Fixtures that start programs of ROS packages as `rosrun` does, and read the messages that they publish."""
+"""Fixtures that start programs in ROS packages as `rosrun` does, and read the messages that these publish."""
 
 from __future__ import annotations
 

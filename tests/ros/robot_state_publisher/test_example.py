@@ -52,7 +52,7 @@ def test_arm_of_the_page_prints_what_the_page_shows() -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C of Unix")
 def test_arguments_of_the_launch_file_reach_the_description() -> None:
-    # 0.1 + 0.8 + 0.4: the arm points straight up.
+    # 0.1 + 0.8 + 0.4 m: the arm points straight up.
     read = typed(
         "roslaunch two_link_arm arm.launch upper_length:=0.8 shoulder:=0.0 elbow:=0.0", "RPY .degree"
     )

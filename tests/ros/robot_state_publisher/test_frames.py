@@ -1,4 +1,4 @@
-"""Joint positions -> link poses."""
+"""The conversion of joint positions to link poses."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def frames_of(*joints: str) -> RobotFrames:
 
 
 def test_moving_joints_come_in_the_order_of_their_names() -> None:
-    # As recorded from Debian's robot_state_publisher.
+    # These values are recorded from Debian's robot_state_publisher.
     moving = [*RobotFrames(ARM).moving({"shoulder": 0.5, "elbow": 1.0, "left": 0.02})]
     assert [each.child for each in moving] == ["forearm", "finger_left", "finger_right", "upper_arm"]
     assert moving[0].pose.rotation == pytest.approx(

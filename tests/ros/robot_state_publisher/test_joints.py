@@ -1,4 +1,4 @@
-"""The joints of a description that can be set, and the published lists of them."""
+"""The joints in a description that can be set, and the joint states published for them."""
 
 from __future__ import annotations
 

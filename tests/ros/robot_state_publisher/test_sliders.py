@@ -1,4 +1,4 @@
-"""Joints set by keys, and joint_state_publisher_gui in a terminal and without one."""
+"""Joints set with keys, and joint_state_publisher_gui in a terminal and without one."""
 
 from __future__ import annotations
 
@@ -104,14 +104,14 @@ def test_keys_in_a_terminal_move_the_robot() -> None:
     while b"shoulder" not in seen:
         seen += os.read(ours, 4096)
     os.write(ours, b"\x1b[C\x1b[C")
-    # Two steps of 1 % of 3.14 rad.
+    # Two steps, each 1 % of 3.14 rad.
     assert python(FIRST_POSITION.format(condition="message.position[0] > 0.05")) == "0.0628\n"
     os.write(ours, b"q")
     try:
         while os.read(ours, 4096):
             pass
     except OSError:
-        # The terminal was closed (Linux).
+        # On Linux, reading fails when the terminal is closed.
         pass
     _, errors = program.communicate(timeout=SECONDS)
     os.close(ours)

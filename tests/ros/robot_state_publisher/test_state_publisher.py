@@ -76,7 +76,7 @@ def test_prefix_is_found_upwards_and_fixed_joints_repeat_without_tf_static(
         async for message in node.subscribe("/tf", TFMessage):
             assert frames(message) == [("left/forearm", "left/tool")]
             stamps.append(message.transforms[0].header.stamp)
-            # Late stamps are no longer in the future.
+            # If messages arrive late, their stamps are no longer in the future.
             if len(stamps) > 1 and stamps[-1] > node.now():
                 break
         assert stamps[0] < stamps[1]

@@ -1,4 +1,4 @@
-"""A node that publishes, and the recorder as a process."""
+"""A node that publishes, and `rosbag record` and `play` as processes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Recorded(NamedTuple):
 
 
 def messages(path: Path) -> list[Recorded]:
-    """Return the messages of a bag in the order of time, as the library rosbags reads them."""
+    """Return a bag's messages in order of time, as read by the library rosbags."""
     with Reader(path) as reader:
         return [
             Recorded(connection.topic, connection.ext.callerid or "", time, body)  # type: ignore[union-attr]
@@ -69,7 +69,7 @@ def say(publication: Publication, text: str | bytes) -> None:
 
 
 def said(body: bytes) -> str:
-    """Return the string of a message."""
+    """Return the string in a serialized message."""
     return body[4:].decode()
 
 
@@ -122,7 +122,7 @@ def start(tmp_path: Path) -> Iterator[Start]:
 
 
 def read_until(process: subprocess.Popen[str], text: str, stream: IO[str] | None = None) -> None:
-    """Read a program's output lines up to the one that contains this text."""
+    """Read a program's output up to the line that contains this text."""
     stream = stream or process.stdout
     assert stream
     for line in stream:

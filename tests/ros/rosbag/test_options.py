@@ -1,4 +1,4 @@
-"""How `rosbag record` reads durations, sizes and topics."""
+"""The parsing of durations, sizes and topics by `rosbag record`."""
 
 from __future__ import annotations
 

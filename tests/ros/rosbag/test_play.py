@@ -61,7 +61,7 @@ class Ear:
         return [one.text for one in self.heard]
 
     def expect(self, *texts: str) -> None:
-        """Assert that exactly these strings are received: the last may arrive after the player has exited."""
+        """Assert that exactly these strings are received. The last may arrive after the player has exited."""
         wait_until(lambda: len(self.heard) >= len(texts))
         assert self.texts == list(texts)
 
@@ -121,7 +121,7 @@ def test_messages_are_played_in_the_order_of_time(ear: Ear, start: Start, tmp_pa
     one = make_bag(tmp_path / "one.bag", [("/a", 0, "1"), ("/a", 0.2, "3")])
     two = make_bag(tmp_path / "two.bag", [("/a", 0.1, "2"), ("/a", 0.3, "4")])
     ear.listen("/a")
-    # Three seconds: of a shorter time, little may remain if the first message arrives late.
+    # This plays for three seconds; of a shorter time, little may remain if the first message arrives late.
     output, errors = play(start, one, "-r", "0.1", "--bags", two).communicate(timeout=GUARD)
 
     assert errors == ""
@@ -194,7 +194,7 @@ def test_the_clock_is_published(ear: Ear, start: Start, tmp_path: Path) -> None:
     name = make_bag(tmp_path / "b.bag", [("/a", 0, "1"), ("/a", 0.5, "2")])
     ear.listen("/clock")
     ear.listen("/a")
-    # Five seconds: a player that stalls skips the output of that time.
+    # This plays for five seconds; a player that stalls skips the output for that time.
     play(start, name, "--clock", "--hz", "50", "-r", "0.1").communicate(timeout=GUARD)
     wait_until(lambda: [one.topic for one in ear.heard].count("/a") == 2)
 
@@ -298,7 +298,7 @@ def test_immediate(ear: Ear, start: Start, tmp_path: Path) -> None:
 
 
 STALLED = "from minirospy.ros.rosbag.recording import player; player._STALLED_SECONDS = {}"
-PATIENT = STALLED.format(1e9)  # only the test's action ends the wait for a subscriber
+PATIENT = STALLED.format(1e9)  # with this, only the test's action ends the wait for a subscriber
 
 
 def test_slow_subscriber_gets_all_that_waits_for_it(ear: Ear, start: Start, tmp_path: Path) -> None:
@@ -382,7 +382,7 @@ def test_keys_of_a_terminal(ear: Ear, start: Start, tmp_path: Path) -> None:
     ear.listen("/a")
     ours, theirs = pty.openpty()
     before = termios.tcgetattr(theirs)
-    # Start a new session whose controlling terminal this is.
+    # Start a new session, with this terminal as the controlling terminal.
     take = "import os, fcntl, termios; os.setsid(); fcntl.ioctl(0, termios.TIOCSCTTY, 0)"
     process = start("play", name, "--pause", "--wait-for-subscribers", stdin=theirs, prelude=take)
     read_until(process, "Finished waiting")

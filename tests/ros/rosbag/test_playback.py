@@ -1,4 +1,4 @@
-"""What requests do in each phase of a playback: the state machine, without clock, files or threads."""
+"""The effect of requests in each phase of a playback: the state machine, without a clock, files or threads."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from minirospy.ros.rosbag.recording.schedule import PlayOptions, State
 
 SECOND = 10**9
 START, END = 1000 * SECOND, 1010 * SECOND
-"""Bag times of the first and last message; the wall starts at 0."""
+"""Bag times of the first and last message. Wall time starts at 0."""
 LEAD = SECOND // 500
 
 
@@ -32,7 +32,7 @@ def made(phase: Phase, options: PlayOptions | None = None) -> Playback:
 @pytest.mark.parametrize("is_controlled", [False, True])
 @pytest.mark.parametrize("paused", [False, True])
 def test_pause_requested_before_the_start_counts(paused: bool, is_controlled: bool) -> None:
-    """The service is offered before the clock runs."""
+    """The service is offered before the clock starts."""
     playback = Playback(PlayOptions(paused=paused))
     playback.set_span(START, END)
     if is_controlled:

@@ -1,4 +1,4 @@
-"""`rosbag record` as a process: the bag's contents, and the exit."""
+"""`rosbag record` as a process: the bag's contents, and how the process exits."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_compressed_message_reaches_the_disk_without_another(
     talker: Talker, start: Start, tmp_path: Path
 ) -> None:
     chatter = talker.advertise("/chatter")
-    # One message fills the buffer: while the recorder waited, nothing else would be recorded.
+    # One message fills the buffer, so if the recorder waited, nothing else would be recorded.
     process = start("record", "-j", "-b", "1", "--chunksize", "0", "-O", "out", "/chatter")
     connected(chatter)
     for i in range(3):
@@ -292,7 +292,7 @@ def test_a_full_disk_leaves_a_readable_mcap_file(talker: Talker, start: Start, t
 def test_a_chunk_that_cannot_be_compressed_leaves_a_readable_bag(
     talker: Talker, start: Start, tmp_path: Path, chunk: str
 ) -> None:
-    """A chunk of 10 KB fails during recording, one of 4 MB when the file is completed."""
+    """A 10 KB chunk fails during recording, and a 4 MB chunk when the file is completed."""
     chatter = talker.advertise("/chatter")
     no_memory = (
         "from minirospy.core.bag import writer\n"
@@ -321,7 +321,7 @@ def test_a_chunk_that_cannot_be_compressed_leaves_a_readable_bag(
 
 def test_dropped_messages_are_counted(talker: Talker, start: Start, tmp_path: Path) -> None:
     chatter = talker.advertise("/chatter")
-    # A disk that blocks until stdin is closed.
+    # Simulate a disk that blocks until stdin is closed.
     slow = (
         "from minirospy.ros.rosbag.recording.disk import QueuedFile\n"
         "write = QueuedFile._write_all\n"
@@ -515,7 +515,7 @@ def test_a_second_ctrl_c_does_not_cost_the_file(talker: Talker, start: Start, tm
     process.send_signal(signal.SIGINT)
     read_until(process, "Closing 'out.bag'.")
     process.send_signal(signal.SIGINT)
-    # If the signal arrives while the node still unregisters, this is printed after two seconds.
+    # If the signal arrives while the node is still unregistering, this line is printed after two seconds.
     read_until(process, " MB are still to be written", process.stderr)
     assert process.stdin
     process.stdin.close()

@@ -8,18 +8,18 @@ from minirospy.ros.rosbag.recording.schedule import PlayOptions, Schedule, State
 
 SECOND = 10**9
 TICK = SECOND // 10
-START = 1000 * SECOND  # the bag's time of the first message; the wall clock starts at 0
+START = 1000 * SECOND  # bag time of the first message; wall time starts at 0
 
 
 class Published(NamedTuple):
-    """A message and its publication time, both in seconds since the start."""
+    """A message and the time when it was published, both in seconds since the start."""
 
     stored: float
     at: float
 
 
 class Wall:
-    """Plays messages (seconds, topic) by a schedule; ``on`` has the events by wall-clock time."""
+    """Plays messages (seconds, topic) by a schedule; ``on`` contains the events by wall time."""
 
     def __init__(self, options: PlayOptions, *, last: float = 10.0) -> None:
         self.now = 0
@@ -107,7 +107,7 @@ def test_a_step_publishes_one_message() -> None:
     wall = Wall(PlayOptions(paused=True))
     wall.events = [(1.0, "s"), (2.0, "s"), (5.0, "space")]
 
-    # After the steps, the third keeps its distance to the second as in the bag.
+    # After the steps, the third message follows the second at the same distance as in the bag.
     assert wall.play(0, 10, 11) == [(0, 1), (10, 2), (11, 6)]
 
 
@@ -140,7 +140,7 @@ def test_pause_topics_pause_before_the_message() -> None:
     wall = Wall(PlayOptions(pause_topics=frozenset({"/stop"})))
     wall.events = [(3.0, "space")]
 
-    # It has waited since 1.0, when the message became the next one; 0.5 s of its delay remain.
+    # It has been pending since 1.0, when it became the next message; 0.5 s of its delay remain.
     assert wall.play(0, 1, (1.5, "/stop"), 2) == [(0, 0), (1, 1), (1.5, 3.5), (2, 4)]
 
 

@@ -1,4 +1,4 @@
-"""The splitting of a recording, and the names of its files."""
+"""When a recording is split, and the names of its files."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import pytest
 
 BIN = Path(sys.executable).parent
 
-# A single write per line: roslaunch writes to the same pipe at the same time.
+# Write each line with a single call, because roslaunch writes to the same pipe at the same time.
 WAIT = """import signal, sys, time
 def stop(number, frame):
     sys.stdout.write(f'ended by {signal.Signals(number).name}\\n')
@@ -70,7 +70,7 @@ Start = Callable[..., Running]
 
 @pytest.fixture
 def start(package: Path) -> Iterator[Start]:
-    """Start roslaunch on the text of a launch file, with options."""
+    """Return a function that starts roslaunch with the text of a launch file, and options."""
     running: list[Running] = []
 
     def start(text: str, *options: str) -> Running:

@@ -1,4 +1,4 @@
-"""A user's program that launches nodes, with every class of roslaunch's API; and the documented forms of `import roslaunch`."""
+"""A user's program that launches nodes with every class in roslaunch's API, and the documented forms of `import roslaunch`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import pytest
 import roslaunch
 import roslaunch.roslaunch_logs
 
+from minirospy.ros.roslaunch.launcher.spec import ParameterCommand
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 from tests.conftest import free_port
 from tests.waiting import wait_until
@@ -98,7 +99,7 @@ def test_no_node_outlives_its_program(master: str, package: Path, end: str) -> N
 
 
 def test_a_process_that_was_stopped_is_not_respawned(master: str, package: Path) -> None:
-    """The process had exited by itself before, and was waiting to be respawned."""
+    """The process had exited by itself before, and was pending a respawn."""
     launch = roslaunch.scriptapi.ROSLaunch()
     launch.start()
     try:
@@ -115,7 +116,7 @@ def test_a_process_that_was_stopped_is_not_respawned(master: str, package: Path)
 
 
 def test_the_run_id_is_the_programs(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """This also applies to a master that the launch starts."""
+    """The run id also applies to a master that the launch starts."""
     uri = f"http://localhost:{free_port()}"
     monkeypatch.setenv("ROS_MASTER_URI", uri)
     run_id = roslaunch.rlutil.get_or_generate_uuid(None, False)
@@ -196,9 +197,19 @@ def test_nothing_is_left_of_a_program_that_forgets_its_launch(master: str, packa
         "process = launch.launch(roslaunch.core.Node('pkg', 'wait.py', 'a', output='screen'))\n"
         "print('pid', process.pid, flush=True)\n"
     )
-    # The output reaches end of file only when the node, which has the pipe open too, has exited.
+    # The output only reaches end of file when the node, which also has the pipe open, has exited.
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False
     )
     assert "pid " in done.stdout
     assert done.returncode == 0
+
+
+def test_a_configuration_runs_the_commands_that_it_was_given() -> None:
+    config = roslaunch.ROSLaunchConfig()
+    text = '<launch><rosparam command="delete" param="a"/><rosparam command="dump" file="f" ns="b"/><bogus/></launch>'
+    roslaunch.XmlLoader().load_string(text, config, verbose=False)
+    config.add_executable(roslaunch.core.Executable("echo", ["hi"], roslaunch.core.PHASE_SETUP))
+    assert config.spec.commands == [ParameterCommand("/a"), ParameterCommand("/b", "f")]
+    assert config.config_errors == ["unrecognized tag bogus"]
+    assert [str(warning) for warning in config.spec.warnings] == ["<stdin>:1: unrecognized tag <bogus>"]

@@ -1,4 +1,4 @@
-"""The command that runs a node, made from its attributes."""
+"""The command that runs a node, built from the node's attributes."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 @pytest.fixture
 def files(package: Path) -> Path:
-    """Return a launch file that includes one of another package, and runs nodes of two packages."""
+    """Return a launch file that includes a file from another package, and runs nodes from two packages."""
     other = package.parent / "other"
     other.mkdir()
     (other / "package.xml").write_text("<package><name>other</name><run_depend>pkg</run_depend></package>")
@@ -32,7 +32,7 @@ def test_what_a_file_needs(files: Path, capsys: pytest.CaptureFixture[str]) -> N
     inner_line = f"pkg [pkg/wait.py]\nother [{inner}]\n"
     assert roslaunch_deps.main([str(inner)]) == 0
     assert capsys.readouterr().out == "pkg\n"
-    # Files that do not exist yet and an arg without a value are not faults.
+    # Files that do not exist yet and an arg without a value are not errors.
     assert roslaunch_deps.main(["-v", "-w", str(files)]) == 0
     said = capsys.readouterr().out
     assert said == (
@@ -76,7 +76,7 @@ def test_run_id_that_leads_elsewhere_is_not_followed(
     proxy = MasterProxy(master, "/t")
     proxy.set_param("/run_id", run_id)
     proxy.close()
-    # A list's text does not look like a path, so it is refused as well.
+    # A list's text does not look like a path, so it is also rejected.
     assert roslaunch_logs.main([]) == (0 if run_id == 5 else 1)
     assert "elsewhere" not in capsys.readouterr().out
 
@@ -89,7 +89,7 @@ def test_without_a_master(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
 
 
 def test_the_args_of_a_file_as_they_are(package: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """With default values, and only args that apply; a value that cannot be resolved stays as written."""
+    """Defaults are resolved, and only args that apply are listed; a value that cannot be resolved stays as written."""
     file = package / "a.launch"
     file.write_text(
         '<launch><arg name="need" doc="a thing"/><arg name="a" default="1"/><arg name="b" default="$(arg a)2"/>'

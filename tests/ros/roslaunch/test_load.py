@@ -88,6 +88,11 @@ def test_private_params_go_to_the_nodes_that_follow(packages: Packages) -> None:
     assert spec.params == {"/after/x": 1}
 
 
+def test_a_param_takes_precedence_over_a_rosparam_of_its_node(packages: Packages) -> None:
+    node = '<node pkg="rpi_feros" type="n" name="n"><param name="a" value="1"/><rosparam>{a: 2, b: 3}</rosparam></node>'
+    assert load(packages, f'<param name="~b" value="4"/>{node}').params == {"/n/a": 1, "/n/b": 4}
+
+
 def test_rosparam_sets_leaves_and_leaves_siblings_alone(packages: Packages) -> None:
     spec = load(
         packages,
@@ -379,7 +384,7 @@ def test_file_that_explodes_is_refused_in_one_line(packages: Packages, body: str
 
 
 def test_files_that_include_the_next_one_twice_are_refused(packages: Packages, tmp_path: Path) -> None:
-    # 2^40 includes, without a limit.
+    # Without a limit, there would be 2^40 includes.
     for number in range(40):
         include = f'<include file="$(dirname)/f{number + 1}.launch"/>'
         (tmp_path / f"f{number}.launch").write_text(f"<launch>{include * 2}</launch>")
@@ -410,7 +415,7 @@ def test_args_that_double_are_refused(packages: Packages) -> None:
     ids=["open", "nested", "bracket", "package", "words"],
 )
 def test_long_substitutions_take_no_time(packages: Packages, text: str, why: str | None) -> None:
-    # The first one took 20 s: each of its characters was tried as the end of two parts.
+    # Without the fix, the first one took 20 s, because each character was tried as the end of two parts.
     if why is None:
         assert load(packages, f'<param name="p" value="{text}"/>').params == {"/p": text}
         return

@@ -1,4 +1,4 @@
-"""`<test>` tags of launch files."""
+"""`<test>` tags in launch files."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_a_name_is_required() -> None:
 
 
 def test_empty_name_leaves_the_node_unnamed() -> None:
-    """As in rostest: the parameters are in the namespace, and the node gets a unique name at run time."""
+    """As in rostest, the parameters are in the namespace, and the node gets a unique name when it runs."""
     param = '<param name="~v" value="1"/>'
     text = f'<launch><group ns="g"><test test-name="" pkg="p" type="t.py">{param}</test></group></launch>'
     spec = load_text(text, {}, Packages.below(), {})

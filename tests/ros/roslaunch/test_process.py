@@ -1,4 +1,4 @@
-"""Stopping the processes of a launch, and the guardian on systems that stop them."""
+"""Stopping the processes of a launch, and the guardian on systems that stop these processes themselves."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FOREVER = [sys.executable, "-c", "import time; time.sleep(600)"]
 def test_a_process_that_no_interrupt_reaches_is_terminated_immediately(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """As on Windows without a console: waiting its 600 seconds would have no effect."""
+    """On Windows without a console, no interrupt reaches the process, so waiting its 600 seconds would have no effect."""
 
     def refuse(_: object) -> None:
         raise OSError("Invalid handle")
@@ -33,7 +33,7 @@ def test_a_process_that_no_interrupt_reaches_is_terminated_immediately(
 
 
 def test_the_guardian_leaves_processes_alone_that_the_system_ends() -> None:
-    """Their process ids may belong to other processes by then."""
+    """By then, their process ids may belong to other processes."""
     words = [sys.executable, "-I", "-S", str(guardian.__file__), "0", "0", "http://localhost:1"]
     with subprocess.Popen(FOREVER) as other:
         try:
@@ -58,7 +58,7 @@ def test_the_guardian_ends_nodes_before_their_master() -> None:
 def test_guardian_is_started_if_cleanup_is_needed(
     is_guarded: bool, own_master: bool, starts: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If the system stops the processes, the guardian still unregisters nodes at a master that keeps running."""
+    """If the system stops the processes, the guardian still unregisters nodes from a master that keeps running."""
     children = guard_children()
     monkeypatch.setattr(children, "is_guarded", is_guarded)
     monkeypatch.setattr(process, "guard_children", lambda: children)

@@ -16,7 +16,7 @@ from minirospy.ros.roslaunch.launcher.remote import RemoteMachines
 def test_node_that_ends_before_the_others_have_started_does_not_run(
     ended: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its roslaunch reports the exit on a separate connection, perhaps before it answers that the node has started."""
+    """Its roslaunch reports the exit on a separate connection, perhaps before it reports the node's start."""
     machines = RemoteMachines(Mock(), "run", Mock(), Mock(), Mock())
     nodes: Any = [SimpleNamespace(name=name, to_xml=lambda: "<node/>") for name in ("/a", "/b")]
     ssh: Any = SimpleNamespace(is_running=True)

@@ -77,7 +77,7 @@ def test_output_and_working_directory_of_a_node(start: Start, master: str, packa
         '<node pkg="pkg" type="stop.py" name="b" args="0" output="screen"/>'
     )
     said, _ = launch.process.communicate(timeout=30)
-    # Stderr is shown for any value of `output`.
+    # Stderr is shown regardless of the value of `output`.
     assert said.count("err\n") == 2
     assert f"out {home} 1 2\n" in said
     folder = home / "log" / str(run_id.get_param("/run_id"))
@@ -126,7 +126,7 @@ def test_watch_starts_a_node_again_when_its_file_changes(start: Start, master: s
     launch = start(f'{NODE}"a" output="screen"/>', "--watch")
     launch.read_until("waiting")
     file = package / "wait.py"
-    # Replace the file atomically: roslaunch may read it at any moment.
+    # Replace the file atomically, because roslaunch may read it at any moment.
     changed = package / "changed"
     changed.write_text(file.read_text().replace("waiting", "changed"))
     changed.replace(file)

@@ -1,4 +1,4 @@
-"""The summary of a launch: parameter values as roslaunch shortens them."""
+"""The summary of a launch, with parameter values shortened as in roslaunch."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from minirospy.ros.roslaunch.launcher.supervisor import Supervisor
 
 
 class FakePopen:
-    """A process that exits on the test's request; its thread waits until then."""
+    """A process that exits when the test requests it."""
 
     def __init__(self, pid: int) -> None:
         self.pid = pid
@@ -48,7 +48,7 @@ class Clock:
 
 
 class Events(queue.SimpleQueue):  # type: ignore[type-arg]
-    """A queue whose timeouts expire immediately on the test's clock; it blocks while no node is to be respawned."""
+    """A queue whose timeouts expire immediately on the test's clock. It blocks while no node is to be respawned."""
 
     def __init__(self, clock: Clock, supervisor: Supervisor) -> None:
         self.clock = clock

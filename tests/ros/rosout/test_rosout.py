@@ -1,4 +1,4 @@
-"""rosout: the node that collects all log messages blocks neither the master nor exhausts its memory."""
+"""rosout: the node that collects all log messages neither blocks the master nor exhausts its memory."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def body_of(text: str, name: str = "/talker") -> bytes:
 
 
 class Link:
-    """A subscriber of /rosout_agg."""
+    """A subscriber to /rosout_agg."""
 
     def __init__(self, waiting: int) -> None:
         self.waiting = waiting
@@ -66,7 +66,7 @@ def test_long_text_is_written_in_steps() -> None:
     node._file = SimpleNamespace(text=lines.append)
     text = "\x1b[1m\n\t" * 10_000
     steps = node.on_message(body_of(text, "/a\nb"), {})
-    # Each control character in a string takes some 0.5 us.
+    # Escaping each control character in a string takes some 0.5 us.
     assert sum(1 for _ in steps) >= len(text) // rosout.STEP_LETTERS
     assert lines == [
         f"0.000000000 INFO /a\\nb [f.py:7(g)] [topics: ] {text.replace(chr(27), chr(92) + 'x1b')}"
@@ -89,7 +89,7 @@ def test_message_that_is_left_out_is_one_warning_with_the_node(caplog: pytest.Lo
     first, *others = caplog.records
     assert first.levelname == "WARNING"
     assert first.message == "a log message of /talk\\ner was left out: it is longer than 256 KiB"
-    # Each is counted, also if ten seconds have passed between two of them.
+    # Each is counted, even if ten seconds have passed between two of them.
     assert others
 
 
@@ -130,5 +130,5 @@ def test_publishers_are_read_in_turns() -> None:
     assert sorted(left_out) == [0, 1]
     assert found.count(b"last") == 2
     assert len(found) == 42
-    # Neither waits until the other is done.
+    # Neither waits until the other one is done.
     assert set(found[:4]) == {b"0", b"1"}

@@ -1,4 +1,4 @@
-"""serial_node.py: a device on a pseudo-terminal, and one that connects by TCP."""
+"""serial_node.py with a device on a pseudo-terminal, and with one that connects over TCP."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ def test_device_and_node_see_the_same_as_with_the_real_program(master: str) -> N
     )
     assert done.returncode == 0, done.stderr
     recorded = (HERE / "drive.txt").read_text(encoding="utf-8")
-    # Python's own messages, which do not name a type.
+    # These messages are Python's own, which do not name a type.
     for python, ours in (
         ("no_such_msgs", "no_such_msgs/Thing"),
         ("module 'std_msgs.msg' has no attribute 'NoSuch'", "std_msgs/NoSuch"),
     ):
         line = f"Cannot import package of message type [{ours}]: build or install it on this side, too"
         recorded = recorded.replace(f"failed: {python}\n", f"failed: {line}\n")
-    # Published once the node runs, even if the subscriber of /rosout is not connected by then.
+    # The message is published once the node runs, even if the subscriber to /rosout is not connected by then.
     printed = done.stdout
     for early in ("log: 2 ROS Serial Python Node\n", "log: 2 Connecting to PORT at 57600 baud\n"):
         printed, recorded = printed.replace(early, ""), recorded.replace(early, "")
@@ -80,22 +80,20 @@ def test_devices_connect_by_tcp_one_after_the_other(start: Start, fork: str) -> 
     port = free_port()
     process = start("rosserial_python", "serial_node.py", "tcp", str(port), f"_fork_server:={fork}")
 
-    async def connect() -> socket.socket:
-        while True:
-            try:
-                connection = socket.create_connection(("127.0.0.1", port), SECONDS)
-            except OSError:
-                await asyncio.sleep(0.1)
-            else:
-                connection.settimeout(SECONDS)
-                return connection
+    def connected() -> socket.socket | None:
+        try:
+            return socket.create_connection(("127.0.0.1", port), SECONDS)
+        except OSError:
+            return None
 
     async def body() -> None:
         async with Node("test", rosout=False) as node:
             received = node.subscribe("chatter", String)
             words = node.advertise("words", String)
             for turn in ("first", "second"):
-                with await connect() as device:
+                device = await until(connected)
+                assert device
+                with device:
                     decoder = Decoder()
                     assert await asyncio.to_thread(packets, device, decoder, 1) == [(0, b"")]
                     device.sendall(describe(0, CHATTER, "chatter") + describe(1, WORDS, "words", 280))
@@ -105,7 +103,7 @@ def test_devices_connect_by_tcp_one_after_the_other(start: Start, fork: str) -> 
                         assert message.data == turn
                         break
                     await words.wait_for_subscribers()
-                    # Larger than the device's buffer: dropped, and the next one is received.
+                    # The message is larger than the device's buffer, so it is dropped, and the next one is received.
                     await words.publish(String("x" * 400))
                     await words.publish(String("short"))
                     (packet,) = await asyncio.to_thread(packets, device, decoder, 1)

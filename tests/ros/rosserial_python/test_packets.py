@@ -12,10 +12,10 @@ PIECES = st.lists(st.binary(max_size=20), max_size=8)
 
 
 def test_packets_are_those_of_the_protocol() -> None:
-    # The requests for topics and for silence, as in the protocol's documentation.
+    # These are the requests for topics and for silence in the protocol's documentation.
     assert encode(0, b"") == bytes.fromhex("ff fe 00 00 ff 00 00 ff")
     assert encode(11, b"") == bytes.fromhex("ff fe 00 00 ff 0b 00 f4")
-    # 3 bytes of topic 258: checksums of 03 00, and of 02 01 with the data.
+    # 3 bytes on topic 258, with checksums of 03 00, and of 02 01 with the data.
     assert encode(258, b"abc") == bytes.fromhex("ff fe 03 00 fc 02 01 61 62 63 d6")
 
 

@@ -1,4 +1,4 @@
-"""The test programs of rostest, run by rostest on the package `tested`."""
+"""rostest's test programs, run by rostest on the package `tested`."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def test_a_test_called_as_a_node_is_warned_of(tmp_path: Path) -> None:
 
 
 def test_a_test_without_a_name_runs_under_a_unique_one(tmp_path: Path) -> None:
-    """As in real rostest: its results have no name, and its node is named after its type."""
+    """As in real rostest, its results have no name, and its node is named after its type."""
     text = '<test test-name="" pkg="tested" type="good.py"/><test test-name="" name="x" pkg="tested" type="good.py"/>'
     status, out, _ = ran("rostest", "--package=a", "--pkgdir=/", write_test(tmp_path / "x.test", text))
     assert status == 1
@@ -249,5 +249,5 @@ def test_typed_wrong(
     err = capsys.readouterr().err
     *ros, ours = err.splitlines()
     assert text in ours
-    # rosunit without a file prints its usage first, as the real one does.
+    # rosunit without a file prints its usage first, as the real rosunit does.
     assert ros == (ROSUNIT_USAGE if (command, words) == ("rosunit", ()) else [])

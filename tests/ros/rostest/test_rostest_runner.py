@@ -1,4 +1,4 @@
-"""rostest.runner: programs that run a launch file's tests by unittest. The package `tested` is in this folder."""
+"""rostest.runner: programs that run a launch file's tests with unittest. The package `tested` is in this folder."""
 
 from __future__ import annotations
 

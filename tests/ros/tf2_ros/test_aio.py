@@ -1,4 +1,4 @@
-"""Frames in asyncio programs: buffers, changes and broadcasters of nodes in one loop."""
+"""Frames in asyncio programs: buffers, changes and broadcasters of nodes on one loop."""
 
 from __future__ import annotations
 

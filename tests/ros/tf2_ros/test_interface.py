@@ -1,4 +1,4 @@
-"""Transforms of whole objects and conversions between types, registered and not registered."""
+"""Transforms of whole objects and conversions between types, with registered and unregistered types."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Thing:
 
 
 class Other(Thing):
-    """A type to which things are converted."""
+    """A type to which a Thing can be converted."""
 
 
 class OneTransform(BufferInterface):

@@ -1,4 +1,4 @@
-"""PyKDL: refused arguments. tests/referee/cases/frames_kdl.py compares the rest with the real one."""
+"""PyKDL: rejected arguments. tests/referee/cases/frames_kdl.py compares the rest with the real PyKDL."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""tf2_ros in programs: listeners, waits, time that jumps, buffer servers. tests/core/tf2 tests tf2 itself."""
+"""tf2_ros in programs: listeners, waits, time jumps, buffer servers. tests/core/tf2 tests tf2 itself."""
 
 from __future__ import annotations
 

@@ -23,6 +23,7 @@ from minirospy.ros.tf2_ros.tools import echo, monitor, static_publisher, view
 from minirospy.ros.tf2_ros.tools.angles import euler_of_matrix, rpy_of_matrix
 from minirospy.ros.tf2_ros.tools.monitor import Delays
 from tests.ros.robot_state_publisher.conftest import SECONDS, Start, python
+from tests.waiting import until
 
 STATIC = ("tf2_ros", "static_transform_publisher")
 OLD_STATIC = ("tf", "static_transform_publisher")
@@ -32,15 +33,15 @@ POSE = """\
             in RPY (radian) [0.100, 0.250, 0.500]
             in RPY (degree) [5.730, 14.324, 28.648]
 """
-"""Output of Debian's tf_echo for the frames of the fixture."""
+"""Output of Debian's tf_echo for the frames in the fixture."""
 
 
 @pytest.fixture
 def frames(start: Start) -> None:
-    """Publish the frames a -> b on /tf at 10 Hz, b -> c on /tf_static."""
+    """Publish the frame a -> b on /tf at 10 Hz, and b -> c on /tf_static."""
     start(*OLD_STATIC, *words("1 2 3 0.5 0.25 0.1 /a /b 100"), "__name:=moving")
     start(*STATIC, *words("0.5 0 0 0 0 0 1 b c"), "__name:=fixed")
-    # Some programs listen for only a few seconds.
+    # Wait, because some programs listen for only a few seconds.
     wait_for("b", "c")
 
 
@@ -135,7 +136,7 @@ class TestMonitor:
         found = re.search(
             r"^Frame: b published by /moving Average Delay: (\S+) Max Delay: (\S+)$", read, re.M
         )
-        # Its stamps are 0.1 s in the future; a machine that stalls delays the publication.
+        # The program's stamps are 0.1 s in the future, but a machine that stalls delays the publication.
         assert found
         assert -0.1 <= float(found[1]) <= float(found[2])
         assert "Frame: c published by /fixed(static) Average Delay: 0 Max Delay: 0" in lines_until(
@@ -185,7 +186,7 @@ def test_frames_are_drawn(
         output, errors = program.communicate(timeout=SECONDS)
         assert program.returncode == 0, errors
         graph = Path("frames.gv").read_text(encoding="utf-8")
-        # On a machine that stalls, frames may arrive after the five seconds for which it listens.
+        # On a machine that stalls, frames may arrive after the five seconds for which the program listens.
         if '"a" -> "b"' in graph and '"b" -> "c"' in graph:
             break
     assert re.search(r'"b" -> "c"\[label=" ?Broadcaster: /fixed\\nAverage rate: 10000.0', graph)
@@ -211,8 +212,11 @@ def test_frames_of_a_node_are_drawn(start: Start, tmp_path: Path, monkeypatch: p
     async def listed() -> None:
         async with Node("waits", rosout=False) as node:
             await node.wait_for_service("/tf_buffer/tf2_frames")
-            while "c:" not in (await node.call("/tf_buffer/tf2_frames", FrameGraph)).frame_yaml:
-                await asyncio.sleep(0.02)
+
+            async def has_frame() -> bool:
+                return "c:" in (await node.call("/tf_buffer/tf2_frames", FrameGraph)).frame_yaml
+
+            await until(has_frame)
 
     asyncio.run(asyncio.wait_for(listed(), SECONDS))
     program = start("tf", "view_frames", "--node=/tf_buffer")
@@ -313,7 +317,7 @@ def test_wrong_parameters_are_one_line(
 def test_parameter_is_broadcast(start: Start) -> None:
     pose = "{translation: {x: 1, y: 2.5, z: 0}, rotation: {x: 0, y: 0, z: 0, w: 1}}"
     value = f"{{header: {{frame_id: p}}, child_frame_id: q, transform: {pose}}}"
-    # Set with the program's own arguments: a private parameter, by its full name.
+    # The program's own arguments set a private parameter, which is given by its full name.
     start(*STATIC, "/fixed/here", f"_here:={value}", "__name:=fixed")
     program = start("tf", "tf_echo", "p", "q", "20")
     read = lines_until(program, "- Translation: ")

@@ -47,7 +47,7 @@ def test_angles_become_a_rotation_and_angles_again(roll: float, pitch: float, ya
 
 
 def test_shears_are_taken_apart() -> None:
-    """The real module decomposes shears by eigenvectors, of which a shear has too few, and errs by some percent."""
+    """The real module decomposes shears with eigenvectors, of which a shear has too few, and is off by some percent."""
     matrix = transformations.shear_matrix(0.7, [1, -2, 0], [1, 2, 3], [0, 0, 5])
     found, direction, _, normal = transformations.shear_from_matrix(matrix)
     assert found == pytest.approx(0.7, rel=0.1)
@@ -71,7 +71,7 @@ def test_a_ball_turns_with_the_mouse() -> None:
     ball.place([320, 320], 320)
     ball.down([500, 250])
     ball.drag([475, 275])
-    # The numbers of the real module's example.
+    # These are the numbers in the real module's example.
     assert ball.matrix().sum() == pytest.approx(3.90583455)
     ball = transformations.Arcball(initial=[0, 0, 0, 1])
     ball.place([320, 320], 320)

@@ -15,7 +15,7 @@ Call = tuple[str, list[Any], dict[str, Any]]
 
 
 def calls(module: Any, seed: int) -> list[Call]:
-    """Return calls with arguments from a seed; the module itself makes matrices for decomposition."""
+    """Return calls with arguments generated from a seed. The module itself makes the matrices to be decomposed."""
     rng = random.Random(seed)
 
     def vector(n: int = 3) -> list[float]:
@@ -136,7 +136,7 @@ REMAKE: dict[str, Any] = {
     "scale_from_matrix": lambda module, found: module.scale_matrix(*found),
     "projection_from_matrix": lambda module, found: module.projection_matrix(*found),
 }
-"""The points found on a plane or an axis depend on the linear algebra library; the values derived from them do not."""
+"""The points found on a plane or an axis depend on the linear algebra library, but the values derived from them do not."""
 
 
 def _cross(a: list[float], b: list[float]) -> list[float]:
@@ -144,10 +144,10 @@ def _cross(a: list[float], b: list[float]) -> list[float]:
 
 
 def results(module: Any, made: list[Call]) -> list[Any]:
-    """Return what each call returns, arrays as lists, or the exception's type and text."""
+    """Return the result of each call, with arrays as lists, or the exception's type and text."""
     found = []
     for name, arguments, keywords in made:
-        # JSON has no tuples, as which axes are encoded.
+        # Convert lists to tuples: axes are passed as tuples, which JSON does not have.
         given = [
             tuple(each) if name == "euler_matrix" and isinstance(each, list) else each for each in arguments
         ]
@@ -169,7 +169,7 @@ def plain(value: Any) -> Any:
 
 
 def is_near(real: Any, ours: Any) -> bool:
-    """Return whether two results are equal, numbers within 1e-9 of their size."""
+    """Return whether two results are equal; numbers may differ by a relative error of 1e-9."""
     if isinstance(real, list):
         return isinstance(ours, list) and len(real) == len(ours) and all(map(is_near, real, ours))
     if isinstance(real, float) or isinstance(ours, float):

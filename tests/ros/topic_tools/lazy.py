@@ -40,7 +40,7 @@ for _ in range(2):
     print("word", flush=True)
     subscriber.unregister()
 
-    # ROS's publisher notices a subscriber that left when it writes to it.
+    # ROS's publisher notices that a subscriber has left only when it writes to the subscriber.
     while is_lazy and not relay.left.wait(0.2):
         relay.output.publish("word")
     relay.left.clear()

@@ -34,7 +34,7 @@ def test_programs_forward_the_same_as_real_ones(master: str) -> None:
 def test_subscriber_that_comes_as_the_input_is_given_up_opens_it_again(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One thread checks for subscribers while the other is notified of the first of them."""
+    """One thread checks for subscribers while another one is notified of the first of them."""
     comes: list[threading.Thread] = []
 
     class Input:

@@ -36,7 +36,7 @@ def run(body: Callable[[Node], Awaitable[None]]) -> None:
 
 
 async def until(node: Node, topic: str, kind: type, is_right: Callable[[object], bool]) -> object:
-    """Return the first message of a topic that fulfils a condition."""
+    """Return the first message on a topic that meets a condition."""
     async for message in node.subscribe(topic, kind):
         if is_right(message):
             return message
@@ -46,14 +46,14 @@ async def until(node: Node, topic: str, kind: type, is_right: Callable[[object],
 async def driven(
     node: Node, commands: Publisher[Twist], twist: Twist, topic: str, is_right: Callable[[object], bool]
 ) -> object:
-    """Publish a command until a pose fulfils a condition."""
+    """Publish a command until a pose meets a condition."""
     return await commanded(node, lambda: commands.publish(twist), topic, is_right)
 
 
 async def commanded(
     node: Node, command: Callable[[], Awaitable[None]], topic: str, is_right: Callable[[object], bool]
 ) -> object:
-    """Repeat a command until a pose fulfils a condition: a turtle follows it for a second, and poses may arrive later."""
+    """Repeat a command until a pose meets a condition, because a command applies for a second, and poses may arrive later."""
     following = asyncio.ensure_future(until(node, topic, Pose, is_right))
     while not following.done():
         await command()
@@ -115,7 +115,7 @@ def test_turtles_come_and_go(start: Start) -> None:
         await node.call("kill", Kill, name="Fred")
         with pytest.raises(ServiceException):
             await node.call("kill", Kill, name="Fred")
-        # Its topics and services are available to another turtle.
+        # Another turtle can use the topics and services of a removed one.
         assert (await node.call("spawn", Spawn, x=3, y=1, name="Fred")).name == "Fred"
         await until(node, "Fred/pose", Pose, lambda pose: pose.x == 3.0)
 
@@ -165,7 +165,7 @@ def test_square_is_drawn_by_draw_square(start: Start) -> None:
     async def body(node: Node) -> None:
         await node.wait_for_service("reset")
         turns = False
-        # As in the tutorial, the turtle drives on if it has not seen a pose within 0.1 m of its goal: then try again.
+        # As in the tutorial, the turtle drives on if it has seen no pose within 0.1 m of its goal; then try again.
         while not turns:
             process = start("turtlesim", "draw_square")
             await until(node, "turtle1/pose", Pose, lambda pose: pose.x < 5.6)
@@ -288,8 +288,8 @@ class Terminal:
         return status
 
     def _read(self) -> None:
-        # Read all the time: a program whose terminal is full blocks, and its turtle stands still. Linux raises an
-        # error if the terminal is closed.
+        # Read continuously, because a program whose terminal is full blocks, and its turtle stands still. Linux
+        # raises an error if the terminal is closed.
         with contextlib.suppress(OSError):
             while data := os.read(self._master, 65536):
                 with self._changed:

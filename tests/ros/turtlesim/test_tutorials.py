@@ -267,7 +267,7 @@ def test_turtlemimic_launch_lets_one_world_copy_the_other(launch: Launch, tmp_pa
                 until(node, "/turtlesim2/turtle1/pose", lambda pose: pose.linear_velocity == 2.0)
             )
             while not copied.done():
-                # As `rostopic pub -r` does.
+                # `rostopic pub -r` does the same.
                 await commands.publish(twist)
                 await asyncio.wait({copied}, timeout=0.2)
             assert copied.result().angular_velocity == pytest.approx(-1.8)

@@ -1,4 +1,4 @@
-"""The world of the turtles and its paper, without a node."""
+"""The turtles' world and its canvas, without a node."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_walls_stop_a_turtle_with_a_warning(world: World) -> None:
     world.command("turtle1", Velocity(forward=1.0), 1.0)
     reading = steps(world, 1, start=1.0)
     assert reading.pose.x == SIZE
-    # Its y is that of the picture, measured from the top.
+    # The y in this message is measured from the top of the picture.
     assert reading.warning == "Oh no! I hit the wall! (Clamping from [x=11.104889, y=6.088889])"
 
 
@@ -111,7 +111,7 @@ def test_pen_that_is_off_draws_nothing_and_is_kept(world: World) -> None:
     world.set_pen("turtle1", PEN, 0, is_off=False)
     world.teleport_absolute("turtle1", 2.0, 1.0, 0.0)
     assert steps(world, 1).color == PEN
-    # A width of 0 is one pixel.
+    # A width of 0 is drawn as one pixel.
     assert set(world.canvas.marks.sum(axis=0).tolist()) == {0, 1}
 
 
@@ -199,7 +199,7 @@ def test_stroke_outside_of_the_paper_changes_nothing() -> None:
 
 
 def test_square_is_drawn_with_its_goals(world: World) -> None:
-    """The lines that draw_square logs: for half of its turns the goal is the point at which the turtle stops."""
+    """These are the lines that draw_square logs. For half of its turns, the goal is the point at which the turtle stops."""
     square = Square()
     lines: list[str] = []
     orders: list[Order | None] = []

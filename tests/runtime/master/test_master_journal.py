@@ -33,6 +33,7 @@ from minirospy.runtime.master.replay import Replay
 from minirospy.runtime.rpc.server import RpcServer
 from minirospy.runtime.transport.loop import LoopThread
 from tests.conftest import free_port
+from tests.patience import PATIENCE
 from tests.waiting import until, wait_until
 
 BIN = Path(sys.executable).parent
@@ -44,6 +45,7 @@ class Fakes:
     def __init__(self) -> None:
         self.called: list[tuple[int, str, list[Any]]] = []
         self._servers: dict[str, RpcServer] = {}
+        self._held: list[socket.socket] = []
 
     async def open(self, name: str = "") -> str:
         """Start a node that returns ``name`` for getName; return its URI."""
@@ -59,14 +61,43 @@ class Fakes:
         return uri
 
     async def close(self, uri: str = "") -> None:
+        """Close one node, whose port refuses connections until all nodes are closed, or all nodes."""
         for each in [uri] if uri else list(self._servers):
             await self._servers.pop(each).close()
         # A transport closes its socket in the next loop iteration.
         await asyncio.sleep(0.01)
+        if uri:
+            self._hold(int(uri.rpartition(":")[2].rstrip("/")))
+        else:
+            while self._held:
+                self._held.pop().close()
+
+    def _hold(self, port: int) -> None:
+        """Bind a closed node's port without listening: else a server of another test that gets it would answer for the node."""
+        sock = socket.socket()
+        self._held.append(sock)
+        # It fails as long as a connection of the node keeps the port.
+        with contextlib.suppress(OSError):
+            sock.bind(("127.0.0.1", port))
 
 
 def run(test: Coroutine[Any, Any, None]) -> None:
-    asyncio.run(asyncio.wait_for(test, 30))
+    asyncio.run(asyncio.wait_for(test, PATIENCE))
+
+
+def test_port_of_a_closed_node_refuses_connections_and_stays_taken() -> None:
+    async def test() -> None:
+        nodes = Fakes()
+        uri = await nodes.open()
+        await nodes.close(uri)
+        port = int(uri.rpartition(":")[2].rstrip("/"))
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection(("127.0.0.1", port), PATIENCE)
+        with pytest.raises(OSError, match="in use"):
+            await RpcServer(lambda *_: [1, "", 0], port=port).start()
+        await nodes.close()
+
+    run(test())
 
 
 def state(master: Master) -> Any:
@@ -716,14 +747,15 @@ class Killed:
 
     def wait(self) -> float:
         start_time = time.monotonic()
-        while True:
-            try:
-                with ServerProxy(self.uri) as proxy:
-                    proxy.getPid("/test")
-                return time.monotonic() - start_time
-            except OSError:
-                assert time.monotonic() - start_time < 60
-                time.sleep(0.01)
+
+        def answers() -> bool:
+            with contextlib.suppress(OSError), ServerProxy(self.uri) as proxy:
+                proxy.getPid("/test")
+                return True
+            return False
+
+        wait_until(answers)
+        return time.monotonic() - start_time
 
     def kill(self) -> float:
         """Kill and restart the master; return the seconds until it responds."""

@@ -718,6 +718,29 @@ def test_a_restarted_master_that_knows_one_new_topic_gets_all_others() -> None:
     run(scene)
 
 
+def test_a_node_whose_service_another_node_took_notices_a_restarted_master() -> None:
+    """Its service is in the master, but as the other node's; the other node keeps it."""
+
+    async def scene() -> None:
+        async with graph("/a", "/b", watch_seconds=0.05, port=free_port()) as (master, (a, b)):
+            await offer(a, "service")
+            await offer(a, "publisher")
+            await offer(b, "service")
+            await until(lambda: a._registrations._taken)
+            port = master.port
+            await master.close()
+            restarted = Master(host="127.0.0.1", port=port)
+            await restarted.start()
+            try:
+                await until(lambda: known(restarted) == {"publisher": ["/a"], "service": ["/b"]})
+                await a._registrations._register_all(again=True)
+                assert known(restarted)["service"] == ["/b"]
+            finally:
+                await restarted.close()
+
+    run(scene)
+
+
 def test_closing_the_last_topic_is_not_taken_for_a_new_master(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

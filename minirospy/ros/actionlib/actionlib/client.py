@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/actionlib/DetailedDescription.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -17,12 +18,13 @@ from minirospy.client.session import current_session
 from minirospy.core.idl.protocols import Action, ActionFeedback, ActionResult, Message
 from minirospy.ros.actionlib.actionlib.machine import (
     ClientGoalHandle,
+    CommStateMachine,
     FeedbackCallback,
     GoalManager,
     TransitionCallback,
 )
-from minirospy.ros.actionlib.actionlib.spec import TAKES_FAST_ANSWERS
-from minirospy.ros.actionlib.actionlib.statuses import StatusList
+from minirospy.ros.actionlib.actionlib.spec import SERVER_SECONDS, TAKES_FAST_ANSWERS
+from minirospy.ros.actionlib.actionlib.statuses import StatusList, find_status
 from minirospy.ros.actionlib.actionlib.waiting import Waiting
 
 __all__ = ["ActionClient"]
@@ -95,6 +97,9 @@ class ActionClient:
         ``transition_cb(handle)`` is called on each state change, ``feedback_cb(handle, feedback)`` with feedback. Both
         are called in the library's threads, never concurrently.
         """
+        subscription = self.status_sub.impl and self.status_sub.impl.subscription
+        if subscription and self._status_link_ended not in subscription.on_ended:
+            subscription.on_ended.append(self._status_link_ended)
         return self.manager.init_goal(goal, transition_cb, feedback_cb)
 
     def cancel_all_goals(self) -> None:
@@ -131,6 +136,37 @@ class ActionClient:
             end.impl is not None and any(_peer(link) == server for link in end.impl.connections)
             for end in (self.pub_goal, self.pub_cancel, self.result_sub, self.feedback_sub)
         )
+
+    def _status_link_ended(self) -> None:
+        """Check after a while whether the server is gone. Called on the loop."""
+        if goals := self.manager.unfinished():
+            self._check_later(goals)
+
+    def _check_later(self, goals: list[CommStateMachine]) -> None:
+        # Not a rospy.Timer: a simulated clock may stand still without the server.
+        timer = threading.Timer(SERVER_SECONDS, self._check_server, (goals, self.last_status_msg))
+        timer.daemon = True
+        timer.start()
+
+    def _check_server(self, goals: list[CommStateMachine], last: GoalStatusArray | None) -> None:
+        """End ``goals`` as LOST, unless a server lists them in a newer status message than ``last``."""
+        if rospy.is_down() or self.status_sub.impl is None:
+            return
+        statuses = self.last_status_msg
+        is_connected = self.status_sub.impl.get_num_connections() > 0
+        if is_connected and (statuses is last or statuses is None):
+            self._check_later(goals)
+            return
+
+        for goal in goals:
+            goal_id = goal.action_goal.goal_id.id
+            is_listed = is_connected and statuses is not None and find_status(statuses, goal_id) is not None
+            if not is_listed and goal.lose():
+                rospy.logerr(
+                    "The action server [%s] has died or is unreachable: goal %s is LOST",
+                    rospy.resolve_name(self.ns),
+                    goal_id,
+                )
 
     def _subscribe(
         self, name: str, data_class: type[_M], callback: Callable[[_M], None]

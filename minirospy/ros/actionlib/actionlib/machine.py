@@ -195,6 +195,14 @@ class CommStateMachine:
             if self.feedback_cb and self.state != _DONE:
                 self.feedback_cb(ClientGoalHandle(self), action_feedback.feedback)
 
+    def lose(self) -> bool:
+        """End the goal as LOST, because its server is gone; return False if it had ended before."""
+        with self.mutex:
+            if self.state == _DONE:
+                return False
+            self._mark_as_lost()
+            return True
+
     def _mark_as_lost(self) -> None:
         self.latest_goal_status.status = GoalStatus.LOST
         self.transition_to(_DONE)
@@ -278,6 +286,10 @@ class GoalManager:
         """Process feedback."""
         for machine in self._get_live_statuses():
             machine.update_feedback(action_feedback)
+
+    def unfinished(self) -> list[CommStateMachine]:
+        """Return the goals that have not ended."""
+        return [machine for machine in self._get_live_statuses() if machine.state != _DONE]
 
     def _generate_id(self) -> GoalID:
         now = rospy.Time.now()

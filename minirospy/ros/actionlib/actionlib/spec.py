@@ -10,6 +10,7 @@ from minirospy.core.idl.protocols import Action, ActionFeedback, ActionGoal, Act
 __all__ = [
     "CANCEL_SECONDS",
     "SEND_SECONDS",
+    "SERVER_SECONDS",
     "TAKES_FAST_ANSWERS",
     "ActionException",
     "ActionTypes",
@@ -26,6 +27,9 @@ SEND_SECONDS = 1e-3
 
 # Seconds by which cancel requests are delayed: a goal sent earlier uses another connection, and is itself delayed.
 CANCEL_SECONDS = 3 * SEND_SECONDS
+
+# Time for a server to connect again after its connection has ended. Afterwards its goals are LOST.
+SERVER_SECONDS = 5.0
 
 
 class ActionException(MinirospyError):

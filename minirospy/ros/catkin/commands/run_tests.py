@@ -19,6 +19,7 @@ from minirospy.base.installation import install_command
 from minirospy.ros.catkin.commands.test_results import Counts, results_below
 from minirospy.ros.rosunit.runner.bare import POLL_SECONDS, interrupt_noted
 from minirospy.workspace.build import Workspace
+from minirospy.workspace.download import download
 from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
 
 __all__ = ["run_tests"]
@@ -49,6 +50,7 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
             # Remove old results, because the tests that wrote them may no longer exist.
             for file in results.glob("*.xml"):
                 file.unlink()
+        download(plan, plan.downloads)
         for test in plan.tests:
             if not wanted & {*_targets(plan, None), *_targets(plan, test)}:
                 continue

@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 from minirospy.base.errors import NotFoundError
 from minirospy.workspace.build import Report, Workspace, build, read_plans, write_set_up
+from minirospy.workspace.download import download
 from minirospy.workspace.packages import Packages
 from minirospy.workspace.plan import Plan
 
@@ -55,7 +56,7 @@ def build_packages(
 ) -> list[Plan]:
     """Build the chosen packages, or all, printing a line for each; return all packages' plans."""
     white = [name for name in variables.get("CATKIN_WHITELIST_PACKAGES", "").split(";") if name]
-    plans = read_plans(workspace.source, variables)
+    plans = read_plans(workspace.source, {**_places(workspace), **variables})
     names = {plan.name for plan in plans}
     for name in (*chosen, *with_deps, *white):
         if name not in names:
@@ -74,6 +75,7 @@ def build_packages(
             print(
                 f"       {report.plan.name}: skipped, they need a C++ compiler: {', '.join(report.plan.skipped)}"
             )
+        download(report.plan, (each for each in report.plan.downloads if not each.for_tests))
         if report.stand_ins:
             print(f"       {report.plan.name}: minirospy's own are used instead: {report.stand_ins}")
         for warning in report.warnings:
@@ -86,6 +88,12 @@ def build_packages(
     if not plans:
         print(f"There are no packages in {workspace.source} yet")
     return plans
+
+
+def _places(workspace: Workspace) -> dict[str, str]:
+    """Return the variables with the workspace's folders."""
+    devel, build = workspace.devel.as_posix(), workspace.build.as_posix()
+    return {"CATKIN_DEVEL_PREFIX": devel, "CMAKE_BINARY_DIR": build}
 
 
 def _with_dependencies(plans: Sequence[Plan], names: Collection[str]) -> set[str]:

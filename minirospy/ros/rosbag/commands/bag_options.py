@@ -118,7 +118,7 @@ def echo_bag(path: str, name: str | None, options: EchoOptions) -> None:
             try:
                 text = echo.text(value, received)
             except IndexError as error:
-                print(f"rostopic: {error}", file=sys.stderr)
+                print(f"{error.__cause__}: /{field}\nrostopic: {error}", file=sys.stderr)
                 continue
 
             sys.stdout.write(options.prefix + text)

@@ -12,8 +12,9 @@ AT_END    waiting after the last message                 PLAYING by a seek, by r
                                                          :meth:`Playback.leave_end`
 ========= ============================================== ===================================================
 
-A seek takes two steps, since files are read meanwhile: a request sets it, and interrupts the messages; the reader takes it and
-reports that it has arrived. :mod:`minirospy.ros.rosbag.recording.player` is the shell: it has the lock, the clock and the files.
+A seek takes two steps, because files must be read in between: a request sets the time and interrupts the messages; the reader
+takes the request and reports when it has arrived. :mod:`minirospy.ros.rosbag.recording.player` is the impure part, with the
+lock, the clock and the files.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
 
 from minirospy.client.log_handlers import RosStreamHandler
 
@@ -15,7 +16,13 @@ __all__ = [
     "_defaultFormatter",
     "_logging_to_rospy_names",
     "configure_logging",
+    "makedirs_with_parent_perms",
+    "renew_latest_logdir",
 ]
+
+_FILE_BYTES = 50_000_000  # of a log file, before another is begun
+_FILE_BACKUPS = 4
+_FORMAT = "[%(name)s][%(levelname)s] %(asctime)s: %(message)s"
 
 
 class LoggingException(Exception):
@@ -29,23 +36,82 @@ class RospyLogger(logging.Logger):
 def configure_logging(
     logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
 ) -> str | None:
-    """Log to a file in the log folder; set ROS_LOG_FILENAME to the file's path, and return the path."""
+    """Log to a file in the log folder, and what logger `rosout` gets to the terminal, too; return the file's path.
+
+    Replaces the handlers of the root logger and of `rosout`; ``level`` has no effect, as in ROS. A configuration file (of
+    ROS_PYTHON_LOG_CONFIG_FILE, or in ROS_HOME) replaces these settings. Set ROS_LOG_FILENAME to the path. Return None, with a
+    warning, if the folder cannot be created. Raise LoggingException if a file is in its place.
+    """
     from pathlib import Path
 
-    from minirospy.ros.rospkg.rospkg.environment import get_log_dir
+    from minirospy.client.log_setup import configured_by_file
+    from minirospy.ros.rospkg.rospkg.environment import get_log_dir, get_ros_home
     from minirospy.runtime.master.log_file import LogFileHandler
 
-    path = Path(get_log_dir(env)) / (filename or f"{logname}-{os.getpid()}.log")
+    log_dir = get_log_dir(env)
+    path = os.path.join(log_dir, filename or f"{logname or 'unknown'}-{os.getpid()}.log")
+    folder = os.path.dirname(path)
+    if os.path.isfile(folder):
+        raise LoggingException(f"Cannot save log files: file [{folder}] is in the way")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handler = LogFileHandler(path)
+        makedirs_with_parent_perms(folder)
+    except OSError:
+        sys.stderr.write(
+            f"WARNING: cannot create log directory [{folder}]. Please set ROS_LOG_DIR to a writable location.\n"
+        )
+        return None
+    if folder != log_dir and os.name != "nt":
+        try:
+            if not renew_latest_logdir(folder):
+                sys.stderr.write("INFO: cannot create a symlink to latest log directory\n")
+        except OSError as error:
+            sys.stderr.write(f"INFO: cannot create a symlink to latest log directory: {error}\n")
+
+    os.environ["ROS_LOG_FILENAME"] = path
+    if configured_by_file(Path(get_ros_home(env))):
+        return path
+
+    class RotatingFileHandler(LogFileHandler):
+        """A handler with the class name that programs written for ROS expect among the root logger's handlers."""
+
+    try:
+        file = RotatingFileHandler(Path(path), _FILE_BYTES, _FILE_BACKUPS)
     except OSError as error:
         raise LoggingException(f"cannot write the log file [{path}]: {error.strerror}") from error
-    handler.setFormatter(logging.Formatter("[%(name)s][%(levelname)s] %(asctime)s: %(message)s"))
-    logging.getLogger().addHandler(handler)
-    logging.getLogger(logname).setLevel(level)
-    os.environ["ROS_LOG_FILENAME"] = str(path)
-    return str(path)
+    for logger, handler in ((logging.getLogger(), file), (logging.getLogger("rosout"), RosStreamHandler())):
+        handler.setLevel(logging.DEBUG)
+        handler.setFormatter(logging.Formatter(_FORMAT))
+        for old in list(logger.handlers):
+            logger.removeHandler(old)
+        logger.addHandler(handler)
+        logger.setLevel(logging.INFO)
+    return path
+
+
+def makedirs_with_parent_perms(p: str) -> None:
+    """Create a folder and its parents with the owner and the permissions of the nearest folder that exists."""
+    path = os.path.abspath(p)
+    parent = os.path.dirname(path)
+    if os.path.exists(path) or parent == path:
+        return
+    makedirs_with_parent_perms(parent)
+    os.mkdir(path)
+    wanted, made = os.stat(parent), os.stat(path)
+    if os.name != "nt" and (wanted.st_uid, wanted.st_gid) != (made.st_uid, made.st_gid):
+        os.chown(path, wanted.st_uid, wanted.st_gid)
+    if wanted.st_mode != made.st_mode:
+        os.chmod(path, wanted.st_mode)
+
+
+def renew_latest_logdir(logfile_dir: str) -> bool:
+    """Link `latest`, next to a run's folder, to that folder. Return False if something else has the name."""
+    latest = os.path.join(os.path.dirname(logfile_dir), "latest")
+    if os.path.lexists(latest):
+        if not os.path.islink(latest):
+            return False
+        os.remove(latest)
+    os.symlink(logfile_dir, latest)
+    return True
 
 
 # Programs read and change these private names of ROS's module.

@@ -5,7 +5,7 @@ Source: http://wiki.ros.org/roslaunch/XML.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import TypeVar
 
 from minirospy.base.errors import LaunchError, NotFoundError
@@ -165,14 +165,14 @@ class Tag:
                 return value == (key == "if")
         return True
 
-    def warn_of_attributes(self, warn: Callable[[LaunchError], None]) -> None:
-        """Warn about each attribute that this tag does not support, because most are typos."""
+    def unknown_attributes(self) -> Iterator[tuple[LaunchError, str]]:
+        """Yield a warning about each attribute that this tag does not support, and its name: most are typing errors."""
         known = ATTRIBUTES[self.name]
         for key in self.element.attributes:
             if key not in known:
                 near = nearest(key, known)
                 hint = f": did you mean {' or '.join(near)}?" if near else ""
-                warn(self.error(f"unknown <{self.name}> attribute '{key}'{hint}"))
+                yield self.error(f"unknown <{self.name}> attribute '{key}'{hint}"), key
 
     def error(self, text: str) -> LaunchError:
         """Return an error for this tag, for the caller to raise."""

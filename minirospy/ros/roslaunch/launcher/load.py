@@ -102,9 +102,14 @@ def load_sources(
     packages: Packages,
     environ: Mapping[str, str] | None = None,
     problems: Problems | None = None,
+    spec: LaunchSpec | None = None,
 ) -> LaunchSpec:
-    """Load launch files one after another. Raise LaunchError on an error, or append all errors to ``problems`` if given."""
-    spec = LaunchSpec()
+    """Load launch files one after another. Raise LaunchError on an error, or append all errors to ``problems`` if given.
+
+    If ``spec`` is given, add the content to it, without checking that its nodes' names are unique.
+    """
+    is_checked = spec is None
+    spec = LaunchSpec() if spec is None else spec
     anonymous: dict[str, str] = {}
     used: set[str] = set()
     environ = os.environ if environ is None else environ
@@ -121,7 +126,8 @@ def load_sources(
         # An arg that is used counts as known, even if no <arg> declares it.
         spec.args.setdefault(name, ArgDoc(name, None, None))
 
-    _check_names(spec, problems)
+    if is_checked:
+        _check_names(spec, problems)
     return spec
 
 
@@ -177,12 +183,11 @@ class _File:
     def read(self, text: bytes, scope: _Scope) -> _Scope:
         """Read the file's text; return the scope at its end. Raise LaunchError on an error, unless errors are collected."""
         path = str(Path(self._file).resolve()) if self._file != STDIN else self._file
-        if path not in self._spec.files:
-            self._spec.files.append(path)
+        self._spec.add_file(path, self._file)
         root = Tag(parse_document(text, self._file), self._file, self._substitution)
-        root.warn_of_attributes(self._spec.warnings.append)
+        self._warn_of_attributes(root)
         if root.has("deprecated"):
-            self._spec.warnings.append(root.error(f"DEPRECATED: {root.element.attributes['deprecated']}"))
+            self._spec.add_warning(root.error(f"DEPRECATED: {root.element.attributes['deprecated']}"))
         for tag in root.children():
             scope = self._read(tag, scope)
         return scope
@@ -200,9 +205,12 @@ class _File:
             near = [] if reader else nearest(tag.name, allowed or self._tags)
             hint = f": did you mean <{near[0]}>?" if near else ""
             where = "" if allowed is None else " here"
-            self._spec.warnings.append(tag.error(f"unrecognized tag <{tag.name}>{where}{hint}"))
+            text = f"unrecognized tag {tag.name}"
+            if allowed is not None:
+                text = f"WARN: unrecognized '{tag.name}' child tag in the parent tag element"
+            self._spec.add_warning(tag.error(f"unrecognized tag <{tag.name}>{where}{hint}"), text)
             return scope
-        tag.warn_of_attributes(self._spec.warnings.append)
+        self._warn_of_attributes(tag)
         try:
             if tag.name == "arg" and not self._depth:
                 # The arg is known even if its `if` excludes the tag.
@@ -273,7 +281,7 @@ class _File:
             if child.name != "arg":
                 inner = self._read(child, inner, ("arg", "env"))
             elif child.applies():
-                child.warn_of_attributes(self._spec.warnings.append)
+                self._warn_of_attributes(child)
                 name, value, default = _arg_texts(child)
                 if name in given and not hands_on_all:
                     raise child.error(f"arg '{name}' has already been declared")
@@ -294,6 +302,7 @@ class _File:
         substitution = replace(self._substitution, file=file, args={**passed, **given}, unset={})
         args = _Args(given, passed, hands_on_all=hands_on_all)
         inner = _File(self._spec, substitution, args, self._depth + 1, self._problems).read(text, inner)
+        self._spec.end_include(file)
         unused = set(given) - args.declared
         if unused and not hands_on_all:
             raise tag.error(f"unused args [{', '.join(sorted(unused))}] for include of [{file}]")
@@ -340,32 +349,34 @@ class _File:
             line=tag.line,
         )
 
-        other = self._spec.machines.setdefault(machine.name, machine)
-        if replace(other, file=machine.file, line=machine.line) != machine:
-            where = f"{other.file}:{other.line}"
-            raise tag.error(f"machine [{machine.name}] is declared otherwise at {where}")
+        self._spec.add_machine(machine)
         default = (tag.optional("default") or "false").lower()
         if default not in ("false", "true", "never"):
             raise tag.error(f"default must be one of 'false', 'true', 'never', not '{default}'")
         return replace(scope, machine=machine.name) if default == "true" else scope
 
     def _master(self, tag: Tag, scope: _Scope) -> _Scope:
-        self._spec.warnings.append(tag.error("ignoring defunct <master /> tag"))
+        self._spec.add_warning(tag.error("ignoring defunct <master /> tag"))
         return scope
 
     # --- parameters
 
     def _param(self, tag: Tag, scope: _Scope) -> _Scope:
         name = tag.required("name")
-        value = param_value(tag)
+        value = self._value(tag)
         if names.is_private(name):
             return replace(scope, private=(*scope.private, (name[1:].lstrip("/"), value)))
-        self._set(tag, names.join(scope.namespace, name), value)
+        self._set(tag, names.join(scope.namespace, name), value, self._file)
         return scope
+
+    def _value(self, tag: Tag) -> object:
+        if tag.has("command"):
+            self._spec.runs_command(tag.required("command", may_be_empty=True))
+        return param_value(tag)
 
     def _param_of_node(self, tag: Tag, full_name: str) -> None:
         """Store a parameter set inside a node as private to the node, even if its name starts with a slash or tilde."""
-        self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", param_value(tag))
+        self._set(tag, f"{full_name}/{tag.required('name').lstrip('~/')}", self._value(tag))
 
     def _rosparam(self, tag: Tag, scope: _Scope) -> _Scope:
         command = tag.choice("command", ("load", "dump", "delete"))
@@ -391,17 +402,15 @@ class _File:
             )
         if command == "dump" and not file:
             raise tag.error('<rosparam command="dump"> needs a file')
-        self._spec.commands.append(ParameterCommand(name, file))
+        self._spec.add_command(ParameterCommand(name, file))
         return scope
 
-    def _set(self, tag: Tag, name: str, value: object) -> None:
-        name = names.canonicalize(name)
-        upper = name
-        while upper := upper.rpartition("/")[0]:
-            if upper in self._spec.params and not isinstance(self._spec.params[upper], dict):
-                text = f"parameter [{name}] conflicts with parent parameter [{upper}]"
-                self._spec.warnings.append(tag.error(text))
-        self._spec.params[name] = value
+    def _set(self, tag: Tag, name: str, value: object, file: str | None = None) -> None:
+        self._spec.add_param(names.canonicalize(name), value, tag.error, file)
+
+    def _warn_of_attributes(self, tag: Tag) -> None:
+        for error, key in tag.unknown_attributes():
+            self._spec.add_warning(error, f"[{self._file}] unknown <{tag.name}> attribute '{key}'")
 
     # --- nodes
 
@@ -412,10 +421,8 @@ class _File:
                 raise tag.error(f"node name cannot contain a namespace: [{name}]: use ns")
             if names.is_private(name):
                 raise tag.error(f"cannot turn [{name}] into a global name")
-            self._spec.warnings.append(
-                tag.error(f"illegal <node> name '{name}': letters, digits and _ alone")
-            )
-        self._spec.nodes.append(self._process(tag, scope, name))
+            self._spec.add_warning(tag.error(f"illegal <node> name '{name}': letters, digits and _ alone"))
+        self._spec.add_node(self._process(tag, scope, name))
         return scope
 
     def _test(self, tag: Tag, scope: _Scope) -> _Scope:
@@ -432,7 +439,7 @@ class _File:
         seconds = tag.number_or_empty("time-limit", 60.0, float)
         if seconds <= 0:
             raise tag.error("'time-limit' must be a positive number of seconds")
-        self._spec.tests.append(TestSpec(test_name, node, seconds, tag.number_or_empty("retry", 0, int)))
+        self._spec.add_test(TestSpec(test_name, node, seconds, tag.number_or_empty("retry", 0, int)))
         return scope
 
     def _process(self, tag: Tag, scope: _Scope, name: str) -> NodeSpec:
@@ -446,16 +453,19 @@ class _File:
         if tag.flag("clear_params"):
             if not name:
                 raise tag.error("<node> tag must have a 'name' attribute to use 'clear_params' attribute")
-            self._spec.clear.append(full_name)
-        for private, value in scope.private:
-            self._set(tag, f"{full_name}/{private}", value)
-
+            self._spec.add_clear(full_name)
         inner = replace(scope, namespace=full_name + "/", private=())
+        params: list[Tag] = []
         for child in tag.children():
             if child.name == "param":
-                self._read_own_param(child, full_name)
+                params.append(child)
             else:
                 inner = self._read(child, inner, ("param", "rosparam", "remap", "env"))
+        # As in ROS, a <param> takes precedence over a <rosparam>, in the node as well as in an enclosing group.
+        for private, value in scope.private:
+            self._set(tag, f"{full_name}/{private}", value)
+        for child in params:
+            self._read_own_param(child, full_name)
         for private, value in inner.private:
             self._set(tag, f"{full_name}/{private}", value)
         return NodeSpec(
@@ -477,7 +487,7 @@ class _File:
         )
 
     def _read_own_param(self, tag: Tag, full_name: str) -> None:
-        tag.warn_of_attributes(self._spec.warnings.append)
+        self._warn_of_attributes(tag)
         try:
             if tag.applies():
                 self._param_of_node(tag, full_name)
@@ -501,7 +511,7 @@ class _File:
             return
         if not tag.has("ns") or inner.namespace.strip("/") == "":
             raise tag.error("'ns' attribute must be set in order to use 'clear_params'")
-        self._spec.clear.append(names.canonicalize(inner.namespace))
+        self._spec.add_clear(names.canonicalize(inner.namespace))
 
 
 def _folder(tag: Tag) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 from minirospy.base.errors import LaunchError
@@ -139,6 +139,58 @@ class LaunchSpec:
     args: dict[str, ArgDoc] = field(default_factory=dict)
     machines: dict[str, MachineSpec] = field(default_factory=dict)
     warnings: list[LaunchError] = field(default_factory=list)
+
+    # --- adding: the loader calls these methods in the order of the tags
+
+    def add_file(self, path: str, name: str) -> None:
+        """Add a file that is read now; ``name`` is its path as written."""
+        if path not in self.files:
+            self.files.append(path)
+
+    def end_include(self, name: str) -> None:
+        """Handle the end of an included file."""
+
+    def add_node(self, node: NodeSpec) -> None:
+        """Add a node."""
+        self.nodes.append(node)
+
+    def add_test(self, test: TestSpec) -> None:
+        """Add a test."""
+        self.tests.append(test)
+
+    def add_param(
+        self, name: str, value: object, error: Callable[[str], LaunchError], file: str | None = None
+    ) -> None:
+        """Add a parameter; ``error`` makes errors with the tag's place. ``file`` has the ``<param>``, if it is in no node."""
+        upper = name
+        while upper := upper.rpartition("/")[0]:
+            if upper in self.params and not isinstance(self.params[upper], dict):
+                self.add_warning(error(f"parameter [{name}] conflicts with parent parameter [{upper}]"))
+        self.params[name] = value
+
+    def add_clear(self, name: str) -> None:
+        """Add a namespace to delete."""
+        self.clear.append(name)
+
+    def add_command(self, command: ParameterCommand) -> None:
+        """Add a command for the parameter server."""
+        self.commands.append(command)
+
+    def add_machine(self, machine: MachineSpec) -> None:
+        """Add a machine. Raise LaunchError if a different machine has the same name."""
+        other = self.machines.setdefault(machine.name, machine)
+        if replace(other, file=machine.file, line=machine.line) != machine:
+            text = f"machine [{machine.name}] is declared otherwise at {other.file}:{other.line}"
+            raise LaunchError(machine.file, machine.line, text)
+
+    def add_warning(self, warning: LaunchError, ros_text: str = "") -> None:
+        """Add a warning about content that is ignored; ``ros_text`` is how ROS's roslaunch words it, if that differs."""
+        self.warnings.append(warning)
+
+    def runs_command(self, text: str) -> None:
+        """Handle that the command of a ``<param>`` is run now."""
+
+    # --- reading
 
     def runnables(self) -> Iterator[NodeSpec]:
         """Yield the nodes, then the tests' nodes."""

@@ -11,14 +11,22 @@ __all__ = ["summary"]
 _MAX_LENGTH = 20
 
 
-def summary(nodes: Iterable[NodeSpec], params: Mapping[str, object], clear: Iterable[str]) -> str:
-    """Return the text from SUMMARY up to the first process."""
+def summary(
+    nodes: Iterable[NodeSpec],
+    params: Mapping[str, object],
+    clear: Iterable[str],
+    machines: Iterable[str] | None = None,
+) -> str:
+    """Return the text from SUMMARY up to the first process; ``machines`` are the names to list, None for no such section."""
     lines = ["", "SUMMARY", "========", ""]
     cleared = sorted({f" * {name.rstrip('/')}/" for name in clear})
     if cleared:
         lines += ["CLEAR PARAMETERS", *cleared, ""]
-    lines += ["PARAMETERS", *sorted(f" * {name}: {_short(value)}" for name, value in params.items())]
-    lines += ["", "NODES"]
+    if params:
+        lines += ["PARAMETERS", *sorted(f" * {name}: {_short(value)}" for name, value in params.items()), ""]
+    if machines is not None:
+        lines += ["MACHINES", *(sorted(f" * {name}" for name in machines) or [""]), ""]
+    lines += ["NODES"]
     by_namespace: dict[str, list[str]] = {}
     for node in nodes:
         text = f"    {node.base_name} ({node.package}/{node.type})"

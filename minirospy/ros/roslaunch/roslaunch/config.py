@@ -9,9 +9,10 @@ from collections.abc import Sequence
 
 from minirospy.base.environment import DEFAULT_MASTER_PORT, DISTRO, ROS_VERSION, Environment
 from minirospy.base.errors import LaunchError
-from minirospy.ros.roslaunch.launcher.spec import LaunchSpec
+from minirospy.ros.roslaunch.launcher.spec import LaunchSpec, ParameterCommand
 from minirospy.ros.roslaunch.launcher.summary import summary
 from minirospy.ros.roslaunch.roslaunch.core import (
+    Executable,
     Machine,
     Master,
     Node,
@@ -20,8 +21,9 @@ from minirospy.ros.roslaunch.roslaunch.core import (
     Test,
     is_machine_local,
     local_machine,
+    printlog,
 )
-from minirospy.ros.roslaunch.roslaunch.xmlloader import XmlLoader
+from minirospy.ros.roslaunch.roslaunch.xmlloader import ConfigError, XmlLoader
 
 __all__ = [
     "DEFAULT_MASTER_PORT",
@@ -46,33 +48,37 @@ class ROSLaunchConfig:
         self.master = Master()
         self.nodes: list[Node] = []
         self.nodes_core: list[Node] = []
-        self.executables: list[object] = []
+        self.executables: list[Executable] = []
         self.tests: list[Test] = []
         self.params: dict[str, Param] = {}
         self.machines: dict[str, Machine] = {"": local_machine()}
         self.clear_params: list[str] = []
         self.roslaunch_files: list[str] = []
         self.config_errors: list[str] = []
-        self._spec = LaunchSpec()
-
-    @property
-    def resolved_node_names(self) -> list[str]:
-        """The nodes' global names."""
-        return [node.spec.name for node in (*self.nodes, *self.nodes_core) if node.name]
+        self.resolved_node_names: list[str] = []  # the global names of nodes that have a name
 
     def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> None:
         """Add a node. Raise RLException if its name is already used."""
-        if node.name and node.spec.name in self.resolved_node_names:
-            raise RLException(
-                f"roslaunch file contains multiple nodes named [{node.spec.name}].\n"
-                "Please check all <node> 'name' attributes to make sure they are unique.\n"
-                "Also check that $(anon id) use different ids."
-            )
+        if node.name:
+            if node.spec.name in self.resolved_node_names:
+                raise RLException(
+                    f"roslaunch file contains multiple nodes named [{node.spec.name}].\n"
+                    "Please check all <node> 'name' attributes to make sure they are unique.\n"
+                    "Also check that $(anon id) use different ids."
+                )
+            self.resolved_node_names.append(node.spec.name)
+        if verbose:
+            kind = "core node" if core else "node"
+            printlog(f"Added {kind} of type [{node.package}/{node.type}] in namespace [{node.namespace}]")
         (self.nodes_core if core else self.nodes).append(node)
 
     def add_test(self, test: Test, verbose: bool = True) -> None:
         """Add a test."""
         self.tests.append(test)
+
+    def add_executable(self, exe: Executable) -> None:
+        """Add a command. Of a program's own, only `rosparam delete` and `rosparam dump` run."""
+        self.executables.append(exe)
 
     def add_roslaunch_file(self, f: str) -> None:
         """Add a file to the list of files that were read."""
@@ -99,9 +105,12 @@ class ROSLaunchConfig:
         return any(node.machine is not None and not is_machine_local(node.machine) for node in nodes)
 
     def summary(self, local: bool = False) -> str:
-        """Return the summary that roslaunch prints before it starts any process."""
+        """Return the summary that roslaunch prints before it starts any process; unless ``local``, it lists the machines."""
         return summary(
-            self.spec.nodes, {name: param.value for name, param in self.params.items()}, self.spec.clear
+            self.spec.nodes,
+            {name: param.value for name, param in self.params.items()},
+            self.spec.clear,
+            None if local else [name for name in self.machines if name],
         )
 
     def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> None:
@@ -110,6 +119,8 @@ class ROSLaunchConfig:
             if parent in self.params:
                 self.add_config_error(f"parameter [{p.key}] conflicts with parent parameter [{parent}]")
         self.params[p.key] = p
+        if verbose:
+            printlog(f"Added parameter [{p.key}]")
 
     def add_clear_param(self, param: str) -> None:
         """Add a namespace that is deleted before the parameters are set."""
@@ -119,6 +130,8 @@ class ROSLaunchConfig:
         """Add a machine; return False if it was already added. Raise RLException if a different machine has the same name."""
         if m.name not in self.machines:
             self.machines[m.name] = m
+            if verbose:
+                printlog(f"Added machine [{m.name}]")
             return True
         if m != self.machines[m.name]:
             raise RLException(f"Machine [{m.name}] already added and does not match duplicate entry")
@@ -128,23 +141,6 @@ class ROSLaunchConfig:
         """Add a configuration error, which is printed as a warning."""
         self.config_errors.append(msg)
 
-    def add(self, spec: LaunchSpec) -> None:
-        """Add the content of launch files."""
-        self._spec.commands += spec.commands
-        self._spec.warnings += spec.warnings
-        for node in spec.nodes:
-            self.add_node(Node.of(node))
-        self.tests += map(Test.of_test, spec.tests)
-        self.params.update({name: Param(name, _as_read(value)) for name, value in spec.params.items()})
-        for each in spec.machines.values():
-            self.machines[each.name] = Machine(
-                each.name, each.address, each.env_loader or None, each.ssh_port, each.user or None, each.password or None,
-                timeout=each.timeout,
-            )  # fmt: skip
-        self.clear_params += [f"{name.rstrip('/')}/" for name in spec.clear]
-        self.roslaunch_files += [file for file in spec.files if file not in self.roslaunch_files]
-        self.config_errors += map(str, spec.warnings)
-
     @property
     def spec(self) -> LaunchSpec:
         """The whole configuration as a LaunchSpec, for running."""
@@ -152,10 +148,10 @@ class ROSLaunchConfig:
             nodes=[node.spec for node in self.nodes],
             params={name: _as_sent(param.value) for name, param in self.params.items()},
             clear=[name.rstrip("/") or "/" for name in self.clear_params],
-            commands=self._spec.commands,
+            commands=[command for exe in self.executables if (command := _parameter_command(exe))],
             files=self.roslaunch_files,
             machines={name: machine.spec for name, machine in self.machines.items() if name},
-            warnings=self._spec.warnings,
+            warnings=[_warning(text) for text in self.config_errors],
         )
 
 
@@ -175,13 +171,13 @@ def load_config_default(
         config.set_master(Master(uri=f"http://{environment.uri_host}:{port}/"))
 
     for name, value in (("/rosversion", ROS_VERSION), ("/rosdistro", DISTRO)):
-        config.add_param(Param(name, value))
+        config.add_param(Param(name, value), verbose=verbose)
 
     for each in roslaunch_files:
         file, argv = (each, []) if isinstance(each, str) else each
-        loader.load(file, config, argv=argv)
+        loader.load(file, config, argv=argv, verbose=verbose)
     for text in roslaunch_strs or ():
-        loader.load_string(text, config)
+        loader.load_string(text, config, verbose=verbose)
 
     if assign_machines:
         config.assign_machines()
@@ -193,13 +189,18 @@ def get_roscore_filename() -> str | None:
     return None
 
 
-def _as_read(value: object) -> object:
-    """Return a parameter's value in the type that programs receive: a file's content becomes an xmlrpc.client.Binary."""
-    if not isinstance(value, bytes):
-        return value
-    from xmlrpc.client import Binary
+def _parameter_command(exe: Executable) -> ParameterCommand | None:
+    """Return a rosparam command as the launcher runs it, or None if it is another one."""
+    match (exe.command, *exe.args):
+        case ("rosparam", "delete", name):
+            return ParameterCommand(name)
+        case ("rosparam", "dump", file, name):
+            return ParameterCommand(name.rstrip("/") or "/", file)
+    return None
 
-    return Binary(value)
+
+def _warning(text: str) -> LaunchError:
+    return text.error if isinstance(text, ConfigError) else LaunchError("<configuration>", 0, text)
 
 
 def _as_sent(value: object) -> object:

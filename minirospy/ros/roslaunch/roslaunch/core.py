@@ -27,11 +27,13 @@ __all__ = [
     "PHASE_SETUP",
     "PHASE_TEARDOWN",
     "TEST_TIME_LIMIT_DEFAULT",
+    "Executable",
     "Machine",
     "Master",
     "Node",
     "Param",
     "RLException",
+    "RosbinExecutable",
     "Test",
     "add_printerrlog_handler",
     "add_printlog_handler",
@@ -123,6 +125,14 @@ class Param:
 class Machine:
     """A machine that runs nodes."""
 
+    @classmethod
+    def of(cls, spec: MachineSpec) -> Machine:
+        """Return the machine that a launch file declares."""
+        return cls(
+            spec.name, spec.address, spec.env_loader or None, spec.ssh_port, spec.user or None, spec.password or None,
+            timeout=spec.timeout,
+        )  # fmt: skip
+
     def __init__(
         self,
         name: str,
@@ -194,6 +204,25 @@ def is_machine_local(machine: Machine) -> bool:
     except (OSError, UnicodeError) as error:
         raise RLException(f"cannot resolve host address for machine [{machine.address}]") from error
     return not machine.user and is_own_host(machine.address)
+
+
+class Executable:
+    """A command that roslaunch runs in a ``phase`` of the launch."""
+
+    def __init__(self, cmd: str, args: Sequence[str], phase: str = PHASE_RUN) -> None:
+        self.command = cmd
+        self.args = args
+        self.phase = phase
+
+    def __repr__(self) -> str:
+        return f"{self.command} {' '.join(self.args)}"
+
+
+class RosbinExecutable(Executable):
+    """A command of ROS, such as rosparam."""
+
+    def __repr__(self) -> str:
+        return f"ros/bin/{super().__repr__()}"
 
 
 class Node:

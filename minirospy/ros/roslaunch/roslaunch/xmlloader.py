@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 from minirospy.base import names
-from minirospy.base.errors import MinirospyError
+from minirospy.base.errors import LaunchError, MinirospyError
 from minirospy.ros.roslaunch.launcher.load import STDIN, LaunchSource, load_sources
-from minirospy.ros.roslaunch.launcher.spec import LaunchSpec
-from minirospy.ros.roslaunch.roslaunch.core import Machine, Node, Param, RLException, Test
+from minirospy.ros.roslaunch.launcher.spec import (
+    LaunchSpec,
+    MachineSpec,
+    NodeSpec,
+    ParameterCommand,
+    TestSpec,
+)
+from minirospy.ros.roslaunch.roslaunch.core import (
+    PHASE_SETUP,
+    Executable,
+    Machine,
+    Node,
+    Param,
+    RLException,
+    RosbinExecutable,
+    Test,
+    printlog,
+)
 from minirospy.ros.roslaunch.roslaunch.substitution_args import (
     ArgException,
     SubstitutionException,
@@ -34,10 +51,125 @@ class XmlParseException(RLException):
 
 
 class Configuration(Protocol):
-    """The object into which launch files are loaded: a ROSLaunchConfig."""
+    """The object into which launch files are loaded: a ROSLaunchConfig, or a program's own with these methods.
 
-    def add(self, spec: LaunchSpec) -> None:
-        """Add the content of launch files."""
+    They are called in the order of the tags.
+    """
+
+    def add_roslaunch_file(self, f: str) -> None:
+        """Handle that a file is read now."""
+
+    def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> object:
+        """Add a node."""
+
+    def add_test(self, test: Test, verbose: bool = True) -> object:
+        """Add a test."""
+
+    def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> object:
+        """Add a parameter; ``filename`` is given for a ``<param>`` that is in no node."""
+
+    def add_clear_param(self, param: str) -> object:
+        """Add a namespace to delete."""
+
+    def add_executable(self, exe: Executable) -> object:
+        """Add a command."""
+
+    def add_machine(self, m: Machine, verbose: bool = True) -> object:
+        """Add a machine."""
+
+    def add_config_error(self, msg: str) -> object:
+        """Add a warning about content that is ignored."""
+
+
+class ConfigError(str):
+    """A warning as ROS words it; ``error`` is minirospy's, with the line."""
+
+    error: LaunchError
+
+    def __new__(cls, text: str, error: LaunchError) -> ConfigError:
+        """Return ``text`` with the error."""
+        made = super().__new__(cls, text)
+        made.error = error
+        return made
+
+
+class _Forwarded(LaunchSpec):
+    """Passes the content of launch files to a configuration."""
+
+    def __init__(self, config: Configuration, *, core: bool, verbose: bool) -> None:
+        super().__init__()
+        self._config = config
+        self._core = core
+        self._verbose = verbose
+
+    def add_file(self, path: str, name: str) -> None:
+        """Pass a file on, except for a string."""
+        if name == STDIN:
+            self._print("... loading XML")
+            return
+        self._print(f"... loading XML file [{name}]")
+        self._config.add_roslaunch_file(name)
+
+    def end_include(self, name: str) -> None:
+        """Print the end of an included file."""
+        self._print(f"... done importing include file [{name}]")
+
+    def runs_command(self, text: str) -> None:
+        """Print the command of a ``<param>``."""
+        self._print(f"... executing command param [{text}]")
+
+    def add_node(self, node: NodeSpec) -> None:
+        """Pass a node on."""
+        node = replace(node, file=_shown(node.file))
+        self._config.add_node(Node.of(node), core=self._core, verbose=self._verbose)
+
+    def add_test(self, test: TestSpec) -> None:
+        """Pass a test on."""
+        test = replace(test, node=replace(test.node, file=_shown(test.node.file)))
+        self._config.add_test(Test.of_test(test), verbose=self._verbose)
+
+    def add_param(
+        self, name: str, value: object, error: Callable[[str], LaunchError], file: str | None = None
+    ) -> None:
+        """Pass a parameter on; a file's content becomes an xmlrpc.client.Binary."""
+        if isinstance(value, bytes):
+            from xmlrpc.client import Binary
+
+            value = Binary(value)
+        param = Param(name, value)
+        if file is None:
+            self._config.add_param(param, verbose=self._verbose)
+        else:
+            self._config.add_param(param, filename=_shown(file), verbose=self._verbose)
+
+    def add_clear(self, name: str) -> None:
+        """Pass a namespace on."""
+        self._config.add_clear_param(f"{name.rstrip('/')}/")
+
+    def add_command(self, command: ParameterCommand) -> None:
+        """Pass a command on."""
+        words: tuple[str, ...] = ("delete", command.name)
+        if command.file is not None:
+            words = ("dump", command.file, f"{command.name.rstrip('/')}/")
+        self._config.add_executable(RosbinExecutable("rosparam", words, PHASE_SETUP))
+
+    def add_machine(self, machine: MachineSpec) -> None:
+        """Pass a machine on."""
+        self._config.add_machine(Machine.of(machine), verbose=self._verbose)
+
+    def add_warning(self, warning: LaunchError, ros_text: str = "") -> None:
+        """Pass a warning on."""
+        text = ros_text.replace(f"[{STDIN}]", "[string]") if ros_text else warning.text
+        self._config.add_config_error(ConfigError(text, warning))
+
+    def _print(self, text: str) -> None:
+        if self._verbose:
+            printlog(text)
+
+
+def _shown(file: str) -> str:
+    """Return a file's name as ROS has it."""
+    return "string" if file == STDIN else file
 
 
 class XmlLoader:
@@ -57,16 +189,18 @@ class XmlLoader:
         verbose: bool = True,
     ) -> None:
         """Load a file, with its args as ``["name:=value", ...]``. Raise XmlParseException if it is invalid."""
-        self._load(LaunchSource(filename, None, names.parse_launch_arguments(argv or ())), ros_config)
+        source = LaunchSource(filename, None, names.parse_launch_arguments(argv or ()))
+        self._load(source, _Forwarded(ros_config, core=core, verbose=verbose))
 
     def load_string(
         self, xml_text: str, ros_config: Configuration, core: bool = False, verbose: bool = True
     ) -> None:
         """Load a launch file given as a string. Raise XmlParseException if it is invalid."""
-        self._load(LaunchSource(STDIN, xml_text.encode(), {}), ros_config)
+        source = LaunchSource(STDIN, xml_text.encode(), {})
+        self._load(source, _Forwarded(ros_config, core=core, verbose=verbose))
 
-    def _load(self, source: LaunchSource, config: Configuration) -> None:
+    def _load(self, source: LaunchSource, spec: LaunchSpec) -> None:
         try:
-            config.add(load_sources([source], chosen_packages()))
+            load_sources([source], chosen_packages(), spec=spec)
         except MinirospyError as error:
             raise XmlParseException(str(error)) from error

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import re
 import socket
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, NodeUnreachableError, NotFoundError
 from minirospy.introspect import nodes
 from minirospy.introspect.graph import Graph, NodeAddress, node_host
 from minirospy.introspect.texts import connections_text, node_text
 from minirospy.ros.rosgraph.rosgraph import masterapi
+from minirospy.ros.rosgraph.rosgraph.names import script_resolve_name
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
     import rosgraph as rosgraph
 
 __all__ = [
+    "CONNECTION_PATTERN",
     "ID",
     "NAME",
     "ROSNodeException",
@@ -42,7 +45,9 @@ __all__ = [
     "get_node_names",
     "get_nodes_by_machine",
     "kill_nodes",
+    "lookup_uri",
     "rosnode_cleanup",
+    "rosnode_debugnode",
     "rosnode_info",
     "rosnode_listnodes",
     "rosnode_ping",
@@ -52,6 +57,7 @@ __all__ = [
 
 NAME = "rosnode"
 ID = "/rosnode"
+CONNECTION_PATTERN = re.compile(r"\w+ connection on port (\d+) to \[(.*) on socket (\d+)\]")
 _RULE = "-" * 80
 _PING_SECONDS = 3.0
 
@@ -77,6 +83,18 @@ def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = Fal
     """Return a node's URI, or None if the node is not registered. The master is always queried."""
     with _graph(master) as graph:
         return graph.node_uri(caller_id)
+
+
+def lookup_uri(master: masterapi.Master, system_state: Sequence[Any], topic: str, uri: str) -> str:
+    """Return `NODE (URI)` for the node of a topic in the master's ``system_state`` that has this URI; else the URI."""
+    from minirospy.ros.rostopic.rostopic import get_api
+
+    for rows in system_state[:2]:
+        for name, names in rows:
+            for node in names if name == topic else ():
+                if get_api(master, node) == uri:
+                    return f"{node} ({uri})"
+    return uri
 
 
 def get_node_info_description(node_name: str) -> str:
@@ -239,6 +257,9 @@ def rosnode_info(node_name: str, quiet: bool = False) -> None:
     print(get_node_connection_info_description(uri, masterapi.Master(ID)))
 
 
+rosnode_debugnode = rosnode_info
+
+
 def rosnode_cleanup() -> None:
     """Run `rosnode cleanup` with its confirmation prompt. Raise ROSNodeIOException if the master does not respond."""
     from minirospy.ros.rosnode.commands.rosnode import main
@@ -258,15 +279,41 @@ def rosnodemain(argv: Sequence[str] | None = None) -> NoReturn:
 # The following private functions of ROS's rosnode are called by programs.
 
 
-def _command(argv: Sequence[str]) -> None:
-    from minirospy.ros.rosnode.commands.rosnode import main
+def _run_verb(name: str, argv: Sequence[str]) -> int | None:
+    from minirospy.command.called import Raised, call_verb
+    from minirospy.ros.rosnode.commands.rosnode import FAMILY
 
-    if status := main(list(argv)[1:]):
-        sys.exit(status)
+    return call_verb(FAMILY, [name, *argv[2:]], Raised(ROSNodeException, ROSNodeIOException))
 
 
-_rosnode_cmd_cleanup = _rosnode_cmd_info = _rosnode_cmd_kill = _command
-_rosnode_cmd_list = _rosnode_cmd_machine = _rosnode_cmd_ping = _command
+def _verb(name: str) -> Callable[[Sequence[str]], None]:
+    """Return the function for a command line whose first words are the command's name and the verb."""
+
+    def call(argv: Sequence[str]) -> None:
+        _run_verb(name, argv)
+
+    return call
+
+
+_rosnode_cmd_cleanup = _verb("cleanup")
+_rosnode_cmd_info = _verb("info")
+_rosnode_cmd_list = _verb("list")
+_rosnode_cmd_machine = _verb("machine")
+_rosnode_cmd_ping = _verb("ping")
+
+
+def _rosnode_cmd_kill(argv: Sequence[str]) -> int:
+    """Run `rosnode kill`; return its status. Raise ROSNodeException if a name is no node."""
+    names = [script_resolve_name(ID, word) for word in argv[2:] if not word.startswith("-")]
+    if names:
+        try:
+            known = get_node_names()
+        except ROSNodeIOException:
+            raise ROSNodeIOException("Unable to communicate with master!") from None
+        unknown = [name for name in names if name not in known]
+        if unknown and len(names) == len(argv[2:]):
+            raise ROSNodeException("\n * ".join(["Unknown node(s):", *unknown]))
+    return _run_verb("kill", argv) or 0
 
 
 def _fullusage(return_error: bool = True) -> NoReturn:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import math
+import os
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from optparse import OptionParser, Values
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 from xmlrpc.client import Binary
@@ -15,7 +20,14 @@ from minirospy.base.errors import MasterUnreachableError, MinirospyError, NotFou
 from minirospy.client.params import as_xmlrpc_client, check_sendable
 from minirospy.introspect import parameters
 from minirospy.introspect.graph import Graph
-from minirospy.introspect.values import add_angles, parse_documents, parse_value
+from minirospy.introspect.values import (
+    add_angles,
+    arithmetic,
+    format_pretty,
+    format_value,
+    parse_documents,
+    parse_value,
+)
 from minirospy.ros.ros_names import GLOBALNS, get_ros_namespace, ns_join
 from minirospy.ros.rosgraph.rosgraph.masterapi import Master, MasterError
 
@@ -29,10 +41,17 @@ __all__ = [
     "RosParamException",
     "RosParamIOException",
     "_fullusage",
+    "_get_caller_id",
+    "_pretty_print",
     "_rosparam_cmd_delete",
     "_rosparam_cmd_get_dump",
+    "_rosparam_cmd_get_param",
     "_rosparam_cmd_list",
     "_rosparam_cmd_set_load",
+    "_set_optparse_neg_args",
+    "construct_angle_degrees",
+    "construct_angle_radians",
+    "construct_yaml_binary",
     "delete_param",
     "dump_params",
     "get_param",
@@ -44,7 +63,10 @@ __all__ = [
     "make_caller_id",
     "make_global_ns",
     "ns_join",
+    "pattern",
     "print_params",
+    "represent_foo",
+    "represent_xml_binary",
     "script_resolve_name",
     "set_param",
     "set_param_raw",
@@ -54,10 +76,6 @@ __all__ = [
 
 NAME = "rosparam"
 NS = "_ns"
-
-# After importing rosparam, programs can read deg(90) and rad(pi/2) with PyYAML's own loaders, as in ROS.
-for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
-    add_angles(_loader)
 
 
 class RosParamException(Exception):
@@ -220,15 +238,129 @@ def yamlmain(argv: Sequence[str] | None = None) -> None:
 
 # The following private functions of ROS's rosparam are called by programs.
 
-_rosparam_cmd_delete = _rosparam_cmd_list = yamlmain
+
+def _run_verb(name: str, argv: Sequence[str]) -> None:
+    from minirospy.command.called import Raised, call_verb
+    from minirospy.ros.rosparam.commands.rosparam import FAMILY
+
+    call_verb(FAMILY, [name, *argv[2:]], Raised(RosParamException, RosParamIOException))
+
+
+def _rosparam_cmd_list(argv: Sequence[str]) -> None:
+    """Run ``rosparam list``."""
+    _run_verb("list", argv)
+
+
+def _rosparam_cmd_delete(argv: Sequence[str]) -> None:
+    """Run ``rosparam delete``. Raise RosParamException if the parameter is not set."""
+    _run_verb("delete", argv)
 
 
 def _rosparam_cmd_get_dump(cmd: str, argv: Sequence[str]) -> None:
-    """Run ``rosparam get`` or ``dump``."""
-    yamlmain(argv)
+    """Run ``rosparam get`` or ``dump``.
+
+    If the parameter is not set, `get` raises RosParamException, and `dump` rosgraph.MasterError, as in ROS.
+    """
+    try:
+        _run_verb(cmd, argv)
+    except RosParamException as error:
+        cause = error.__cause__
+        if cmd == "dump" and NotFoundError in (type(cause), type(cause and cause.__cause__)):
+            raise MasterError(str(error)) from error
+        raise
 
 
-_rosparam_cmd_set_load = _rosparam_cmd_get_dump
+def _rosparam_cmd_set_load(cmd: str, argv: Sequence[str]) -> None:
+    """Run ``rosparam set`` or ``load``. Raise RosParamException if a file or value cannot be used."""
+    _run_verb(cmd, argv)
+
+
+def _rosparam_cmd_get_param(param: str, pretty: bool = False, verbose: bool = False) -> None:
+    """Print a parameter as `rosparam get` does. Raise RosParamException if it is not set."""
+    if verbose:
+        print(f"getting parameter [{param}]")
+    try:
+        value = get_param(param)
+    except MasterError as error:
+        raise RosParamException(str(error)) from error
+    print((format_pretty if pretty else format_value)(_with_bytes(value)))
+
+
+def _pretty_print(value: dict[str, object], indent: str = "") -> None:
+    """Print a dictionary as `rosparam get -p` does: texts of several lines as they are."""
+    if value:
+        print(format_pretty(_with_bytes(value), indent))
+
+
+def _set_optparse_neg_args(parser: OptionParser, argv: Sequence[str]) -> tuple[Values, list[str]]:
+    """Return the options and values of a command line of `rosparam set`, whose values may be negative numbers."""
+    values: list[str] = []
+    options: list[str] = []
+    takes_value = False
+    for word in argv[2:]:
+        if takes_value and word.startswith("-"):
+            parser.error("-t and --textfile options require an argument")
+        is_value = not word.startswith("-") or word[1:2].isdecimal()
+        (values if is_value and not takes_value else options).append(word)
+        takes_value = word in ("-t", "--textfile", "-b", "--binfile")
+    return parser.parse_args(options)[0], values
+
+
+def _get_caller_id() -> str:
+    """Return the caller id of this process's calls to the master."""
+    from minirospy.ros.rosgraph.rosgraph.names import make_caller_id
+
+    return make_caller_id(f"rosparam-{os.getpid()}")
+
+
+pattern = re.compile(r"^rad\([^\)]*\)$")
+"""The last of the two patterns by which ROS recognizes angles."""
+
+
+def construct_angle_degrees(loader: Any, node: Any) -> float:
+    """Return `deg(90)` or the number in a node of YAML as radians. Raise RosParamException if it is not a number."""
+    value = loader.construct_scalar(node)
+    try:
+        return math.radians(arithmetic(value.strip()[4:-1] if value.startswith("deg(") else value))
+    except (ValueError, SyntaxError, ArithmeticError):
+        raise _YamlError(f"invalid degree value: {value}") from None
+
+
+def construct_angle_radians(loader: Any, node: Any) -> float:
+    """Return the value of an expression such as `rad(pi/2)` in a node of YAML.
+
+    Raise RosParamException if it is none. Unlike ROS, which runs it as Python, read arithmetic with `pi` only.
+    """
+    value = loader.construct_scalar(node).strip()
+    try:
+        return arithmetic(value[4:-1] if value.startswith("rad(") else value)
+    except (ValueError, SyntaxError, ArithmeticError):
+        raise _YamlError(f"invalid radian expression: {value}") from None
+
+
+def construct_yaml_binary(loader: Any, node: Any) -> Binary:
+    """Return bytes in a node of YAML as xmlrpc.client.Binary."""
+    return Binary(loader.construct_yaml_binary(node))
+
+
+def represent_xml_binary(loader: Any, data: Binary) -> Any:
+    """Return a node of YAML for an xmlrpc.client.Binary."""
+    encoded = base64.b64encode(data.data).decode()
+    return loader.represent_scalar("tag:yaml.org,2002:binary", encoded, style="|")
+
+
+def represent_foo(loader: Any, data: str) -> Any:
+    """Return a node of YAML with the tag `#`."""
+    return loader.represent_scalar("#", data)
+
+
+# Programs that import rosparam can read deg(90) and rad(pi/2), and get bytes as Binary, with PyYAML's own loaders, as in ROS.
+for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
+    add_angles(_loader)
+    _loader.add_constructor("!degrees", construct_angle_degrees)
+    _loader.add_constructor("!radians", construct_angle_radians)
+    _loader.add_constructor("tag:yaml.org,2002:binary", construct_yaml_binary)
+yaml.add_representer(Binary, represent_xml_binary)
 
 
 def _fullusage() -> NoReturn:

@@ -1,67 +1,7 @@
 """Writes and reads messages with a length prefix, as rospy.msg does. Source: http://wiki.ros.org/ROS/TCPROS."""
 
-from __future__ import annotations
-
-import struct
-from io import BytesIO
-from typing import TYPE_CHECKING
-
-from minirospy.base.errors import DeserializationError
+from minirospy.client.length_prefix import deserialize_messages, serialize_message
 from minirospy.client.topics import AnyMsg
-from minirospy.core.idl.message import args_kwds_to_message, number_header
-
-if TYPE_CHECKING:
-    from minirospy.core.idl.protocols import Message
+from minirospy.core.idl.message import args_kwds_to_message
 
 __all__ = ["AnyMsg", "args_kwds_to_message", "deserialize_messages", "serialize_message"]
-
-_LENGTH = struct.Struct("<I")
-
-
-def serialize_message(b: BytesIO, seq: int, msg: Message) -> None:
-    """Write ``msg`` to ``b``, preceded by its length.
-
-    Set the header's ``seq``, and replace the frame_id "0" by an empty string.
-    """
-    number_header(msg, seq)
-    start = b.tell()
-    b.write(b"\0\0\0\0")
-    msg.serialize(b)
-    end = b.tell()
-    b.seek(start)
-    b.write(_LENGTH.pack(end - start - 4))
-    b.seek(end)
-
-
-def deserialize_messages(
-    b: BytesIO,
-    msg_queue: list[Message],
-    data_class: type[Message],
-    queue_size: int | None = None,
-    max_msgs: int | None = None,
-    start: int = 0,
-) -> None:
-    """Move the complete messages in ``b``, from ``start`` to its position, to ``msg_queue``.
-
-    Move at most ``max_msgs``; keep only the newest ``queue_size``. An incomplete message is moved to the
-    front of ``b``. Raise DeserializationError if a message is invalid.
-    """
-    data, position, count = b.getvalue()[: b.tell()], start, 0
-    while (max_msgs is None or count < max_msgs) and len(data) - position >= 4:
-        (size,) = _LENGTH.unpack_from(data, position)
-        if len(data) - position - 4 < size:
-            break
-        message = data_class()
-        try:
-            message.deserialize(data[position + 4 : position + 4 + size])
-        except (struct.error, ValueError, IndexError) as error:
-            raise DeserializationError(f"cannot deserialize {data_class._type}: {error}") from error
-        msg_queue.append(message)
-        position += 4 + size
-        count += 1
-    if queue_size is not None:
-        del msg_queue[: max(0, len(msg_queue) - queue_size)]
-    if position > start:
-        b.seek(0)
-        b.truncate()
-        b.write(data[position:])

@@ -8,7 +8,7 @@ from minirospy.client.topics import Publisher, SubscribeListener, Subscriber, To
 from minirospy.core.idl.message import Message, args_kwds_to_message
 from minirospy.ros.rospy.rospy.core import topics_logger as _logger
 from minirospy.ros.rospy.rospy.impl.registration import Registration, get_topic_manager
-from minirospy.ros.rospy.rospy.impl.tcpros_base import DEFAULT_BUFF_SIZE
+from minirospy.ros.rospy.rospy.impl.transport import DEFAULT_BUFF_SIZE
 from minirospy.ros.rospy.rospy.msg import serialize_message
 from minirospy.ros.rospy.rospy.passing import topics_dir as __dir__
 from minirospy.ros.rospy.rospy.passing import topics_getattr as __getattr__

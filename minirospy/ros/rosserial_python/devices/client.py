@@ -60,7 +60,7 @@ _VERSIONS = {
 }
 _OPEN_SECONDS = 3.0
 _READY_SECONDS = 0.1
-_BOOT_SECONDS = 2.0  # time for a device to boot: an Arduino restarts when its port is opened
+_BOOT_SECONDS = 2.0  # to let a device boot; an Arduino restarts when its port is opened
 
 
 class SerialClient:

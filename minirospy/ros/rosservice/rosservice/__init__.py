@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
+
+import yaml
 
 from minirospy.base.errors import (
     MasterUnreachableError,
@@ -19,6 +21,7 @@ from minirospy.client.params import check_sendable
 from minirospy.introspect import services
 from minirospy.introspect.graph import Graph
 from minirospy.ros.rosgraph.rosgraph import masterapi
+from minirospy.ros.rosgraph.rosgraph.names import script_resolve_name
 
 if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Message, ServiceClass
@@ -29,6 +32,10 @@ __all__ = [
     "ROSServiceIOException",
     "_fullusage",
     "_get_master",
+    "_optparse_service_only",
+    "_resource_name_package",
+    "_rosservice_args",
+    "_rosservice_call",
     "_rosservice_cmd_args",
     "_rosservice_cmd_call",
     "_rosservice_cmd_find",
@@ -37,6 +44,13 @@ __all__ = [
     "_rosservice_cmd_node",
     "_rosservice_cmd_type",
     "_rosservice_cmd_uri",
+    "_rosservice_info",
+    "_rosservice_list",
+    "_rosservice_node",
+    "_rosservice_type",
+    "_rosservice_uri",
+    "_stdin_yaml_arg",
+    "_succeed",
     "call_service",
     "get_service_args",
     "get_service_class_by_name",
@@ -169,8 +183,145 @@ def rosservicemain(argv: Sequence[str] | None = None) -> None:
 
 # The following private functions of ROS's rosservice are called by programs.
 
-_rosservice_cmd_args = _rosservice_cmd_call = _rosservice_cmd_find = _rosservice_cmd_info = rosservicemain
-_rosservice_cmd_list = _rosservice_cmd_node = _rosservice_cmd_type = _rosservice_cmd_uri = rosservicemain
+
+def _verb(name: str) -> Callable[[Sequence[str]], None]:
+    """Return the function for a command line whose first words are the command's name and the verb."""
+
+    def call(argv: Sequence[str] = sys.argv) -> None:
+        from minirospy.command.called import Raised, call_verb
+        from minirospy.ros.rosservice.commands.rosservice import FAMILY
+
+        call_verb(FAMILY, [name, *argv[2:]], Raised(ROSServiceException, ROSServiceIOException))
+
+    return call
+
+
+_rosservice_cmd_args = _verb("args")
+_rosservice_cmd_call = _verb("call")
+_rosservice_cmd_find = _verb("find")
+_rosservice_cmd_list = _verb("list")
+_rosservice_cmd_type = _verb("type")
+_rosservice_cmd_uri = _verb("uri")
+
+
+def _rosservice_cmd_node(argv: Sequence[str]) -> None:
+    """Run `rosservice node`."""
+    _rosservice_node(_optparse_service_only("node", argv))
+
+
+def _rosservice_cmd_info(argv: Sequence[str]) -> None:
+    """Run `rosservice info`."""
+    from optparse import OptionParser
+
+    parser = OptionParser(usage="usage: %prog info /service", prog=NAME)
+    _, words = parser.parse_args(list(argv)[2:])
+    if len(words) != 1:
+        parser.error("you may only specify one service" if words else "you must specify a service name")
+    _rosservice_info(script_resolve_name(NAME, words[0]))
+
+
+def _rosservice_type(service_name: str) -> None:
+    """Print a service's type; if there is no such service, print an error and exit."""
+    _print_or_exit(get_service_type(service_name), f"Unknown service [{service_name}]")
+
+
+def _rosservice_uri(service_name: str) -> None:
+    """Print a service's URI; if there is no such service, print an error and exit."""
+    _print_or_exit(get_service_uri(service_name), f"Unknown service: {service_name}")
+
+
+def _rosservice_node(service_name: str) -> None:
+    """Print the node that provides a service; if there is no such service, print an error and exit."""
+    _print_or_exit(get_service_node(service_name), f"Unknown service: {service_name}")
+
+
+def _rosservice_args(service_name: str) -> None:
+    """Print the field names of a service's request. Raise ROSServiceException if there is no such service."""
+    print(get_service_args(service_name))
+
+
+def _print_or_exit(text: str | None, error: str) -> None:
+    if not text:
+        print(error, file=sys.stderr)
+        sys.exit(1)
+    print(text)
+
+
+def _rosservice_list(namespace: str | None = None, print_nodes: bool = False) -> None:
+    """Print the services below a namespace; ``print_nodes``: with the nodes that provide them."""
+    for name, nodes in sorted(get_service_list(namespace=namespace, include_nodes=True)):
+        print(f"{name} {','.join(nodes)}" if print_nodes else name)
+
+
+def _rosservice_info(service_name: str) -> None:
+    """Print a service's node, URI, type and arguments; if there is no such service, print an error and exit."""
+    node = get_service_node(service_name)
+    if not node:
+        print("ERROR: unknown service", file=sys.stderr)
+        sys.exit(1)
+    print(f"Node: {node}")
+    for label, find in (("URI", get_service_uri), ("Type", get_service_type), ("Args", get_service_args)):
+        found = find(service_name)
+        if found is None:
+            print("ERROR: service is no longer available", file=sys.stderr)
+            return
+        print(f"{label}: {found}")
+
+
+def _rosservice_call(
+    service_name: str,
+    service_args: Sequence[object],
+    verbose: bool = False,
+    service_class: ServiceClass | None = None,
+) -> None:
+    """Call a service and print its response, after the request if ``verbose``. Raise ROSServiceException if it fails."""
+    request, response = call_service(script_resolve_name(NAME, service_name), service_args, service_class)
+    if verbose:
+        print(f"{request}\n---")
+    print(response)
+
+
+def _optparse_service_only(cmd: str, argv: Sequence[str] = sys.argv) -> str:
+    """Return the global name of the only service in a command line. Print the usage and exit if it has none or several."""
+    from optparse import OptionParser
+
+    parser = OptionParser(usage=f"usage: %prog {cmd} /service", prog=NAME)
+    _, words = parser.parse_args(list(argv)[2:])
+    if len(words) != 1:
+        parser.error("you may only specify one input service" if words else "service must be specified")
+    return script_resolve_name(NAME, words[0])
+
+
+def _resource_name_package(name: str) -> str | None:
+    """Return the package of `pkg/Name`; None for a name without a package."""
+    return name.partition("/")[0] if "/" in name else None
+
+
+def _stdin_yaml_arg() -> Iterator[Any]:
+    """Yield each YAML document of standard input that a line with three hyphens or an empty line ends."""
+    lines: list[str] = []
+    while True:
+        line = sys.stdin.readline()
+        if line.strip() not in ("", "---"):
+            lines.append(line)
+            continue
+        document = None
+        try:
+            document = yaml.safe_load("".join(lines))
+        except yaml.YAMLError as error:
+            print(f"Invalid YAML: {error}", file=sys.stderr)
+        if document is None:
+            return
+        yield document
+        lines.clear()
+
+
+def _succeed(args: Sequence[object]) -> object:
+    """Return the value in a response (code, status message, value). Raise ROSServiceException if it is an error."""
+    code, text, value = args
+    if code != 1:
+        raise ROSServiceException(f"remote call failed: {text}")
+    return value
 
 
 def _fullusage() -> None:

@@ -276,9 +276,13 @@ def _echo(
             return
         field = wait_for_topic(graph, name, lambda: warn_unpublished(graph, name))
 
+    def report(error: Exception) -> None:
+        """Print ROS's message and minirospy's for an index that exceeds an array."""
+        print(f"{error.__cause__}: /{field.path}\nrostopic: {error}", file=sys.stderr)
+
     printed = 0
     with tool_node("rostopic", arguments, ros_time=True) as node:
-        echo = make(field, now=node.clock.now)
+        echo = make(field, now=node.clock.now, report=report)
         for received in node.inbox(field.topic):
             message = echo.message(received)
             if keep and not keep(message, field.topic):
@@ -286,7 +290,7 @@ def _echo(
             try:
                 text = echo.text(message, received)
             except IndexError as error:
-                print(f"rostopic: {error}", file=sys.stderr)
+                report(error)
                 continue
 
             sys.stdout.write(prefix + text)

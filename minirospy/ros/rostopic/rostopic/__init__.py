@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 import time
@@ -14,8 +15,32 @@ from minirospy.introspect import topics
 from minirospy.introspect.fields import Step, field_value, parse_path
 from minirospy.introspect.graph import Graph
 from minirospy.ros.rosgraph.rosgraph import masterapi
-from minirospy.ros.rosgraph.rosgraph.names import script_resolve_name
+from minirospy.ros.rosgraph.rosgraph.names import make_global_ns, script_resolve_name
 from minirospy.ros.rosgraph.rosgraph.network import parse_http_host_and_port
+from minirospy.ros.rostopic.errors import ROSTopicException, ROSTopicIOException
+from minirospy.ros.rostopic.plots import array_index_or_slice as _get_array_index_or_slice_object
+from minirospy.ros.rostopic.plots import ascii_table as _get_ascii_table
+from minirospy.ros.rostopic.plots import convert_getattr as _convert_getattr
+from minirospy.ros.rostopic.plots import is_string_type as _isstring_type
+from minirospy.ros.rostopic.plots import nested_attribute as _get_nested_attribute
+from minirospy.ros.rostopic.plots import plot as _str_plot
+from minirospy.ros.rostopic.plots import plot_cells as _sub_str_plot
+from minirospy.ros.rostopic.plots import plot_field_cells as _sub_str_plot_fields
+from minirospy.ros.rostopic.plots import plot_fields as _str_plot_fields
+from minirospy.ros.rostopic.publishing import (
+    SUBSCRIBER_TIMEOUT,
+    argv_publish,
+    file_yaml_arg,
+    param_publish,
+    param_publish_once,
+    publish_message,
+    stdin_publish,
+    stdin_yaml_arg,
+    wait_for_subscriber,
+)
+from minirospy.ros.rostopic.publishing import fill_message as _fillMessageArgs  # noqa: N812 - ROS's name
+from minirospy.ros.rostopic.publishing import publish_at_rate as _publish_at_rate
+from minirospy.ros.rostopic.publishing import publish_latched as _publish_latched
 from minirospy.ros.rostopic.rostopic.echo import CallbackEcho
 
 if TYPE_CHECKING:
@@ -28,6 +53,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "NAME",
+    "SUBSCRIBER_TIMEOUT",
     "CallbackEcho",
     "ROSTopicBandwidth",
     "ROSTopicDelay",
@@ -35,9 +61,20 @@ __all__ = [
     "ROSTopicHz",
     "ROSTopicIOException",
     "_check_master",
+    "_convert_getattr",
+    "_fillMessageArgs",
     "_fullusage",
+    "_get_array_index_or_slice_object",
+    "_get_ascii_table",
+    "_get_nested_attribute",
     "_get_topic_type",
+    "_isstring_type",
     "_master_get_topic_types",
+    "_optparse_topic_only",
+    "_publish_at_rate",
+    "_publish_latched",
+    "_resource_name_package",
+    "_rostopic_bw",
     "_rostopic_cmd_bw",
     "_rostopic_cmd_delay",
     "_rostopic_cmd_echo",
@@ -47,15 +84,26 @@ __all__ = [
     "_rostopic_cmd_list",
     "_rostopic_cmd_pub",
     "_rostopic_cmd_type",
+    "_rostopic_delay",
     "_rostopic_echo",
+    "_rostopic_echo_bag",
+    "_rostopic_hz",
     "_rostopic_info",
     "_rostopic_list",
+    "_rostopic_list_bag",
     "_rostopic_list_group_by_host",
     "_rostopic_type",
     "_sleep",
+    "_str_plot",
+    "_str_plot_fields",
+    "_sub_rostopic_list",
+    "_sub_str_plot",
+    "_sub_str_plot_fields",
+    "argv_publish",
     "create_field_filter",
     "create_publisher",
     "create_value_transform",
+    "file_yaml_arg",
     "find_by_type",
     "get_api",
     "get_info_text",
@@ -63,24 +111,19 @@ __all__ = [
     "get_topic_list",
     "get_topic_type",
     "msgevalgen",
+    "param_publish",
+    "param_publish_once",
     "publish_message",
     "rostopicmain",
+    "stdin_publish",
+    "stdin_yaml_arg",
+    "wait_for_subscriber",
 ]
 
 NAME = "rostopic"
-_LATCH_SECONDS = 3.0
 _Topic = tuple[str, str, list[str]]
-
 # topic, type, and the nodes that publish (or subscribe to) the topic
 _TopicRow = tuple[str, str, list[str]]
-
-
-class ROSTopicException(Exception):
-    """A request about a topic failed."""
-
-
-class ROSTopicIOException(ROSTopicException):
-    """The master does not respond."""
 
 
 class _NoMaster(ROSTopicIOException, ConnectionRefusedError):
@@ -153,14 +196,16 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
         # Treat the step as the name of a field that no message has.
         steps = tuple(Step(each, None) for each in fields)
 
+    def report(error: NotFoundError | IndexError) -> None:
+        why = f"no field named {error.name} in" if isinstance(error, NotFoundError) else f"{error.__cause__}:"
+        print(why, pattern, file=sys.stderr)
+
     def value(message: Message) -> object:
         try:
-            return field_value(message, steps)
-        except NotFoundError as error:
-            print(f"no field named {error.name} in {pattern}", file=sys.stderr)
-        except IndexError:
-            print(f"list index out of range: {pattern}", file=sys.stderr)
-        return None
+            return field_value(message, steps, report)
+        except (NotFoundError, IndexError) as error:
+            report(error)
+            return None
 
     return value if steps else None
 
@@ -230,62 +275,12 @@ def create_publisher(
     except (AttributeError, TypeError, ValueError) as error:
         raise ROSTopicException(f"invalid topic type: {topic_type}") from error
     if cls is None:
-        raise ROSTopicException(f"invalid message type: {topic_type}.\nIs its package built and sourced?")
+        hint = f"If this is a valid message type, perhaps you need to type 'rosmake {_resource_name_package(topic_type)}'"
+        raise ROSTopicException(f"invalid message type: {topic_type}.\n{hint}")
     if not rospy.core.is_initialized():
         rospy.init_node(NAME, anonymous=True, disable_rosout=True, disable_rostime=disable_rostime)
     name = script_resolve_name(NAME, topic_name)
     return rospy.Publisher(name, cls, latch=latch, queue_size=100), cls
-
-
-def publish_message(
-    pub: Publisher[Message],
-    msg_class: type[Message],
-    pub_args: Sequence[object],
-    rate: float | None = None,
-    once: bool = False,
-    verbose: bool = False,
-    substitute_keywords: bool = False,
-) -> None:
-    """Publish a message built from YAML values.
-
-    Publish it ``rate`` times a second; without ``rate``, keep it latched for 3 seconds with ``once``, else until shutdown.
-
-    With ``substitute_keywords``, replace `now` and `auto` in each message. Raise ROSTopicException if the values do not
-    match the message's fields.
-    """
-    import rospy
-
-    from minirospy.base.errors import MessageException
-    from minirospy.introspect.echo import fill_message
-
-    def message() -> Message:
-        try:
-            return fill_message(msg_class, pub_args, rospy.Time.now().to_nsec())
-        except MessageException as error:
-            raise ROSTopicException(f"Unable to publish message. {error}") from error
-
-    value = message()
-    shown = f"[{value}]" if verbose else "message"
-    if rate is None:
-        pause = f" for {_LATCH_SECONDS} seconds" if once else ". Press ctrl-C to terminate"
-        print(f"publishing and latching {shown}{pause}")
-        pub.publish(value)
-        if not once:
-            rospy.spin()
-            return
-        end = time.monotonic() + _LATCH_SECONDS
-        while time.monotonic() < end and not rospy.is_shutdown():
-            time.sleep(0.05)
-        return
-    pauses = rospy.Rate(rate)
-    with suppress(rospy.ROSInterruptException):
-        while not rospy.is_shutdown():
-            if verbose:
-                print(f"publishing {shown}")
-            pub.publish(message() if substitute_keywords else value)
-            if once:
-                return
-            pauses.sleep()
 
 
 def rostopicmain(argv: Sequence[str] | None = None) -> None:
@@ -295,10 +290,28 @@ def rostopicmain(argv: Sequence[str] | None = None) -> None:
 
 # The following private functions of ROS's rostopic are called by programs.
 
-_rostopic_cmd_bw = _rostopic_cmd_delay = _rostopic_cmd_echo = _rostopic_cmd_find = _rostopic_cmd_hz = (
-    rostopicmain
-)
-_rostopic_cmd_info = _rostopic_cmd_list = _rostopic_cmd_pub = _rostopic_cmd_type = rostopicmain
+
+def _verb(name: str) -> Callable[[Sequence[str]], None]:
+    """Return the function for a command line whose first words are the command's name and the verb."""
+
+    def call(argv: Sequence[str] = sys.argv) -> None:
+        from minirospy.command.called import Raised, call_verb
+        from minirospy.ros.rostopic.commands.rostopic import FAMILY
+
+        call_verb(FAMILY, [name, *argv[2:]], Raised(ROSTopicException, ROSTopicIOException))
+
+    return call
+
+
+_rostopic_cmd_bw = _verb("bw")
+_rostopic_cmd_delay = _verb("delay")
+_rostopic_cmd_echo = _verb("echo")
+_rostopic_cmd_find = _verb("find")
+_rostopic_cmd_hz = _verb("hz")
+_rostopic_cmd_info = _verb("info")
+_rostopic_cmd_list = _verb("list")
+_rostopic_cmd_pub = _verb("pub")
+_rostopic_cmd_type = _verb("type")
 
 
 def _fullusage() -> NoReturn:
@@ -377,9 +390,9 @@ def _rostopic_echo(
     import rospy
 
     if bag_file:
-        raise ROSTopicException(f"[{bag_file}]: bags are not read by this function")
-    if not rospy.core.is_initialized():
-        rospy.init_node(NAME, anonymous=True)
+        _rostopic_echo_bag(callback_echo, bag_file)
+        return
+    _become_node()
     cls, real_topic, field = get_topic_class(topic, blocking=True)
     if real_topic is None or cls is None:
         return
@@ -389,6 +402,174 @@ def _rostopic_echo(
     while not rospy.is_shutdown() and not callback_echo.done:
         time.sleep(0.05)
     subscriber.unregister()
+
+
+def _rostopic_echo_bag(callback_echo: CallbackEcho, bag_file: str) -> None:
+    """Pass the messages of a bag to ``callback_echo`` until its ``done`` is true.
+
+    Raise ROSTopicException if the file does not exist.
+    """
+    with _open_bag(bag_file) as bag:
+        for topic, message, stamp in bag.read_messages():
+            callback_echo.callback(message, {"topic": script_resolve_name(NAME, topic)}, current_time=stamp)
+            if callback_echo.done:
+                return
+
+
+def _rostopic_list_bag(bag_file: str, topic: str | None = None) -> None:
+    """Print the topics of a bag, or the number of messages below ``topic`` and their times.
+
+    Raise ROSTopicException if the file does not exist.
+    """
+    with _open_bag(bag_file) as bag:
+        if topic:
+            stamps = [
+                stamp.to_time()
+                for name, _, stamp in bag.read_messages(raw=True)
+                if name == topic or name.startswith(make_global_ns(topic))
+            ]
+            start, end = (time.strftime("%d %b %Y %H:%M:%S", time.localtime(stamps[at])) for at in (0, -1))
+            print(f"{len(stamps)} message(s) from {start} to {end}")
+            return
+        for name in dict.fromkeys(name for name, _, _ in bag.read_messages(raw=True)):
+            print(name)
+
+
+def _open_bag(path: str) -> Any:
+    from minirospy.ros.rosbag.rosbag.bag import Bag
+
+    if not os.path.exists(path):
+        raise ROSTopicException(f"bag file [{path}] does not exist")
+    return Bag(path)
+
+
+def _become_node(disable_rostime: bool = False) -> None:
+    """Call init_node if this process is not a node yet. Raise ROSTopicIOException if the master does not respond."""
+    import rospy
+
+    _check_master()
+    if not rospy.core.is_initialized():
+        rospy.init_node(NAME, anonymous=True, disable_rostime=disable_rostime)
+
+
+def _rostopic_hz(
+    topics: Sequence[str],
+    window_size: int = -1,
+    filter_expr: Callable[[object], bool] | None = None,
+    use_wtime: bool = False,
+    tcp_nodelay: bool = False,
+) -> None:
+    """Print the rates of topics every second until shutdown; wait for each to be published."""
+    import rospy
+
+    from minirospy.ros.rostopic.rostopic.rates import ROSTopicHz
+
+    _become_node()
+    rates = ROSTopicHz(window_size, filter_expr=filter_expr, use_wtime=use_wtime)
+    for topic in topics:
+        cls, real_topic, _ = get_topic_class(topic, blocking=True)
+        if real_topic is None:
+            return
+        wanted: Any = rospy.AnyMsg if filter_expr is None else cls
+        rospy.Subscriber(real_topic, wanted, rates.callback_hz, topic, tcp_nodelay=tcp_nodelay)
+        print(f"subscribed to [{real_topic}]")
+    _print_every_second(lambda: rates.print_hz(topics))
+
+
+def _rostopic_bw(topic: str, window_size: int = -1) -> None:
+    """Print the bandwidth of a topic every second until shutdown; wait for it to be published."""
+    import rospy
+
+    from minirospy.ros.rostopic.rostopic.rates import ROSTopicBandwidth
+
+    _check_master()
+    _, real_topic, _ = get_topic_type(topic, blocking=True)
+    if real_topic is None:
+        return
+    _become_node(disable_rostime=True)
+    bandwidth = ROSTopicBandwidth(window_size)
+    subscriber = rospy.Subscriber(real_topic, rospy.AnyMsg, bandwidth.callback)
+    print(f"subscribed to [{subscriber.resolved_name}]")
+    _print_every_second(bandwidth.print_bw)
+
+
+def _rostopic_delay(topic: str, window_size: int = -1, tcp_nodelay: bool = False) -> None:
+    """Print the delay of a topic's stamped messages every second until shutdown; wait for it to be published."""
+    import rospy
+
+    from minirospy.ros.rostopic.rostopic.rates import ROSTopicDelay
+
+    cls, real_topic, _ = get_topic_class(topic, blocking=True)
+    if cls is None or real_topic is None:
+        return
+    _become_node()
+    delay = ROSTopicDelay(window_size)
+    subscriber: Any = rospy.Subscriber(real_topic, cls, delay.callback_delay, tcp_nodelay=tcp_nodelay)
+    print(f"subscribed to [{subscriber.resolved_name}]")
+    _print_every_second(delay.print_delay)
+
+
+def _print_every_second(show: Callable[[], None]) -> None:
+    import rospy
+
+    if rospy.get_param("use_sim_time", False):
+        print("WARNING: may be using simulated time", file=sys.stderr)
+    with suppress(rospy.ROSInterruptException):
+        while not rospy.is_shutdown():
+            _sleep(1.0)
+            show()
+
+
+def _sub_rostopic_list(
+    master: masterapi.Master,
+    pubs: Sequence[_Topic],
+    subs: Sequence[_Topic],
+    publishers_only: bool,
+    subscribers_only: bool,
+    verbose: bool,
+    indent: str = "",
+) -> None:
+    """Print rows of (topic, type, nodes) as `rostopic list` does; each line starts with ``indent``."""
+    if not verbose:
+        chosen = [
+            *([] if subscribers_only and not publishers_only else pubs),
+            *([] if publishers_only else subs),
+        ]
+        names = [row[0] for row in chosen]
+        names = sorted(names if publishers_only or subscribers_only else set(names))
+        print("\n".join(indent + name for name in names))
+        return
+    _master_get_topic_types(master)
+    if not subscribers_only:
+        print(f"\n{indent}Published topics:")
+        _print_counts(pubs, "publisher", indent)
+    if not publishers_only:
+        print(indent)
+        print(f"{indent}Subscribed topics:")
+        _print_counts(subs, "subscriber", indent)
+    print()
+
+
+def _print_counts(rows: Sequence[_Topic], word: str, indent: str) -> None:
+    for topic, type_, nodes in rows:
+        count = f"{len(nodes)} {word}s" if len(nodes) > 1 else f"1 {word}"
+        print(f"{indent} * {topic} [{type_}] {count}")
+
+
+def _resource_name_package(name: str) -> str | None:
+    """Return the package of `pkg/Name`; None for a name without a package."""
+    return name.partition("/")[0] if "/" in name else None
+
+
+def _optparse_topic_only(cmd: str, argv: Sequence[str]) -> str:
+    """Return the global name of the only topic in a command line. Print the usage and exit if it has none or several."""
+    from optparse import OptionParser
+
+    parser = OptionParser(usage=f"usage: %prog {cmd} /topic", prog=NAME)
+    _, words = parser.parse_args(list(argv)[2:])
+    if len(words) != 1:
+        parser.error("you may only specify one input topic" if words else "topic must be specified")
+    return script_resolve_name(NAME, words[0])
 
 
 def _is_shutdown() -> bool:

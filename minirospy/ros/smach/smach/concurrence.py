@@ -253,7 +253,7 @@ class Concurrence(Container):
             super().request_preempt()
             self._done_cond.notify_all()
 
-    # The interface of containers.
+    # The remaining methods implement the interface of containers.
 
     def get_children(self) -> Mapping[str, State]:
         """Return the states by label."""

@@ -150,7 +150,7 @@ class Iterator(Container):
         if self._is_running:
             self._state.request_preempt()
 
-    # The interface of containers.
+    # The remaining methods implement the interface of containers.
 
     def get_children(self) -> Mapping[str, State]:
         """Return the state as ``{label: state}``."""

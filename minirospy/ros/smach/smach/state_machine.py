@@ -311,7 +311,7 @@ class StateMachine(Container):
         except Exception:  # noqa: BLE001 - the user's state
             logerr(f"Failed to preempt contained state '{label}': {traceback.format_exc()}")
 
-    # The interface of containers.
+    # The remaining methods implement the interface of containers.
 
     def get_children(self) -> Mapping[str, State]:
         """Return the states by label."""

@@ -71,7 +71,7 @@ class SoundClient:
         self.sub = rospy.Subscriber(f"{sound_action}/status", GoalStatusArray, self._action_status_cb)
 
     def voiceSound(self, s: str, volume: float = 1.0) -> Sound:
-        """Return a sound that speaks a text."""
+        """Return a sound that speaks ``text``."""
         return Sound(self, SoundRequest.SAY, s, volume=volume)
 
     def waveSound(self, sound: str, volume: float = 1.0) -> Sound:
@@ -83,15 +83,15 @@ class SoundClient:
         return Sound(self, id, "", volume)
 
     def say(self, text: str, voice: str = "", volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
-        """Speak a text."""
+        """Speak ``text``."""
         self.sendMsg(SoundRequest.SAY, SoundRequest.PLAY_ONCE, text, voice, volume, **kwargs)
 
     def repeat(self, text: str, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:
-        """Speak a text repeatedly."""
+        """Speak ``text`` repeatedly."""
         self.sendMsg(SoundRequest.SAY, SoundRequest.PLAY_START, text, vol=volume, **kwargs)
 
     def stopSaying(self, text: str) -> None:
-        """Stop speaking a text."""
+        """Stop speaking ``text``."""
         self.sendMsg(SoundRequest.SAY, SoundRequest.PLAY_STOP, text)
 
     def playWave(self, sound: str, volume: float = 1.0, **kwargs: Unpack[Options]) -> None:

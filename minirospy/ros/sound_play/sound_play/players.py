@@ -1,4 +1,4 @@
-"""Selects a program on this machine that plays a file or speaks a text, and the program's arguments. Pure."""
+"""Selects a program on this machine that plays a file or speaks text, and the program's arguments. Pure."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
         text,
     ),
 }
-"""Functions that return the command for a program that speaks a text, by program, in order of preference."""
+"""Functions that return the command for a program that speaks text, by program, in order of preference."""
 
 _ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
 
@@ -83,7 +83,7 @@ def play_command(file: str, volume: float, which: Which) -> Command | None:
 
 
 def say_command(text: str, voice: str, volume: float, which: Which) -> Command | None:
-    """Return the command that speaks a text, or None if there is no such program."""
+    """Return the command that speaks ``text``, or None if there is no such program."""
     for name, make in SPEAKERS.items():
         program = which(name)
         if program:

@@ -16,7 +16,7 @@ from minirospy.base.errors import ROSException, ROSInterruptException
 from minirospy.core.graph.goals import TERMINAL, GoalState
 from minirospy.core.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
 from minirospy.ros.actionlib.actionlib.aio.common import WAITING, ActionClass, ActionEnd, GoalError
-from minirospy.ros.actionlib.actionlib.spec import TAKES_FAST_ANSWERS
+from minirospy.ros.actionlib.actionlib.spec import SERVER_SECONDS, TAKES_FAST_ANSWERS
 from minirospy.ros.actionlib.actionlib.statuses import StatusList, find_status
 
 __all__ = ["ActionClient", "ClientGoal"]
@@ -130,6 +130,8 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         self._status = node.subscribe(self._topic("status"), StatusList, queue_size=WAITING)
         self._result = node.subscribe(self._topic("result"), types.action_result, queue_size=WAITING)
         self._feedback = node.subscribe(self._topic("feedback"), types.action_feedback, queue_size=WAITING)
+        self._statuses: StatusList | None = None  # the last list
+        self._status._state.subscription.on_ended.append(self._status_link_ended)
         self._heard = asyncio.Event()
         self._start(self._read(self._status, self._take_status))
         self._start(self._read(self._result, self._take_result))
@@ -166,6 +168,9 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         Running goals continue on the server, but this client no longer receives their feedback or results. Idempotent.
         """
         self._is_closed = True
+        hooks = self._status._state.subscription.on_ended
+        if self._status_link_ended in hooks:
+            hooks.remove(self._status_link_ended)
         for goal in list(self._goals.values()):
             goal._interrupt()
         self._goals.clear()
@@ -210,10 +215,35 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
 
     def _take_status(self, statuses: StatusList) -> None:
         self._heard.set()
+        self._statuses = statuses
         for goal in list(self._goals.values()):
             goal._take_status(find_status(statuses, goal.id))
             if goal.done:
                 del self._goals[goal.id]
+
+    def _status_link_ended(self) -> None:
+        """Check after a while whether the server is gone."""
+        if goals := [goal for goal in self._goals.values() if goal._is_sent]:
+            self._check_later(goals)
+
+    def _check_later(self, goals: list[ClientGoal[_R, _F]]) -> None:
+        asyncio.get_running_loop().call_later(SERVER_SECONDS, self._check_server, goals, self._statuses)
+
+    def _check_server(self, goals: list[ClientGoal[_R, _F]], last: StatusList | None) -> None:
+        """End ``goals`` as LOST, unless a server lists them in a newer status message than ``last``."""
+        if self._is_closed or self._node.is_shutdown:
+            return
+        statuses, is_connected = self._statuses, self._status.num_connections > 0
+        if is_connected and statuses is last:
+            self._check_later(goals)
+            return
+        for goal in goals:
+            is_listed = is_connected and statuses is not None and find_status(statuses, goal.id) is not None
+            if not goal.done and not is_listed:
+                self._node.log.error(
+                    "The action server [%s] has died or is unreachable: goal %s is LOST", self.name, goal.id
+                )
+                self._end_goal(goal, GoalState.LOST, "the server has died or is unreachable", None)
 
     def _take_result(self, message: ActionResult) -> None:
         status = message.status

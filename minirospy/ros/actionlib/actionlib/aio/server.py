@@ -84,8 +84,8 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
     """A server for the action ``name``; it runs ``await execute(goal)`` for each goal.
 
     If ``execute`` returns, the goal has succeeded, and the return value is its result: a result message, a dictionary of
-    fields, all values, the value of the only field, or None for an empty result. GoalError aborts the goal, with a text and
-    a result; any other exception also aborts the goal, and is logged.
+    fields, all values, the value of the only field, or None for an empty result. GoalError aborts the goal, with a status
+    text and a result; any other exception also aborts the goal, and is logged.
     If a client cancels the goal, ``execute`` is cancelled: CancelledError is raised at its current ``await``. The goal is
     then preempted, with the result that ``execute`` may still return.
 

@@ -1,6 +1,48 @@
-"""The names of rospy.impl.tcpros_service."""
+"""rospy.impl.tcpros_service: services, and the two sides of a connection to one."""
 
-from minirospy.base.errors import ServiceException
+from minirospy.base.errors import (
+    ROSException,
+    ServiceException,
+    TransportInitError,
+    TransportTerminated,
+)
+from minirospy.client.lifecycle import ROSInterruptException
 from minirospy.client.services import Service, ServiceProxy, wait_for_service
+from minirospy.client.tcpros import (
+    TCPROSServiceClient,
+    TCPROSTransport,
+    TCPROSTransportProtocol,
+    TCPService,
+    recv_buff,
+)
+from minirospy.core.idl.protocols import Message
+from minirospy.core.idl.service import to_response
+from minirospy.ros.rospy.rospy.impl.registration import get_service_manager
+from minirospy.ros.rospy.rospy.impl.transport import DEFAULT_BUFF_SIZE
 
-__all__ = ["Service", "ServiceException", "ServiceProxy", "wait_for_service"]
+__all__ = [
+    "DEFAULT_BUFF_SIZE",
+    "ROSException",
+    "ROSInterruptException",
+    "Service",
+    "ServiceException",
+    "ServiceImpl",
+    "ServiceProxy",
+    "TCPROSServiceClient",
+    "TCPROSTransport",
+    "TCPROSTransportProtocol",
+    "TCPService",
+    "TransportInitError",
+    "TransportTerminated",
+    "convert_return_to_response",
+    "get_service_manager",
+    "recv_buff",
+    "wait_for_service",
+]
+
+ServiceImpl = Service  # in ROS, the base class of Service
+
+
+def convert_return_to_response(response: object, response_class: type[Message]) -> Message:
+    """Return a handler's return value as a response. Raise ServiceException if it does not match."""
+    return to_response(response_class, response)

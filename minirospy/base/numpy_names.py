@@ -1,0 +1,29 @@
+"""Array methods that numpy has removed, and that ROS 1 programs call."""
+
+from __future__ import annotations
+
+import sys
+
+__all__ = ["add_numpy_note"]
+
+_REMOVED = {
+    "itemset": ("2", "a[i] = value"),
+    "newbyteorder": ("2", "a.view(a.dtype.newbyteorder())"),
+    "ptp": ("2", "numpy.ptp(a)"),
+    "tostring": ("2.3", "a.tobytes()"),
+}
+"""Method of arrays -> the version of numpy that removed it, and what replaces it."""
+
+
+def add_numpy_note(error: BaseException) -> None:
+    """Add a line to an error about a method that numpy has removed: what replaces it, and the version that has it.
+
+    Python 3.10 has no such notes (PEP 678).
+    """
+    numpy = sys.modules.get("numpy")
+    if numpy is None or sys.version_info < (3, 11) or not isinstance(error, AttributeError):
+        return
+    removed = _REMOVED.get(error.name or "")
+    if removed and isinstance(error.obj, numpy.ndarray):
+        version, instead = removed
+        error.add_note(f"numpy {version} has removed it: use {instead}, or `pip install 'numpy<{version}'`")

@@ -1,0 +1,64 @@
+"""Let a program import a package that has the name of a file in the program's folder: `turtlebot.msg` in turtlebot.py.
+
+Python searches the program's folder first, so that `from turtlebot.msg import Speed` in turtlebot.py imports turtlebot.py
+again. `import rospy` calls :func:`find_packages_named_like_scripts`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib.machinery import ModuleSpec, PathFinder
+from importlib.util import spec_from_file_location
+from types import ModuleType
+
+__all__ = ["find_packages_named_like_scripts"]
+
+
+def find_packages_named_like_scripts() -> None:
+    """Let imports find the packages that files in the program's folder hide. Idempotent; no effect without such a folder."""
+    main = sys.modules.get("__main__")
+    file = getattr(main, "__file__", None)
+    # A program that `python -m` runs has a spec, and its folder is not searched.
+    if (
+        not file
+        or getattr(main, "__spec__", None)
+        or any(isinstance(each, _Finder) for each in sys.meta_path)
+    ):
+        return
+    path = os.path.abspath(file)
+    # catkin_make's copy of a program runs the file in the source folder: Python searches the copy's folder.
+    if sys.path and os.path.isfile(os.path.join(sys.path[0], os.path.basename(path))):
+        sys.meta_path.insert(0, _Finder(sys.path[0], os.path.basename(path)))
+
+
+class _Finder:
+    """Finds packages whose name a file in ``folder`` has. ``program`` is the name of the program's own file."""
+
+    def __init__(self, folder: str, program: str) -> None:
+        self._folder = folder
+        self._program = program
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return the package's spec, or None if no file in the folder hides it.
+
+        The program itself is not imported again. Another file is, and the package's submodules are found in addition.
+        """
+        if path is not None:
+            return None
+        file = os.path.join(self._folder, f"{fullname}.py")
+        if not os.path.isfile(file) or os.path.isdir(os.path.join(self._folder, fullname)):
+            return None
+
+        others = [entry for entry in sys.path if entry != self._folder]
+        package = PathFinder.find_spec(fullname, others)
+        if package is None or package.submodule_search_locations is None or package.loader is None:
+            return None
+        if f"{fullname}.py" == self._program:
+            return package
+        return spec_from_file_location(
+            fullname, file, submodule_search_locations=list(package.submodule_search_locations)
+        )

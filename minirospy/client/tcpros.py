@@ -1,0 +1,356 @@
+"""A TCPROS connection that a program makes itself: the classes of rospy.impl.tcpros_base and tcpros_service.
+
+minirospy's own connections are in ``runtime/``; they use none of these. Source: http://wiki.ros.org/ROS/TCPROS, and the
+behaviour of rospy.impl.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import socket
+import struct
+from collections.abc import Callable, Mapping
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+from minirospy.base.errors import (
+    DeserializationError,
+    ServiceException,
+    TransportException,
+    TransportInitError,
+    TransportTerminated,
+    WireError,
+)
+from minirospy.client.length_prefix import deserialize_messages, serialize_message
+from minirospy.client.session import current_session
+from minirospy.core.wire.header import parse_header, serialize_header
+
+if TYPE_CHECKING:
+    from minirospy.core.idl.protocols import Message
+
+__all__ = [
+    "DEFAULT_BUFF_SIZE",
+    "ResponseTransport",
+    "TCPROSServiceClient",
+    "TCPROSTransport",
+    "TCPROSTransportProtocol",
+    "TCPService",
+    "recv_buff",
+]
+
+DEFAULT_BUFF_SIZE = 65536
+BIDIRECTIONAL = "b"
+_LENGTH = struct.Struct("<I")
+_OK_LENGTH = struct.Struct("<BI")
+_NOT_INITIALIZED = "TCPROS transport was not successfully initialized"
+_numbers = itertools.count(1)
+
+
+def recv_buff(sock: socket.socket, b: BytesIO, buff_size: int) -> int:
+    """Append received bytes to ``b``; return their number. Raise TransportTerminated if the peer has closed the connection."""
+    data = sock.recv(buff_size)
+    if not data:
+        raise TransportTerminated("unable to receive data from sender, check sender's logs for details")
+    b.write(data)
+    return len(data)
+
+
+class TCPROSTransportProtocol:
+    """The contents of a connection: its header's fields, and the class of the received messages."""
+
+    def __init__(
+        self,
+        resolved_name: str,
+        recv_data_class: type[Message] | None,
+        queue_size: int | None = None,
+        buff_size: int = DEFAULT_BUFF_SIZE,
+    ) -> None:
+        self.resolved_name = resolved_name
+        self.recv_data_class = recv_data_class
+        self.queue_size = queue_size
+        self.buff_size = buff_size
+        self.direction = BIDIRECTIONAL
+
+    def read_messages(self, b: BytesIO, msg_queue: list[Message], sock: socket.socket) -> None:
+        """Move the complete messages in ``b`` to ``msg_queue``."""
+        assert self.recv_data_class
+        deserialize_messages(b, msg_queue, self.recv_data_class, queue_size=self.queue_size)
+
+    def get_header_fields(self) -> dict[str, str]:
+        """Return the fields for the connection header."""
+        return {}
+
+
+class TCPROSServiceClient(TCPROSTransportProtocol):
+    """A client's side of a connection to a service."""
+
+    def __init__(
+        self,
+        resolved_name: str,
+        service_class: Any,
+        headers: Mapping[str, str] | None = None,
+        buff_size: int = DEFAULT_BUFF_SIZE,
+    ) -> None:
+        super().__init__(resolved_name, service_class._response_class, buff_size=buff_size)
+        self.service_class = service_class
+        self.headers = headers or {}
+
+    def get_header_fields(self) -> dict[str, str]:
+        """Return the fields for the connection header."""
+        return {
+            "service": self.resolved_name,
+            "md5sum": self.service_class._md5sum,
+            "callerid": current_session().name,
+            **self.headers,
+        }
+
+    def read_messages(self, b: BytesIO, msg_queue: list[Message], sock: socket.socket) -> None:
+        """Move a complete response in ``b`` to ``msg_queue``. Raise ServiceException if it is an error of the service."""
+        size = b.tell()
+        if size < _OK_LENGTH.size:
+            return
+        ok, length = _OK_LENGTH.unpack_from(b.getvalue())
+        if size < _OK_LENGTH.size + length:
+            return
+        if ok:
+            assert self.recv_data_class
+            deserialize_messages(b, msg_queue, self.recv_data_class, max_msgs=1, start=1)
+            return
+        data = b.getvalue()[:size]
+        text = data[_OK_LENGTH.size : _OK_LENGTH.size + length]
+        b.seek(0)
+        b.truncate()
+        b.write(data[_OK_LENGTH.size + length :])
+        raise ServiceException(f"service [{self.resolved_name}] responded with an error: {text!r}")
+
+
+class TCPService(TCPROSTransportProtocol):
+    """A server's side of a connection to a service."""
+
+    def __init__(self, resolved_name: str, service_class: Any, buff_size: int = DEFAULT_BUFF_SIZE) -> None:
+        super().__init__(resolved_name, service_class._request_class, buff_size=buff_size)
+        self.service_class = service_class
+
+    def get_header_fields(self) -> dict[str, str]:
+        """Return the fields for the connection header."""
+        return {
+            "service": self.resolved_name,
+            "type": self.service_class._type,
+            "md5sum": self.service_class._md5sum,
+            "callerid": current_session().name,
+        }
+
+
+class TCPROSTransport:
+    """A connection that blocks its thread: :meth:`connect`, :meth:`send_message`, :meth:`receive_once`, :meth:`close`.
+
+    Raise TransportInitError if it has no name.
+    """
+
+    transport_type = "TCPROS"
+
+    def __init__(
+        self, protocol: TCPROSTransportProtocol, name: str, header: Mapping[str, str] | None = None
+    ) -> None:
+        if not name:
+            raise TransportInitError("Unable to initialize transport: name is not set")
+        self.protocol = protocol
+        self.name = name
+        self.direction = protocol.direction
+        self.id = next(_numbers)
+        self.buff_size = protocol.buff_size
+        # The peer's connection header, once it was received; `type` and `md5sum` are from it
+        self.header: Mapping[str, str] | None = header
+        self.type: str | None = None
+        self.md5sum: str | None = None
+        self.callerid_pub = "unknown"
+        self.is_latched = False
+        self.latch: str | None = None
+
+        # The socket while the connection is open, and the buffers of data that was received and that is to be sent
+        self.socket: socket.socket | None = None
+        self.read_buff, self.write_buff = BytesIO(), BytesIO()
+        # Where the connection goes: the peer's URI, the address that connect() was called with, and the socket's
+        self.endpoint_id = "unknown"
+        self.dest_address: tuple[str, int] | None = None
+        self.local_endpoint: Any = (None, None)
+        self.remote_endpoint: Any = (None, None)
+        # The number of bytes and messages in both directions
+        self.stat_bytes = self.stat_num_msg = 0
+        self.done = False  # set by close()
+        self.cleanup_cb: Callable[[TCPROSTransport], object] | None = None
+
+    def fileno(self) -> int | None:
+        """Return the socket's file descriptor, or None if the connection is not open."""
+        return self.socket.fileno() if self.socket else None
+
+    def set_endpoint_id(self, endpoint_id: str) -> None:
+        """Set the URI that names the peer."""
+        self.endpoint_id = endpoint_id
+
+    def set_socket(self, sock: socket.socket, endpoint_id: str) -> None:
+        """Use an open socket. Raise TransportInitError if the connection has one."""
+        if self.socket is not None:
+            raise TransportInitError("socket already initialized")
+        self.socket = sock
+        self.endpoint_id = endpoint_id
+        with contextlib.suppress(OSError):
+            self.local_endpoint, self.remote_endpoint = sock.getsockname(), sock.getpeername()
+
+    def set_cleanup_callback(self, cleanup_callback: Callable[[TCPROSTransport], object]) -> None:
+        """Call a function with this object when the connection is closed."""
+        self.cleanup_cb = cleanup_callback
+
+    def get_transport_info(self) -> str:
+        """Return a description of the connection, for getBusInfo."""
+        here, there = self.local_endpoint, self.remote_endpoint
+        port, (host, other) = here[1] if len(here) > 1 else here, (*there, None)[:2]
+        return (
+            f"{self.transport_type} connection on port {port} to [{host}:{other} on socket {self.fileno()}]"
+        )
+
+    def connect(self, dest_addr: str, dest_port: int, endpoint_id: str, timeout: float | None = None) -> None:
+        """Connect to a server and exchange headers. A connection that is open is replaced.
+
+        ``timeout``: the limit for connecting and for each wait for the header, in seconds. Raise TransportInitError if the
+        server is unreachable or refuses.
+        """
+        self.endpoint_id = endpoint_id
+        self.dest_address = (dest_addr, dest_port)
+        before, self.socket = self.socket, None
+        if before is not None:
+            before.close()
+        self.read_buff, self.write_buff = BytesIO(), BytesIO()
+        self.done = False
+        try:
+            sock = socket.create_connection((dest_addr, dest_port), timeout)
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self.set_socket(sock, endpoint_id)
+            self.write_header()
+            self.read_header()
+            sock.settimeout(None)
+        except TransportInitError:
+            # As in rospy, the connection stays open if the server refuses.
+            raise
+        except OSError as error:
+            self.close()
+            raise TransportInitError(str(error)) from error
+
+    def write_header(self) -> None:
+        """Send the connection header."""
+        data = serialize_header(self.protocol.get_header_fields())
+        self._open_socket().sendall(data)
+        self.stat_bytes += len(data)
+
+    def read_header(self) -> None:
+        """Receive the peer's connection header. Raise TransportInitError if it is invalid, or an error."""
+        b, sock = self.read_buff, self._open_socket()
+        try:
+            while b.tell() < _LENGTH.size or b.tell() < _LENGTH.size + _LENGTH.unpack_from(b.getvalue())[0]:
+                self.stat_bytes += recv_buff(sock, b, self.protocol.buff_size)
+            data = b.getvalue()[: b.tell()]
+            end = _LENGTH.size + _LENGTH.unpack_from(data)[0]
+            header = parse_header(data[_LENGTH.size : end])
+        except (WireError, TransportTerminated) as error:
+            raise TransportInitError(str(error)) from error
+        b.seek(0)
+        b.truncate()
+        b.write(data[end:])
+        if "error" in header:
+            raise TransportInitError(f"remote error reported: {header['error']}")
+        self.use_header(header)
+
+    def use_header(self, header: Mapping[str, str]) -> None:
+        """Take the peer's name and type from its connection header. Raise TransportInitError if it lacks the type."""
+        for field in ("md5sum", "type"):
+            if field not in header:
+                raise TransportInitError(f"header missing required field [{field}]")
+        self.header = header
+        self.type, self.md5sum = header["type"], header["md5sum"]
+        self.callerid_pub = header.get("callerid", "unknown")
+        self.latch = header.get("latching")
+        self.is_latched = self.latch == "1"
+
+    def send_message(self, msg: Message, seq: int) -> None:
+        """Send a message after what ``write_buff`` contains. Raise TransportInitError without a connection."""
+        serialize_message(self.write_buff, seq, msg)
+        data = self.write_buff.getvalue()
+        self.write_buff.seek(0)
+        self.write_buff.truncate()
+        self.write_data(data)
+
+    def write_data(self, data: bytes) -> None:
+        """Send bytes. Raise TransportInitError without a connection, TransportException if the peer has closed it."""
+        sock = self._open_socket()
+        try:
+            sock.sendall(data)
+        except OSError as error:
+            self.close()
+            raise TransportException(str(error)) from error
+        self.stat_bytes += len(data)
+        self.stat_num_msg += 1
+
+    def receive_once(self) -> list[Message]:
+        """Wait for messages and return them.
+
+        Raise TransportException if the connection is not open or fails, ServiceException if a service responds with an error.
+        """
+        sock, b, messages = self.socket, self.read_buff, list[Any]()
+        if sock is None:
+            raise TransportException("connection not initialized")
+        try:
+            while not messages and not self.done:
+                self.protocol.read_messages(b, messages, sock)
+                if not messages:
+                    self.stat_bytes += recv_buff(sock, b, self.protocol.buff_size)
+        except DeserializationError as error:
+            raise TransportException(f"receive_once[{self.name}]: DeserializationError {error}") from error
+        except (OSError, TransportTerminated) as error:
+            self.close()
+            raise TransportTerminated(f"receive_once[{self.name}]: {error}") from error
+        self.stat_num_msg += len(messages)
+        for message in messages:
+            message._connection_header = self.header
+        return messages
+
+    def receive_loop(self, msgs_callback: Callable[[list[Message], TCPROSTransport], object]) -> None:
+        """Call a function with received messages until the connection is closed."""
+        while not self.done:
+            try:
+                messages = self.receive_once()
+            except TransportException:
+                self.close()
+                return
+            if not self.done:
+                msgs_callback(messages, self)
+
+    def close(self) -> None:
+        """Close the connection. Idempotent."""
+        if self.done:
+            return
+        self.done = True
+        sock, self.socket = self.socket, None
+        if sock is not None:
+            with contextlib.suppress(OSError):
+                sock.shutdown(socket.SHUT_RDWR)
+            sock.close()
+        if self.cleanup_cb:
+            self.cleanup_cb(self)
+
+    def _open_socket(self) -> socket.socket:
+        if self.socket is None:
+            raise TransportInitError(_NOT_INITIALIZED)
+        return self.socket
+
+
+class ResponseTransport(TCPROSTransport):
+    """Collects a response that a program's ``_handle_request`` sends; ``sent`` is what was sent."""
+
+    def __init__(self, service_name: str, service_class: Any, header: Mapping[str, str]) -> None:
+        super().__init__(TCPService(service_name, service_class), service_name, header)
+        self.sent = b""
+
+    def write_data(self, data: bytes) -> None:
+        """Collect bytes."""
+        self.sent += data

@@ -1,0 +1,53 @@
+"""A command's verb as a function that a program calls: errors are raised, as by ROS's `_rostopic_cmd_list(argv)`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from minirospy.base.errors import (
+    MasterUnreachableError,
+    MessageException,
+    MinirospyError,
+    ROSException,
+    ServiceException,
+)
+from minirospy.base.escape import escaped
+from minirospy.command.command import complain, ros_words
+from minirospy.command.parser import CommandLineError
+from minirospy.command.verbs import Family
+
+__all__ = ["Raised", "call_verb"]
+
+_MAIN_ADDS = "ERROR: "  # ROS's mains print it before the text of an exception
+_NO_NETWORK = "Network communication failed"  # ROS's mains print it for a socket error
+
+
+class Raised(NamedTuple):
+    """The exceptions of a ROS module: ``failed`` for every failure, ``unreachable`` if the master does not respond."""
+
+    failed: type[Exception]
+    unreachable: type[Exception]
+
+
+def call_verb(family: Family, words: Sequence[str], raised: Raised) -> int | None:
+    """Run a command line without the command's name; return the status of its verb.
+
+    Raise an exception in ``raised`` if it fails; ConnectionRefusedError if ROS's function lets the socket error through. Exit
+    after a usage error, and after an error that ROS's function prints itself.
+    """
+    try:
+        return family._dispatch(list(words))
+    except CommandLineError as error:
+        sys.exit(complain(family.name, error, 2, error.ros_text))
+    except (MinirospyError, ROSException, ServiceException, MessageException) as error:
+        text, status = ros_words(error, family.wording)
+        if text.startswith(_NO_NETWORK):
+            raise ConnectionRefusedError(text) from error
+        if text and not text.startswith(_MAIN_ADDS):
+            print(escaped(text, "\n\t"), file=sys.stderr)
+            sys.exit(status)
+        is_unreachable = MasterUnreachableError in (type(error), type(error.__cause__))
+        exception = raised.unreachable if is_unreachable else raised.failed
+        raise exception(text.removeprefix(_MAIN_ADDS) or str(error)) from error

@@ -1,0 +1,72 @@
+"""``catkin_download()`` and ``catkin_download_test_data()``: files that a package's build or its tests download.
+
+Source: http://docs.ros.org/en/noetic/api/catkin/html/dev_guide/generated_cmake_api.html.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+
+from minirospy.base.errors import BuildError
+from minirospy.workspace.plan import Download, Plan
+
+__all__ = ["download"]
+
+_TIMEOUT = 30.0  # seconds without a byte, after which a download fails
+
+
+def download(plan: Plan, wanted: Iterable[Download]) -> None:
+    """Download the files that do not exist or have another MD5 sum; print a line for each.
+
+    Raise BuildError if a file that is REQUIRED cannot be downloaded, or if a downloaded file has another MD5 sum.
+    """
+    for each in wanted:
+        if _is_right(each):
+            continue
+        try:
+            _fetch(each)
+        except (OSError, ValueError) as error:
+            if each.required:
+                raise BuildError(
+                    str(plan.cmake_lists), each.line, f"cannot download {each.url}: {error}"
+                ) from error
+            print(f"Downloading {each.url} to {each.path}... failed ({error})!", flush=True)
+            continue
+        print(f"Downloading {each.url} to {each.path}... done.", flush=True)
+        if not _is_right(each):
+            raise BuildError(
+                str(plan.cmake_lists), each.line, f"{each.url} has another MD5 sum than {each.md5}"
+            )
+
+
+def _is_right(wanted: Download) -> bool:
+    """Return whether the file exists with the MD5 sum, if one is given."""
+    if not wanted.path.is_file():
+        return False
+    if not wanted.md5:
+        return True
+    digest = hashlib.md5(usedforsecurity=False)
+    with wanted.path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest() == wanted.md5.lower()
+
+
+def _fetch(wanted: Download) -> None:
+    """Write the file only when it is complete."""
+    # Importing it takes as long as a build without a download.
+    from urllib.request import Request, urlopen
+
+    wanted.path.parent.mkdir(parents=True, exist_ok=True)
+    part = wanted.path.with_name(f"{wanted.path.name}.part")
+    url = wanted.url if "://" in wanted.url else Path(wanted.url).absolute().as_uri()
+    try:
+        with urlopen(Request(url), timeout=_TIMEOUT) as source, part.open("wb") as target:
+            shutil.copyfileobj(source, target)
+        os.replace(part, wanted.path)
+    finally:
+        part.unlink(missing_ok=True)
