@@ -100,16 +100,16 @@ class Workspace(NamedTuple):
 
 
 def find_workspace(start: Path) -> Path:
-    """Return the workspace that contains ``start``: a folder that was built before, or one in whose ``src`` it is.
+    """Return the workspace that contains ``start``.
 
-    Raise BuildError if there is none.
+    It was built before, or its ``src`` contains ``start``. Raise BuildError if there is no such folder.
     """
     start = start.resolve()
     for folder in (start, *start.parents):
         if (folder / ".catkin_workspace").is_file() or (folder / ".catkin_tools").is_dir():
             return folder
     for folder in (start, *start.parents):
-        # A folder such as ~, with a src of something else, is not the workspace of all folders in it.
+        # A folder such as ~ may have an unrelated src, and is not the workspace of all other folders in it.
         is_inside = start == folder or start.is_relative_to(folder / "src")
         if is_inside and (folder / "src").is_dir() and not (folder / "package.xml").is_file():
             return folder

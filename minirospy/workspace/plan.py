@@ -112,7 +112,7 @@ class Test(NamedTuple):
 class Download(NamedTuple):
     """A file to download.
 
-    ``md5``: "" if any content is right; ``required``: a failure is an error; ``for_tests``: a build does not need it.
+    ``md5`` is "" if any content is right. ``required``: a failed download is an error. ``for_tests``: only tests need the file.
     """
 
     url: str
