@@ -264,7 +264,7 @@ class Registrations:
             try:
                 if asked and asked[0] == "Service":
                     if await self._look("lookupService", asked[1]) != self.service_uri:
-                        # As in ROS, a service belongs to the node that registered it last: this node must ask about something else.
+                        # As in ROS, a service belongs to the node that registered it last, so this entry tells us nothing.
                         self._taken.add(asked)
                         continue
                 else:
