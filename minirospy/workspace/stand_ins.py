@@ -19,9 +19,9 @@ _OVERLAY = Path(__file__).parents[1] / "overlay"
 
 
 class StandIns(NamedTuple):
-    """``programs``: dict from name to minirospy's program. ``modules``: dict from dotted name to minirospy's file.
+    """minirospy's files that replace a package's compiled programs and modules.
 
-    ``modules`` includes the enclosing packages.
+    ``programs`` is a dict by program name; ``modules`` is a dict by dotted name, which includes the enclosing packages.
     """
 
     programs: dict[str, Path]
