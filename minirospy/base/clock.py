@@ -34,13 +34,13 @@ other systems a Ctrl-C just before the start of a wait takes effect only after i
 """
 
 _POLL_SECONDS = 0.1
-_SILENT_SECONDS = 2.0  # a simulator's /clock arrives sooner after a node's start
+_SILENT_SECONDS = 2.0  # seconds; a simulator's /clock normally arrives sooner after a node's start
 
 SILENT_CLOCK = (
     "/use_sim_time is set, and no time has arrived on /clock yet: sleep(), Rate and Timer wait for it. Start the simulator or "
     "`rosbag play --clock`; or type `rosparam set use_sim_time false`, and restart this node"
 )
-"""The warning about a clock that has no time."""
+"""The warning that no time has arrived on /clock."""
 
 
 class SignalSafeEvent(threading.Event):
@@ -136,10 +136,10 @@ class FirstTimeWait:
     """Calls a function once if the first time of a simulated clock does not arrive within two seconds."""
 
     def __init__(self, on_silence: Callable[[], object]) -> None:
-        self._pending = [on_silence]  # a list, because several threads may wait: pop() is atomic
+        self._pending = [on_silence]  # a list, whose pop() is atomic, because several threads may wait
 
     def check(self, started: float) -> None:
-        """Call the function if the wait that began at ``started``, in seconds of time.monotonic(), has lasted too long."""
+        """Call the function if the wait that started at ``started``, in seconds of time.monotonic(), has lasted too long."""
         if self._pending and time.monotonic() - started >= _SILENT_SECONDS:
             try:
                 on_silence = self._pending.pop()

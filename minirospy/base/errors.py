@@ -154,9 +154,10 @@ class NotFoundError(MinirospyError):
 
 
 class MasterUnreachableError(MinirospyError):
-    """No master responds at ``uri``. ``why``: the reason why this process cannot call it; ``cause``: why it does not respond.
+    """No master responds at ``uri``.
 
-    ``ros_text`` is ROS's message for it.
+    ``why``: why this process cannot call the master; ``cause``: why the master does not respond. ``ros_text`` is ROS's
+    message for this error.
     """
 
     ros_text = "Unable to communicate with master!"

@@ -12,13 +12,13 @@ _REMOVED = {
     "ptp": ("2", "numpy.ptp(a)"),
     "tostring": ("2.3", "a.tobytes()"),
 }
-"""Method of arrays -> the version of numpy that removed it, and what replaces it."""
+"""A dict from array method to the version of numpy that removed it and the replacement."""
 
 
 def add_numpy_note(error: BaseException) -> None:
-    """Add a line to an error about a method that numpy has removed: what replaces it, and the version that has it.
+    """If ``error`` is about an array method that numpy has removed, add a note with the replacement to it.
 
-    Python 3.10 has no such notes (PEP 678).
+    There is no note on Python 3.10, which lacks them (PEP 678).
     """
     numpy = sys.modules.get("numpy")
     if numpy is None or sys.version_info < (3, 11) or not isinstance(error, AttributeError):

@@ -1,6 +1,6 @@
-"""Let a program import a package that has the name of a file in the program's folder: `turtlebot.msg` in turtlebot.py.
+"""Let a program import a package with the same name as a file in its folder: `turtlebot.msg` in turtlebot.py.
 
-Python searches the program's folder first, so that `from turtlebot.msg import Speed` in turtlebot.py imports turtlebot.py
+Python searches the program's folder first, so `from turtlebot.msg import Speed` in turtlebot.py would import turtlebot.py
 again. `import rospy` calls :func:`find_packages_named_like_scripts`.
 """
 
@@ -17,10 +17,13 @@ __all__ = ["find_packages_named_like_scripts"]
 
 
 def find_packages_named_like_scripts() -> None:
-    """Let imports find the packages that files in the program's folder hide. Idempotent; no effect without such a folder."""
+    """Let imports find packages that are hidden by files in the program's folder. Idempotent.
+
+    Without effect if Python does not search the program's folder.
+    """
     main = sys.modules.get("__main__")
     file = getattr(main, "__file__", None)
-    # A program that `python -m` runs has a spec, and its folder is not searched.
+    # A program that was started with `python -m` has a spec, and Python does not search its folder.
     if (
         not file
         or getattr(main, "__spec__", None)
@@ -34,7 +37,7 @@ def find_packages_named_like_scripts() -> None:
 
 
 class _Finder:
-    """Finds packages whose name a file in ``folder`` has. ``program`` is the name of the program's own file."""
+    """Finds packages with the same name as a file in ``folder``. ``program`` is the name of the program's own file."""
 
     def __init__(self, folder: str, program: str) -> None:
         self._folder = folder

@@ -1,4 +1,7 @@
-"""Log the errors that the program's callbacks raise: each in full the first time, afterwards one line with their number."""
+"""Log the errors that the program's callbacks raise.
+
+Each error is logged in full the first time, and then in one line with the number of repetitions.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from types import TracebackType
 
 __all__ = ["CallbackErrors"]
 
-_SECONDS = 10.0  # between two lines about the same error
+_SECONDS = 10.0  # seconds between two lines about the same error
 
 _log = logging.getLogger("rosout")
 
@@ -22,23 +25,25 @@ class _Repeated:
     __slots__ = ("due", "line", "omitted")
 
     def __init__(self, due: float, line: str) -> None:
-        self.due = due  # when the next line may be logged
-        self.line = line  # describes the last error
-        self.omitted = 0  # errors since the last line
+        self.due = due  # time when the next line may be logged
+        self.line = line  # description of the last error
+        self.omitted = 0  # number of errors since the last line
 
 
 class CallbackErrors:
-    """Logs the errors of a node's callbacks.
+    """Logs the errors that a node's callbacks raise.
 
     Two errors are the same if they have the same type and the same callback, and were raised at the same line of code.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """``clock()`` returns the time in seconds."""
+        """Create the log. ``clock()`` returns the time in seconds."""
         self._clock = clock
-        # By type, callback's name, file and line. A program has few such places, so the table stays small.
+        # Keys are the error's type, the callback's name, the file and the line. A program has few such places, so the
+        # table stays small.
         self._known: dict[tuple[type[BaseException], str, str, int], _Repeated] = {}
-        # Reentrant: :meth:`close` may run in a signal handler that interrupts :meth:`log` in the same thread.
+        # Use a reentrant lock: :meth:`close` may run in a signal handler that interrupts :meth:`log` in the same
+        # thread.
         self._lock = threading.RLock()
 
     def log(self, callback: object, error: BaseException) -> None:

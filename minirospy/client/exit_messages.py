@@ -24,7 +24,7 @@ def report_waiting(*, is_leaving: bool) -> None:
 
 
 def report_interrupt(reason: str) -> None:
-    """Print that the main thread is interrupted, its location in the program, and the reason of the shutdown."""
+    """Print that the main thread is interrupted, its location in the program, and the reason for the shutdown."""
     main = threading.main_thread()
     place = _place(sys._current_frames().get(main.ident or 0))
     at = f" at {place}" if place else ""

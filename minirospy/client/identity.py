@@ -30,7 +30,8 @@ class Identity:
 
     def __init__(self, previous: Identity | None = None) -> None:
         """Use the identity ``previous`` until :meth:`take_name` is called, except for topic names."""
-        # Keys are resolved names, and __name and similar; empty before init_node. Programs change this and `mappings`
+        # Dict from resolved names, and from __name and similar keys; empty before init_node. Programs change this and
+        # `mappings`
         self.remappings: dict[str, str] = previous.remappings if previous else {}
         self._name: str | None = previous._name if previous else None
         # The namespace that the program has set, or None

@@ -1,4 +1,4 @@
-"""Messages with a length prefix, as TCPROS sends them. Source: http://wiki.ros.org/ROS/TCPROS."""
+"""Read and write messages with a length prefix, as TCPROS sends them. Source: http://wiki.ros.org/ROS/TCPROS."""
 
 from __future__ import annotations
 

@@ -124,7 +124,7 @@ class RosOutHandler(DeferringHandler):
 
 
 def check_message(record: logging.LogRecord) -> str:
-    """Return the record's text. If its arguments do not fit the message, replace the text by one that names the fault."""
+    """Return the record's text. If its arguments do not match the message, replace the text with one that names the fault."""
     try:
         return record.getMessage()
     except Exception as error:  # noqa: BLE001 - also what a program's own __str__() raises

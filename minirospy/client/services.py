@@ -171,7 +171,10 @@ class Service(Generic[_S_co]):
             raise ServiceException(f"error processing request: {error}") from error
 
     def _handle_by_program(self, request: Message, header: Header) -> bytes:
-        """Return the response that a program's own ``_handle_request`` sends. Raise CallFailed if it is an error."""
+        """Call a program's own ``_handle_request``, and return the response that it sends.
+
+        Raise CallFailed if the response is an error.
+        """
         from minirospy.client.tcpros import ResponseTransport
 
         transport = ResponseTransport(self.resolved_name, self.service_class, header)
@@ -187,7 +190,7 @@ class Service(Generic[_S_co]):
     def _handle_request(self, transport: TCPROSTransport, request: Message) -> None:
         """Call the handler and send its response, or its error, through ``transport``.
 
-        Programs replace this method, in a subclass or in the class itself; otherwise, it is not called.
+        It exists for programs that replace it, in a subclass or in the class itself; otherwise, it is not called.
         """
         try:
             response = to_response(self.response_class, self.handler(request))
@@ -201,7 +204,7 @@ class Service(Generic[_S_co]):
             self._write_service_error(transport, f"error processing request: {error}")
 
     def _write_service_error(self, transport: TCPROSTransport, err_msg: str) -> None:
-        """Send an error to the client."""
+        """Send an error response to the client."""
         transport.write_data(serialize_failure(ServiceException(err_msg)))
 
     def _report(self, error: Exception) -> None:
@@ -291,7 +294,7 @@ class ServiceProxy(Generic[_S_co]):
 
     @property
     def protocol(self) -> TCPROSServiceClient:
-        """The fields for the connection header, and the class of the responses; for a program's own TCPROSTransport."""
+        """The connection header's fields and the class of the responses, for a TCPROSTransport that a program creates."""
         if self._protocol is None:
             from minirospy.client.tcpros import TCPROSServiceClient
 
@@ -301,7 +304,7 @@ class ServiceProxy(Generic[_S_co]):
 
     @property
     def transport(self) -> TCPROSTransport | None:
-        """The persistent connection, or None. A program may set a connection of its own, which calls then use."""
+        """The persistent connection, or None. A program may set its own connection, which calls then use."""
         client = self._client
         if self._transport is None and client is not None:
             from minirospy.client.tcpros import TCPROSTransport
@@ -344,7 +347,7 @@ class ServiceProxy(Generic[_S_co]):
     def _is_transport_usable(self, transport: TCPROSTransport) -> bool:
         """Return whether calls use ``transport``; drop it if it is the proxy's own connection and has ended.
 
-        A program's connection may go to another server than the master's, so it is not replaced.
+        A program's own connection is kept: it may lead to a different server than the one that the master knows.
         """
         from minirospy.runtime.transport.sockets import is_readable
 
@@ -355,7 +358,7 @@ class ServiceProxy(Generic[_S_co]):
         return self._transport is not None
 
     def _call_through(self, transport: TCPROSTransport, request: Message) -> Message:
-        """Return the response to a call on a program's connection."""
+        """Call the service through ``transport``, and return the response."""
         is_kept = False
         self._calls += 1
         try:

@@ -231,9 +231,9 @@ class Session:
         self.signals.flush_at_exit()
 
     def _warn_of_missing_spin(self) -> None:
-        """Log one line if the program ends right after it has subscribed, without an error and before any message has arrived."""
+        """Log a warning if the program ends without an error right after it has subscribed, before any message has arrived."""
         waiting = {topic: state for topic, state in self.subscribed.items() if state.has_callback}
-        # A program that polls or waits decides itself when it ends, as does the user of an interactive session.
+        # A program that polls or has waited ends when it means to, and so does an interactive session.
         is_meant = self.lifecycle.has_waited or self.lifecycle.main_polls or hasattr(sys, "ps1")
         topics = sorted(topic for topic in waiting if topic != "/clock")
         if (

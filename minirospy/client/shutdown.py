@@ -13,8 +13,9 @@ __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 # seconds for the main thread to start the hooks, and again to see that is_shutdown() is true
 _GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
-# For the main thread to end by itself after a request from another process. No user waits at the terminal, so the times are
-# longer than after a signal. A main thread that polls is_shutdown() may be in a long iteration of its loop.
+# Seconds for the main thread to exit by itself after a request from another process. No user is waiting at the
+# terminal, so the times are longer than after a signal. A main thread that polls is_shutdown() may be in a long
+# iteration of its loop.
 _REQUEST_GRACE_SECONDS = 2.0
 _REQUEST_GRACE_OF_POLLS_SECONDS = 5.0
 
@@ -71,7 +72,7 @@ class ShutdownMachine:
         self.runs_in_main = False  # True if the main thread itself runs the hooks and unregisters the node
         self.phase = Phase.RUNNING
         self.signals = 0
-        self.is_requested = False  # another process requested the shutdown that is in progress
+        self.is_requested = False  # True if another process requested the shutdown in progress
         self._signalled = 0.0
         # The earliest time at which the main thread could see that is_shutdown() is true
         self._free: float | None = None
@@ -114,13 +115,14 @@ class ShutdownMachine:
     @property
     def main_ends_by_itself(self) -> bool:
         """Return whether the main thread needs no exception, because it has exited or has been notified of the shutdown."""
-        # Trust a main thread that polls to end, except after a request: nobody presses Ctrl-C a second time then.
+        # Trust a main thread that polls to exit, except after a request from another process, when no user can press
+        # Ctrl-C again.
         trusted = Awareness.NOTIFIED if self.is_requested else Awareness.POLLS
         return self.main_has_ended or self.main.awareness >= trusted
 
     @property
     def _grace(self) -> float:
-        """Return how long the main thread may run until it is interrupted, in seconds."""
+        """Return the seconds for which the main thread may run until it is interrupted."""
         if self.main.awareness > Awareness.NONE:
             return _REQUEST_GRACE_OF_POLLS_SECONDS
         return _GRACE_SECONDS if self.signals else _REQUEST_GRACE_SECONDS

@@ -109,7 +109,7 @@ class SignalWatchdog:
                     signal.signal(number, signal.SIG_DFL)
 
     def interrupt_later(self) -> None:
-        """Interrupt a main thread that does not end by itself: another process has shut the node down.
+        """Interrupt a main thread that does not exit by itself after another process has shut the node down.
 
         Has no effect if the program handles the signals itself.
         """
@@ -213,7 +213,8 @@ class SignalWatchdog:
         self._number = int(signal.SIGINT)
         handler = signal.getsignal(self._number)
         if hasattr(sys, "ps1") or not callable(handler):
-            # An interactive session keeps its variables, and a signal that is ignored, or would end the process, is not sent.
+            # Do not interrupt an interactive session, which would lose its variables; do not send a signal that is
+            # ignored, or that would terminate the process.
             return
 
         report_interrupt(str(self._lifecycle.reason))

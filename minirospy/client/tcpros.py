@@ -57,7 +57,7 @@ def recv_buff(sock: socket.socket, b: BytesIO, buff_size: int) -> int:
 
 
 class TCPROSTransportProtocol:
-    """The contents of a connection: its header's fields, and the class of the received messages."""
+    """What a connection transfers: the fields of its header, and the class of the received messages."""
 
     def __init__(
         self,
@@ -106,7 +106,7 @@ class TCPROSServiceClient(TCPROSTransportProtocol):
         }
 
     def read_messages(self, b: BytesIO, msg_queue: list[Message], sock: socket.socket) -> None:
-        """Move a complete response in ``b`` to ``msg_queue``. Raise ServiceException if it is an error of the service."""
+        """Move a complete response in ``b`` to ``msg_queue``. Raise ServiceException if the response is an error."""
         size = b.tell()
         if size < _OK_LENGTH.size:
             return
@@ -145,7 +145,7 @@ class TCPService(TCPROSTransportProtocol):
 class TCPROSTransport:
     """A connection that blocks its thread: :meth:`connect`, :meth:`send_message`, :meth:`receive_once`, :meth:`close`.
 
-    Raise TransportInitError if it has no name.
+    Raise TransportInitError if ``name`` is empty.
     """
 
     transport_type = "TCPROS"
@@ -160,7 +160,7 @@ class TCPROSTransport:
         self.direction = protocol.direction
         self.id = next(_numbers)
         self.buff_size = protocol.buff_size
-        # The peer's connection header, once it was received; `type` and `md5sum` are from it
+        # The peer's connection header, None until it has been received, and the fields from it
         self.header: Mapping[str, str] | None = header
         self.type: str | None = None
         self.md5sum: str | None = None
@@ -168,7 +168,7 @@ class TCPROSTransport:
         self.is_latched = False
         self.latch: str | None = None
 
-        # The socket while the connection is open, and the buffers of data that was received and that is to be sent
+        # The socket while the connection is open, and the buffers for received data and for data to send
         self.socket: socket.socket | None = None
         self.read_buff, self.write_buff = BytesIO(), BytesIO()
         # Where the connection goes: the peer's URI, the address that connect() was called with, and the socket's
@@ -190,7 +190,7 @@ class TCPROSTransport:
         self.endpoint_id = endpoint_id
 
     def set_socket(self, sock: socket.socket, endpoint_id: str) -> None:
-        """Use an open socket. Raise TransportInitError if the connection has one."""
+        """Use an open socket. Raise TransportInitError if the connection already has a socket."""
         if self.socket is not None:
             raise TransportInitError("socket already initialized")
         self.socket = sock
@@ -199,7 +199,7 @@ class TCPROSTransport:
             self.local_endpoint, self.remote_endpoint = sock.getsockname(), sock.getpeername()
 
     def set_cleanup_callback(self, cleanup_callback: Callable[[TCPROSTransport], object]) -> None:
-        """Call a function with this object when the connection is closed."""
+        """Set the function to call, with this object, when the connection is closed."""
         self.cleanup_cb = cleanup_callback
 
     def get_transport_info(self) -> str:
@@ -211,7 +211,7 @@ class TCPROSTransport:
         )
 
     def connect(self, dest_addr: str, dest_port: int, endpoint_id: str, timeout: float | None = None) -> None:
-        """Connect to a server and exchange headers. A connection that is open is replaced.
+        """Connect to a server and exchange headers. An open connection is replaced.
 
         ``timeout``: the limit for connecting and for each wait for the header, in seconds. Raise TransportInitError if the
         server is unreachable or refuses.
@@ -244,7 +244,7 @@ class TCPROSTransport:
         self.stat_bytes += len(data)
 
     def read_header(self) -> None:
-        """Receive the peer's connection header. Raise TransportInitError if it is invalid, or an error."""
+        """Receive the peer's connection header. Raise TransportInitError if it is invalid or contains an error."""
         b, sock = self.read_buff, self._open_socket()
         try:
             while b.tell() < _LENGTH.size or b.tell() < _LENGTH.size + _LENGTH.unpack_from(b.getvalue())[0]:
@@ -273,7 +273,7 @@ class TCPROSTransport:
         self.is_latched = self.latch == "1"
 
     def send_message(self, msg: Message, seq: int) -> None:
-        """Send a message after what ``write_buff`` contains. Raise TransportInitError without a connection."""
+        """Send the contents of ``write_buff`` and then a message. Raise TransportInitError without a connection."""
         serialize_message(self.write_buff, seq, msg)
         data = self.write_buff.getvalue()
         self.write_buff.seek(0)
@@ -345,7 +345,7 @@ class TCPROSTransport:
 
 
 class ResponseTransport(TCPROSTransport):
-    """Collects a response that a program's ``_handle_request`` sends; ``sent`` is what was sent."""
+    """Collects in ``sent`` the bytes of the response that a program's ``_handle_request`` sends."""
 
     def __init__(self, service_name: str, service_class: Any, header: Mapping[str, str]) -> None:
         super().__init__(TCPService(service_name, service_class), service_name, header)

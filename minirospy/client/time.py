@@ -251,7 +251,8 @@ class Timer(threading.Thread):
                     _log.error("Timer ends: its callback %s called sys.exit(%s)", self._callback, error)
                     return
                 except BaseException as error:
-                    # Without a function there is nothing to call again. After a shutdown the callback's errors mean nothing.
+                    # If the callback is not a function, it cannot be called again. After a shutdown the callback's
+                    # errors mean nothing.
                     if not callable(self._callback) or session.lifecycle.is_shutdown_requested:
                         raise
                     session.callback_errors.log(self._callback, error)

@@ -1,4 +1,4 @@
-"""A command's verb as a function that a program calls: errors are raised, as by ROS's `_rostopic_cmd_list(argv)`."""
+"""Run a command's verb for a program that calls a function such as ROS's `_rostopic_cmd_list(argv)`: raise its errors."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ from minirospy.command.verbs import Family
 
 __all__ = ["Raised", "call_verb"]
 
-_MAIN_ADDS = "ERROR: "  # ROS's mains print it before the text of an exception
-_NO_NETWORK = "Network communication failed"  # ROS's mains print it for a socket error
+_MAIN_ADDS = "ERROR: "  # the prefix that the main functions of ROS print before the text of an exception
+_NO_NETWORK = (
+    "Network communication failed"  # the message that the main functions of ROS print for a socket error
+)
 
 
 class Raised(NamedTuple):
-    """The exceptions of a ROS module: ``failed`` for every failure, ``unreachable`` if the master does not respond."""
+    """A ROS module's exceptions: ``unreachable`` if the master does not respond, ``failed`` for any other failure."""
 
     failed: type[Exception]
     unreachable: type[Exception]
@@ -34,8 +36,8 @@ class Raised(NamedTuple):
 def call_verb(family: Family, words: Sequence[str], raised: Raised) -> int | None:
     """Run a command line without the command's name; return the status of its verb.
 
-    Raise an exception in ``raised`` if it fails; ConnectionRefusedError if ROS's function lets the socket error through. Exit
-    after a usage error, and after an error that ROS's function prints itself.
+    Raise one of the exceptions in ``raised`` if the verb fails, but ConnectionRefusedError where ROS's function does not
+    catch the socket error. Exit after a usage error, and after an error that ROS's function prints itself.
     """
     try:
         return family._dispatch(list(words))

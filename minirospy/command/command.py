@@ -293,7 +293,7 @@ def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool =
 def complain(name: str, error: Exception, status: int = 1, ros_text: str = "") -> int:
     """Print an error on stderr after flushing stdout: first ROS's message, then minirospy's. Return ``status``.
 
-    Without a master, minirospy's message is printed only on a terminal: scripts compare the last line with ROS's.
+    If there is no master, minirospy's message is printed only on a terminal, because scripts compare the last line with ROS's.
     """
     _flush()
     if ros_text:

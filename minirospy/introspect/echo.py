@@ -50,8 +50,8 @@ class Echo:
     kinds. ``width``: the width of numbers. ``offset``: show times as differences from ``now()``, which returns
     nanoseconds. ``header_times``: in a plot, use the time in a message's header, if it has one, instead of the receive
     time. ``report`` is called with the error for each element of a slice that lacks the rest of the path; the element is
-    shown as null. ``is_type_known``: ROS looks up the type of a field that is not a message, as it does for topics, but not for
-    bags.
+    shown as null. ``is_type_known``: False for bags, where ROS does not look up the type of a field that is not a
+    message.
     """
 
     def __init__(

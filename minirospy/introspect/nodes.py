@@ -52,7 +52,7 @@ __all__ = [
 
 
 SHUTDOWN_SECONDS = 10.0
-"""Seconds, long enough for a node to run its shutdown hooks before it responds."""
+"""Time limit in seconds: long enough for a node to run its shutdown hooks before it responds."""
 
 
 class TypedName(NamedTuple):

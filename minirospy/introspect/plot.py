@@ -41,7 +41,7 @@ def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -
     elif isinstance(value, str):
         yield _Cell(name, value)
     elif value is None:
-        # An element that lacks the field of a path such as points[:]/x[0] keeps its column.
+        # An element that lacks the rest of a path such as points[:]/x[0] keeps its column, which is empty.
         yield _Cell(name, "")
     elif hasattr(value, "to_nsec"):
         # Subtract the origin only from points in time, not from durations.
@@ -52,7 +52,7 @@ def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -
     else:
         for field in getattr(value, "__slots__", ()):
             inner = getattr(value, field)
-            # As in ROS, fields of messages are left out, but not a path's own value.
+            # As in ROS, fields of messages are left out, but not the value that the path itself selects.
             if (strings and arrays) or not _is_left_out(inner, strings, arrays):
                 yield from _cells(f"{name}.{field}", inner, strings, arrays, origin)
 

@@ -120,7 +120,7 @@ def format_value(value: object) -> str:
 
 
 def format_pretty(value: object, indent: str = "") -> str:
-    """Format a value for people, as `rosparam get -p` prints it: strings unquoted, not meant to be parsed.
+    """Format a value for people, as `rosparam get -p` prints it: strings are unquoted, so the output may not be valid YAML.
 
     ``indent`` is put before the entries of a dictionary.
     """

@@ -34,7 +34,7 @@ MAX_QUICK_CHARACTERS = 64 * 1024
 # Maximum characters in a string with few values, such as a base64 image, that is parsed on the event loop
 MAX_QUICK_STRINGS = 4 * 1024 * 1024
 MAX_QUICK_VALUES = 20_000
-PIECE_NUMBERS = 32 * 1024  # characters of numbers that one call parses
+PIECE_NUMBERS = 32 * 1024  # maximum characters of numbers that one call parses
 
 _PIECE_VALUES = 1000  # maximum values of a list that one call encodes: 1 ms for floats
 _PIECE_CHARACTERS = 64 * 1024  # maximum characters of a string that one call encodes
@@ -54,7 +54,7 @@ _CONTINUATIONS = bytes(range(0x80, 0xC0))
 def size_in_memory(data: bytes | bytearray) -> int:
     """Return the number of bytes in memory of the str decoded from UTF-8 data.
 
-    One wide character makes every character take two or four.
+    If one character is wide, every character takes two or four bytes.
     """
     if data.isascii():
         return len(data)
@@ -238,7 +238,7 @@ def _nested_elements(values: list[object]) -> Iterator[str]:
 
 
 def _size(value: object) -> int:
-    """Return the number of numbers that take about as long to encode as a value. Stops counting early for a large value."""
+    """Return how long a value takes to encode, where 1 is the time for a number. Stop counting early if it is large."""
     if isinstance(value, str):
         return 1 + len(value) * _PIECE_VALUES // _PIECE_CHARACTERS
     if not isinstance(value, dict | list):

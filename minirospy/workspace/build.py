@@ -100,16 +100,16 @@ class Workspace(NamedTuple):
 
 
 def find_workspace(start: Path) -> Path:
-    """Return the workspace that contains ``start``: a folder that was built before, or one in whose ``src`` it is.
+    """Return the workspace that contains ``start``.
 
-    Raise BuildError if there is none.
+    It was built before, or its ``src`` contains ``start``. Raise BuildError if there is no such folder.
     """
     start = start.resolve()
     for folder in (start, *start.parents):
         if (folder / ".catkin_workspace").is_file() or (folder / ".catkin_tools").is_dir():
             return folder
     for folder in (start, *start.parents):
-        # A folder such as ~, with a src of something else, is not the workspace of all folders in it.
+        # A folder such as ~ may have an unrelated src, and is not the workspace of all other folders in it.
         is_inside = start == folder or start.is_relative_to(folder / "src")
         if is_inside and (folder / "src").is_dir() and not (folder / "package.xml").is_file():
             return folder
@@ -156,8 +156,8 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 class Report(NamedTuple):
     """The result of building a package.
 
-    ``made``: the generated parts, as a string; empty if nothing has changed. ``stand_ins``: the names of minirospy's
-    programs and modules that replace compiled ones, as a string.
+    ``made`` describes the generated parts; it is empty if nothing has changed. ``stand_ins`` lists the names of
+    minirospy's programs and modules that replace compiled ones.
     """
 
     plan: Plan
@@ -474,7 +474,10 @@ def _program(path: Path) -> str:
 
 
 def stand_in_files(plan: Plan, found: StandIns, prefix: Path) -> dict[Path, str]:
-    """Return the programs and modules that run minirospy's in place of compiled ones: file below ``prefix`` -> text."""
+    """Return the stubs that run minirospy's programs and modules in place of compiled ones.
+
+    The result is a dict from file below ``prefix`` to text.
+    """
     texts = {prefix / "lib" / plan.name / name: _program(path) for name, path in found.programs.items()}
     for name, path in found.modules.items():
         end = "/__init__.py" if path.name == "__init__.py" else ".py"

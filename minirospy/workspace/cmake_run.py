@@ -24,7 +24,9 @@ _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
 """Optional packages that Python packages search for, reported as found."""
-_ROS_2 = re.compile(r"(ament|rcl|rosidl)")  # packages that a file for ROS 1 and ROS 2 searches for
+_ROS_2 = re.compile(
+    r"(ament|rcl|rosidl)"
+)  # packages of ROS 2, for which a file for both ROS 1 and ROS 2 searches
 _CHECKS = ("check_include_file", "check_include_files", "check_include_file_cxx")
 _FINDERS = ("find_package_handle_standard_args", "pkg_check_modules", "pkg_search_module")
 _MAX_LOOPS = 100_000  # iterations of a foreach() with RANGE
@@ -154,7 +156,7 @@ class _Run:
 
     @contextmanager
     def _nested(self, statements: Sequence[Statement], file: Path) -> Iterator[None]:
-        """Count a level of nesting. Raise BuildError if there are too many."""
+        """Count a level of nesting while the context is active. Raise BuildError if there are too many levels."""
         self._depth += 1
         if self._depth > _MAX_DEPTH:
             raise BuildError(str(file), statements[0].line if statements else 0, "includes or calls itself")
@@ -270,7 +272,7 @@ class _Run:
             "ARGC": str(len(arguments)),
         }
         if not macro.has_scope:
-            # A macro's commands run as those of its caller: return() leaves the caller.
+            # A macro's commands run as if the caller contained them: return() leaves the caller.
             with self._nested(macro.body, macro.file):
                 yield from self._run(_substituted(macro.body, values), macro.file)
             return
@@ -397,9 +399,9 @@ class _Run:
         self._known[arguments[1]] = ";".join(sorted(name.as_posix() for name in names))
 
     def _find_package(self, arguments: list[str]) -> None:
-        """Report packages as found, unless the file expects (QUIET) that there are none; the build reports missing ones.
+        """Report packages as found, because the build reports missing ones; but not optional ones (QUIET) or those of ROS 2.
 
-        A file whose library is missing often ends with return(), before the commands that matter to Python.
+        If a library is reported as missing, a file often ends with return(), before the commands that matter to Python.
         """
         name = "".join(arguments[:1])
         if "REQUIRED" in arguments or name in _HERE:
@@ -408,12 +410,12 @@ class _Run:
             self._known.update(dict.fromkeys((f"{name}_FOUND", f"{name.upper()}_FOUND"), "1"))
 
     def _handle_standard_args(self, arguments: list[str]) -> None:
-        """Report a library as found, of ``FindNAME.cmake`` or of pkg-config: nothing is compiled with it."""
+        """Report the library of a ``FindNAME.cmake`` or of pkg-config as found, because nothing is compiled with it."""
         for name in arguments[:1]:
             self._known.update(dict.fromkeys((f"{name}_FOUND", f"{name.upper()}_FOUND"), "TRUE"))
 
     def _check(self, arguments: list[str]) -> None:
-        """Run ``check_include_files(header NAME)``: report the header as found, because nothing compiles with it."""
+        """Run ``check_include_files(header NAME)``: report the header as found, because nothing is compiled with it."""
         for name in arguments[1:2]:
             self._known[name] = "1"
 

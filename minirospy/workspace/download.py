@@ -16,13 +16,13 @@ from minirospy.workspace.plan import Download, Plan
 
 __all__ = ["download"]
 
-_TIMEOUT = 30.0  # seconds without a byte, after which a download fails
+_TIMEOUT = 30.0  # maximum number of seconds for which a download may receive nothing
 
 
 def download(plan: Plan, wanted: Iterable[Download]) -> None:
-    """Download the files that do not exist or have another MD5 sum; print a line for each.
+    """Download the files that do not exist or have the wrong MD5 sum, and print a line for each.
 
-    Raise BuildError if a file that is REQUIRED cannot be downloaded, or if a downloaded file has another MD5 sum.
+    Raise BuildError if a REQUIRED file cannot be downloaded, or if a downloaded file has the wrong MD5 sum.
     """
     for each in wanted:
         if _is_right(each):
@@ -44,7 +44,7 @@ def download(plan: Plan, wanted: Iterable[Download]) -> None:
 
 
 def _is_right(wanted: Download) -> bool:
-    """Return whether the file exists with the MD5 sum, if one is given."""
+    """Return whether the file exists and has the wanted MD5 sum, if one is given."""
     if not wanted.path.is_file():
         return False
     if not wanted.md5:
@@ -57,8 +57,8 @@ def _is_right(wanted: Download) -> bool:
 
 
 def _fetch(wanted: Download) -> None:
-    """Write the file only when it is complete."""
-    # Importing it takes as long as a build without a download.
+    """Download a file. It appears under its name only once it is complete."""
+    # Imported here, because the import takes as long as a build without downloads.
     from urllib.request import Request, urlopen
 
     wanted.path.parent.mkdir(parents=True, exist_ok=True)

@@ -89,7 +89,10 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
 
 
 def _is_compiled(workspace: Workspace, name: str) -> bool:
-    """Return whether a source would be made by CMake or a compiler: a generator expression, or missing in build or devel."""
+    """Return whether CMake or a compiler would make the file.
+
+    ``name`` is then a generator expression, or a file that is missing in the build or devel folder.
+    """
     made = Path(name)
     folders = (workspace.build, workspace.devel)
     return name.startswith("$<") or (not made.exists() and any(map(made.is_relative_to, folders)))

@@ -112,7 +112,7 @@ class Test(NamedTuple):
 class Download(NamedTuple):
     """A file to download.
 
-    ``md5``: "" if any content is right; ``required``: a failure is an error; ``for_tests``: a build does not need it.
+    ``md5`` is "" if any content is right. ``required``: a failed download is an error. ``for_tests``: only tests need the file.
     """
 
     url: str
@@ -129,7 +129,7 @@ class Plan(NamedTuple):
     ``definitions`` are the .msg, .srv and .action files; ``message_depends`` the packages whose messages these may
     contain; ``needs`` the packages in find_package(), with their lines; ``skipped`` the targets that need a compiler;
     ``has_setup``: setup.py names Python packages; ``not_installed``: definitions that are not installed; ``options``: the
-    .cfg files of dynamic_reconfigure; ``compiled``: the file names of the skipped targets, without ``lib`` and endings.
+    .cfg files of dynamic_reconfigure; ``compiled``: the file names of the skipped targets, without ``lib`` and extensions.
     """
 
     name: str
@@ -414,7 +414,7 @@ class _Collector:
             self._properties.setdefault(target, {}).update(zip(words[::2], words[1::2], strict=False))
 
     def _file_name(self, target: str) -> str:
-        """Return the name of the file that a compiled target makes, without ``lib`` and endings."""
+        """Return the name of the file that a compiled target produces, without ``lib`` and extensions."""
         properties = self._properties.get(target, {})
         return properties.get("PREFIX", "") + properties.get("OUTPUT_NAME", target)
 

@@ -1,7 +1,7 @@
-"""What stands in for the compiled parts of a workspace's package: programs and modules of minirospy's package of that name.
+"""Replace the compiled parts of a workspace's package by programs and modules from minirospy's package with the same name.
 
-A package in a workspace hides minirospy's package of the same name. If the package's CMakeLists.txt compiles a program or
-a Python module that minirospy has, the build puts a file in devel that runs minirospy's.
+A package in a workspace hides minirospy's package with the same name. If the package's CMakeLists.txt compiles a program or
+a Python module that minirospy has, the build writes a file to devel that runs minirospy's program or module.
 """
 
 from __future__ import annotations
@@ -19,19 +19,22 @@ _OVERLAY = Path(__file__).parents[1] / "overlay"
 
 
 class StandIns(NamedTuple):
-    """``programs``: name -> minirospy's program. ``modules``: dotted name -> minirospy's file, enclosing packages included."""
+    """minirospy's files that replace a package's compiled programs and modules.
+
+    ``programs`` is a dict by program name; ``modules`` is a dict by dotted name, which includes the enclosing packages.
+    """
 
     programs: dict[str, Path]
     modules: dict[str, Path]
 
     def names(self) -> str:
-        """Return the names for the user, without packages that only enclose a module; "" if nothing stands in."""
+        """Return the names to show to the user, without packages that only enclose a module; "" if there are none."""
         inner = [name for name, path in self.modules.items() if path.name != "__init__.py"]
         return ", ".join([*self.programs, *inner])
 
 
 def find_stand_ins(plan: Plan) -> StandIns:
-    """Return the programs and modules that stand in for the skipped targets of a package."""
+    """Return the programs and modules that replace the skipped targets of a package."""
     if not plan.compiled:
         return StandIns({}, {})
     return StandIns(dict(_programs(plan)), dict(_modules(plan)))
@@ -46,7 +49,7 @@ def _programs(plan: Plan) -> Iterator[tuple[str, Path]]:
     for name in plan.compiled:
         if name in there:
             *_, program = packages.find_executable(plan.name, name)
-            # A sourced workspace has the file of the build before.
+            # A sourced workspace contains the file from the previous build, so check the folder.
             if Path(program).is_relative_to(folder):
                 yield name, Path(program)
 

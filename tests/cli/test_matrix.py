@@ -126,7 +126,8 @@ ELSEWHERE = re.compile(
 )
 """Commands that have their own matrices or tests."""
 
-MASTERLESS_STATUS = {"rosservice": 2, "rosgraph": 0}  # exit status without a master, as in ROS, if not 1
+# exit status without a master, if it is not 1; the same as in ROS
+MASTERLESS_STATUS = {"rosservice": 2, "rosgraph": 0}
 
 USAGE_ERROR = 2
 EX_USAGE = 64  # ROS's exit status for an unknown verb

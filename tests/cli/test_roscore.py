@@ -397,7 +397,7 @@ def test_silent_master_at_the_port_is_known_by_its_journal(
 @pytest.mark.skipif(sys.platform == "win32", reason="no program of Windows is suspended by a signal")
 def test_roscore_next_to_a_suspended_master(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     def beside(*options: str) -> tuple[Core, str, subprocess.Popen[str]]:
-        """Suspend a roscore on a port of its own, and start another one there."""
+        """Suspend a roscore on a new port, and start another one on the same port."""
         uri = f"http://localhost:{free_port()}"
         monkeypatch.setenv("ROS_MASTER_URI", uri)
         core = start(*options)

@@ -189,7 +189,7 @@ def test_machines(robot: Any, command: Any) -> None:
 @pytest.mark.parametrize("verb", ["info", "ping", "kill"])
 def test_unknown_nodes(robot: Any, command: Any, verb: str) -> None:
     status, _, err = command("rosnode", verb, "/robt")
-    # As in ROS.
+    # ROS exits with the same status.
     expected = 1 if verb == "kill" else 0
     assert (status, err) == (expected, "rosnode: ERROR: node [/robt] not found; did you mean /robot?\n")
 

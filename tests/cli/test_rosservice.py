@@ -165,7 +165,8 @@ def test_help_and_no_master(command: Any) -> None:
         assert f"\trosservice {verb}\t" in command("rosservice", "-h").out
         assert command("rosservice", verb, "-h").status == 0
     assert command("rosservice", "node", "-h").status == 0
-    assert "rosservice node" not in command("rosservice", "-h").out  # nor in ROS's help
+    # ROS's help does not contain it, either
+    assert "rosservice node" not in command("rosservice", "-h").out
     for argv in (["list"], ["node", "/a"], ["info", "/a"], ["call", "/a"], ["find", "std_srvs/Empty"]):
         status, out, err = command("rosservice", *argv)
         assert (status, out) == (2, "")

@@ -104,7 +104,7 @@ def test_error_begins_with_ros_words(
 def test_no_master_in_ros_words(
     line: str, status: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Scripts that read stderr find only ROS's line; a terminal also shows minirospy's."""
+    """Scripts that read stderr find only ROS's line; a terminal also shows minirospy's line."""
     name, *words = line.split()
     assert main_of(name)(words) == status
     assert capsys.readouterr().err == "ERROR: Unable to communicate with master!\n"

@@ -1,4 +1,4 @@
-"""Call a watchdog's handler in the place of the system."""
+"""Call a watchdog's handler in place of the system."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which errors of callbacks are logged, and when; with a manual clock."""
+"""Which errors in callbacks are logged, and when, with a manual clock."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from minirospy.client.callback_errors import CallbackErrors
 
 
 class Clock:
-    """A time that the test sets."""
+    """A clock that the test sets."""
 
     now = 0.0
 

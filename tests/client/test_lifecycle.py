@@ -247,7 +247,7 @@ def test_a_second_signal_ends_a_program_that_goes_on(master: str, what: str, num
 
 
 REQUEST = {
-    # The program's code; its output from the request on; whether it is interrupted.
+    # The program's code, its output from the request on, and whether it is interrupted.
     "input": ("ready(); sys.stdin.readline()", "hook finally atexit", True),
     "a lock": (
         "ready(); threading.Lock().acquire() and threading.Event().wait()",
@@ -307,7 +307,7 @@ def test_request_of_another_process_interrupts_a_main_thread_that_does_not_end(
     master: str, what: str
 ) -> None:
     body, prints, is_interrupted = REQUEST[what]
-    # A loop that polls and ends by itself has any time here, as the machine may stall.
+    # Do not limit the time of a loop that polls and exits by itself, because the machine may stall.
     grace = SHORT_GRACE.format(0.5 if is_interrupted else 1000.0)
     process = start(grace + PROGRAM.format(textwrap.indent(body, "    ")))
     open_input, process.stdin = process.stdin, None
@@ -350,7 +350,7 @@ def test_second_node_of_the_name_interrupts_the_first(master: str) -> None:
 
 @POSIX_ONLY
 def test_an_interactive_session_keeps_its_variables_after_a_request(master: str) -> None:
-    """Nothing is printed there until the next line is executed."""
+    """The session prints nothing until the next line is executed."""
     process = start(
         "import sys; sys.ps1 = '> '\n"
         + SHORT_GRACE.format(0.5)

@@ -144,7 +144,7 @@ def test_request_interrupts_a_main_thread_that_goes_on(
     machine.main.awareness = awareness
     machine.phase = Phase.HOOKS
     machine.is_requested = True
-    # However long hooks take, the main thread is not interrupted meanwhile.
+    # However long the hooks take, the main thread is not interrupted while they run.
     assert timeline(machine, 0.0, 9.9) == []
     machine.phase = Phase.LEAVING
     expected = [] if interrupted_at is None else [(interrupted_at, Action.INTERRUPT)]

@@ -148,7 +148,7 @@ rospy.signal_shutdown("")
     assert said[0].startswith("ERROR bad callback: <function callback>|Traceback (most recent call last):|")
     assert said[0].endswith("|ValueError: a fault|")
     assert said[1:3] == ["True", "False"]
-    # Counted, and logged at the shutdown.
+    # The errors are counted, and the count is logged at the shutdown.
     assert re.fullmatch(
         r"ERROR bad callback: <function callback>: ValueError: a fault \(\d+ more times; the first one is logged above\)",
         said[3],

@@ -180,7 +180,7 @@ def test_large_message_is_encoded_in_a_thread_while_others_are_served(
     latched(bridge, "/large", String("a" * 100_000))
     latched(bridge, "/small", String("b"))
     fields = {"compression": compression, "fragment_size": fragment_size}
-    # They do not read all fragments, and so no close frame either.
+    # The clients do not read all fragments, so they do not receive a close frame either.
     client, other = (bridge.rosbridge(close_timeout=0.1) for _ in range(2))
     client.send(op="subscribe", topic="/large", **fields)
     assert has_started.wait(30)

@@ -287,7 +287,7 @@ def test_new_clients_start_at_the_same_tag_if_none_waits() -> None:
 
 
 def test_known_client_goes_before_new_ones_that_have_had_a_slice() -> None:
-    """250 clients that start to flood the server at once do not delay a client that has sent short requests before."""
+    """250 clients that start to flood the server together do not delay a client that has sent short requests before."""
     machine = Machine()
     machine.join("good", 0.002)
     for _ in range(10):

@@ -60,7 +60,7 @@ def test_cancelled_work_gives_its_turn_back(has_turn: bool) -> None:
             await asyncio.sleep(0)
             if not has_turn:
                 first.cancel()
-        # At the end of the block, the first one is next, but it has not run yet.
+        # The block has ended, so the first task is next in the queue, but it has not run yet.
         first.cancel()
         await asyncio.wait([first, second])
         assert first.cancelled()

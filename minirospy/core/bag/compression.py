@@ -33,7 +33,7 @@ LZ4 = "lz4"
 COMPRESSIONS = (NONE, BZ2, LZ4)  # in the order in which rosbag lists them
 
 MAX_CHUNK_SIZE = 1088 * 1024 * 1024
-"""Maximum bytes in a compressed chunk's data: a 1 GiB message, the limit for a connection, and the records before it."""
+"""Maximum size of a compressed chunk's data in bytes: enough for the longest message (1 GiB) and the records before it."""
 
 _MAX_LZ4 = 256  # maximum ratio of decompressed to compressed size of an LZ4 block
 _MAX_STREAMS = 20_000  # maximum bz2 streams per chunk; parallel compressors write one per 100 kB

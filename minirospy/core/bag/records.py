@@ -51,7 +51,7 @@ __all__ = [
 ]
 
 MAGIC = b"#ROSBAG V2.0\n"
-"""The first line of a bag of version 2.0"""
+"""The first line of a bag of version 2.0."""
 
 OP_MESSAGE_DEFINITION = 1  # only in bags of version 1.2
 OP_MESSAGE_DATA = 2

@@ -224,14 +224,14 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
 
 
 def top_module(package: str, files: Iterable[str]) -> str:
-    """Return the text of a package's ``__init__.py``; ``files``: its others, such as ``msg/__init__.py``."""
+    """Return the text of a package's ``__init__.py``; ``files`` are its other files, such as ``msg/__init__.py``."""
     from minirospy.core.idl.emit import emit_top
 
     return emit_top(package, [kind for kind in ("msg", "srv") if f"{kind}/__init__.py" in files])
 
 
 def _is_generated(file: Path) -> bool:
-    """Return whether :func:`top_module` writes the file: it does not exist, or is of an earlier build."""
+    """Return whether the file may be generated, because it does not exist or is from an earlier build."""
     from minirospy.core.idl.emit import GENERATED
 
     return not file.exists() or GENERATED in file.read_text(encoding="utf-8").partition("\n")[0]

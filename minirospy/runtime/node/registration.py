@@ -95,7 +95,7 @@ class Registrations:
         self._known: dict[_Key, _Part | None] = {}
         """The object registered with the master; None if the call failed or has no response yet."""
         self._taken: set[_Key] = set()
-        """Services that another node has registered since: the master's entry is that node's."""
+        """Services that another node has registered later, so that the master's entry is for that node."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
         self.watching: asyncio.Task[None] | None = None
@@ -111,7 +111,7 @@ class Registrations:
         """Unregister everything, and register nothing more. The first call is sent before anything else is done.
 
         Waits while the master continues to respond; does not wait if it refuses connections, and gives up if it sends no
-        response for ``SILENT_SECONDS``. ``announces``: whether to log a line when this takes long.
+        response for ``SILENT_SECONDS``. With ``announces``, a line is logged if this takes long.
         """
         self._closed = True
         if self.watching:
@@ -264,7 +264,7 @@ class Registrations:
             try:
                 if asked and asked[0] == "Service":
                     if await self._look("lookupService", asked[1]) != self.service_uri:
-                        # As in ROS, the node that registered it last has it; this entry shows nothing about this node.
+                        # As in ROS, a service belongs to the node that registered it last, so this entry tells us nothing.
                         self._taken.add(asked)
                         continue
                 else:

@@ -1,4 +1,4 @@
-"""The state that all clients of the rosbridge server share: services that they offer, encoded messages, threads."""
+"""The state shared by all clients of the rosbridge server: the services that they offer, encoded messages, and threads."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _MAX_QUICK_IMAGE = 1024 * 1024
 _IMAGES = {
     "sensor_msgs/Image",
     "sensor_msgs/CompressedImage",
-}  # types whose only array is the data, in base64 or typed
+}  # types whose only array is the data, which is sent as base64 or as a typed array
 
 _T = TypeVar("_T")
 
@@ -144,7 +144,7 @@ class RosbridgeShared:
     async def encoded_large(
         self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str
     ) -> bytes:
-        """Return the same as :meth:`encoded`, but encode in a thread, so that only clients of this message wait."""
+        """Return the same as :meth:`encoded`, but encode in a thread, so that only the receivers of this message wait."""
         found = self._encodings(topic, arrival)
 
         def encode() -> bytes:

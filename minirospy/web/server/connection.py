@@ -75,7 +75,7 @@ class Traffic:
 
 
 class Site(Protocol):
-    """The contents that a listener serves."""
+    """The pages and endpoints that a listener serves, and the limits and rights of its clients."""
 
     @property
     def limits(self) -> Limits: ...

@@ -32,7 +32,8 @@ _log = logging.getLogger(__name__)
 TURN_SECONDS = 0.004  # seconds per loop iteration for the queued work of all clients together
 # seconds of one client's work before the next client's work; with 250 clients the wait is 25 ms
 SLICE_SECONDS = 0.0001
-# pieces of work after which a client is known; until then, its work is expected to take as long as other new clients'
+# pieces of work after which a client is no longer new; until then, its work is expected to take as long as that of
+# other new clients
 NEW_PIECES = 8
 EXPECTED_DECAY = 0.9  # decay of the expected seconds with each piece of work that takes less
 IMMEDIATE_SHARE = 0.5  # share of the time for work that starts without being queued
@@ -74,7 +75,7 @@ class Share:
         self.expected = 0.0  # seconds that its next piece of work may take, estimated from earlier pieces
         self.pieces = 0  # number of pieces of work done while the client is new
         self.burst = 0.0  # seconds used since the client last had nothing to do
-        self.last_burst = 0.0  # seconds of the previous burst
+        self.last_burst = 0.0  # seconds used in the previous burst
         self.short_bursts = 0  # number of short bursts in succession, up to INTERACTIVE_SLICES
         self.is_queued = False
         self.is_closed = False

@@ -387,7 +387,7 @@ def with_chunk(compression: str, stored: bytes, size: int) -> bytes:
     repair = McapRepair(stream := io.BytesIO(head))
     list(repair.run())
     repair.apply()
-    # The repair omits a decompression bomb from the index: without an index, chunks are found by reading the file.
+    # The repair does not index a decompression bomb: a reader then finds the chunk by reading the file.
     return stream.getvalue()
 
 

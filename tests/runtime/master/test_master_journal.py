@@ -61,7 +61,7 @@ class Fakes:
         return uri
 
     async def close(self, uri: str = "") -> None:
-        """Close one node, whose port refuses connections until all nodes are closed, or all nodes."""
+        """Close all nodes, or only the one with this URI; its port then refuses connections until all are closed."""
         for each in [uri] if uri else list(self._servers):
             await self._servers.pop(each).close()
         # A transport closes its socket in the next loop iteration.
@@ -73,10 +73,10 @@ class Fakes:
                 self._held.pop().close()
 
     def _hold(self, port: int) -> None:
-        """Bind a closed node's port without listening: else a server of another test that gets it would answer for the node."""
+        """Bind a closed node's port without listening, so that no server of another test can get it."""
         sock = socket.socket()
         self._held.append(sock)
-        # It fails as long as a connection of the node keeps the port.
+        # Binding fails as long as a connection of the node occupies the port.
         with contextlib.suppress(OSError):
             sock.bind(("127.0.0.1", port))
 

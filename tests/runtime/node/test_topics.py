@@ -719,7 +719,7 @@ def test_a_restarted_master_that_knows_one_new_topic_gets_all_others() -> None:
 
 
 def test_a_node_whose_service_another_node_took_notices_a_restarted_master() -> None:
-    """Its service is in the master, but as the other node's; the other node keeps it."""
+    """The master lists the service for the other node, which keeps it after the restart."""
 
     async def scene() -> None:
         async with graph("/a", "/b", watch_seconds=0.05, port=free_port()) as (master, (a, b)):
