@@ -16,7 +16,6 @@ from minirospy.ros.actionlib.actionlib import (
     g_goal_id,
     get_name_of_constant,
 )
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "INVALID_TRANSITION",
@@ -35,5 +34,3 @@ __all__ = [
     "g_goal_id",
     "get_name_of_constant",
 ]
-
-__getattr__ = modules_on_first_use("actionlib.action_client", "rospy threading time weakref")

@@ -11,7 +11,6 @@ from minirospy.ros.actionlib.actionlib import (
     StatusTracker,
     nop_cb,
 )
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "ActionException",
@@ -25,5 +24,3 @@ __all__ = [
     "StatusTracker",
     "nop_cb",
 ]
-
-__getattr__ = modules_on_first_use("actionlib.action_server", "rospy threading")

@@ -9,7 +9,6 @@ from minirospy.ros.actionlib.actionlib import (
     SimpleGoalState,
     get_name_of_constant,
 )
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "ActionClient",
@@ -19,5 +18,3 @@ __all__ = [
     "SimpleGoalState",
     "get_name_of_constant",
 ]
-
-__getattr__ = modules_on_first_use("actionlib.simple_action_client", "rospy threading")

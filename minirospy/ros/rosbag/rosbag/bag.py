@@ -90,7 +90,6 @@ from minirospy.ros.rosbag.rosbag.records import _unpack_uint64 as _unpack_uint64
 from minirospy.ros.rosbag.rosbag.records import _write_header as _write_header
 from minirospy.ros.rosbag.rosbag.records import _write_record as _write_record
 from minirospy.ros.rosbag.rosbag.records import _write_sized as _write_sized
-from minirospy.ros.submodules import modules_on_first_use
 
 if TYPE_CHECKING:
     from minirospy.base.times import Time
@@ -118,11 +117,6 @@ __all__ = [
     "_message_types",
     "found_lz4",
 ]
-
-__getattr__ = modules_on_first_use(
-    "rosbag.bag",
-    "bisect bz2 collections genmsg genpy heapq os re roslib rospy struct sys threading time yaml",
-)
 
 found_lz4 = True  # whether LZ4 is available; programs check this name
 

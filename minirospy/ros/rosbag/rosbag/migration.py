@@ -19,7 +19,6 @@ from minirospy.ros.rosbag.migration.rules import (
 )
 from minirospy.ros.rosbag.migration.rules_files import MessageMigrator, Migration, RuleChain, ScaffoldNode
 from minirospy.ros.rosbag.rosbag.exceptions import as_ros_errors
-from minirospy.ros.submodules import modules_on_first_use
 
 if TYPE_CHECKING:
     from minirospy.core.idl.protocols import Message
@@ -41,11 +40,6 @@ __all__ = [
     "migration_default_value",
     "qualified_name",
 ]
-
-__getattr__ = modules_on_first_use(
-    "rosbag.migration",
-    "collections copy genmsg genpy inspect itertools os rosbag rospkg string sys traceback",
-)
 
 
 def checkbag(migrator: MessageMigrator, inbag: str) -> list[Migration]:

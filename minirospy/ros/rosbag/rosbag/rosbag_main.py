@@ -5,8 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from minirospy.ros.submodules import modules_on_first_use
-
 __all__ = [
     "check_cmd",
     "compress_cmd",
@@ -19,11 +17,6 @@ __all__ = [
     "reindex_cmd",
     "rosbagmain",
 ]
-
-__getattr__ = modules_on_first_use(
-    "rosbag.rosbag_main",
-    "optparse os roslib shutil signal subprocess sys time",
-)
 
 
 def rosbagmain(argv: Sequence[str] | None = None) -> None:

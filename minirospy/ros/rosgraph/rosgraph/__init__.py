@@ -1,11 +1,11 @@
 """rosgraph: the Master API, names and the environment, for Python programs."""
 
-import sys
+import sys as sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from minirospy.base.names import parse_arguments
-from minirospy.ros.submodules import modules_on_first_use
+from minirospy.ros.submodules import on_first_use
 
 if TYPE_CHECKING:
     from minirospy.ros.rosgraph.rosgraph import masterapi as masterapi
@@ -38,7 +38,7 @@ __all__ = [
     "myargv",
 ]
 
-__getattr__ = modules_on_first_use("rosgraph", "roslogging=rosgraph.roslogging sys xmlrpc=rosgraph.xmlrpc")
+__getattr__ = on_first_use("rosgraph", "roslogging", "xmlrpc")
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:

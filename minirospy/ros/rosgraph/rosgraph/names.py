@@ -22,7 +22,6 @@ from minirospy.ros.ros_names import (
     namespace,
     ns_join,
 )
-from minirospy.ros.submodules import modules_on_first_use
 
 if TYPE_CHECKING:
     from minirospy.ros.rosgraph.rosgraph.rosenv import ROS_NAMESPACE
@@ -56,8 +55,6 @@ __all__ = [
     "resolve_name",
     "script_resolve_name",
 ]
-
-__getattr__ = modules_on_first_use("rosgraph.names", "os re sys")
 
 ANYTYPE = "*"
 MSG_EXT = ".msg"

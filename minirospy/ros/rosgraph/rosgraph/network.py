@@ -16,7 +16,6 @@ from minirospy.base.errors import WireError
 from minirospy.core.wire.framing import LENGTH_BYTES, parse_length
 from minirospy.core.wire.header import parse_header
 from minirospy.ros.rosgraph.rosgraph.rosenv import ROS_HOSTNAME, ROS_IP, ROS_IPV6
-from minirospy.ros.submodules import modules_on_first_use
 
 if TYPE_CHECKING:
     from io import BytesIO
@@ -40,11 +39,6 @@ __all__ = [
     "use_ipv6",
     "write_ros_handshake_header",
 ]
-
-__getattr__ = modules_on_first_use(
-    "rosgraph.network",
-    "logging os platform socket struct sys urlparse=urllib.parse",
-)
 
 
 class ROSHandshakeException(Exception):

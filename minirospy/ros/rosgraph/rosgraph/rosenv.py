@@ -7,7 +7,6 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from minirospy.base.environment import DEFAULT_MASTER_PORT
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "DEFAULT_MASTER_PORT",
@@ -19,8 +18,6 @@ __all__ = [
     "ROS_NAMESPACE",
     "get_master_uri",
 ]
-
-__getattr__ = modules_on_first_use("rosgraph.rosenv", "os sys")
 
 ROS_MASTER_URI = "ROS_MASTER_URI"
 ROS_IP = "ROS_IP"

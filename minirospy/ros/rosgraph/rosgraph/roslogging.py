@@ -6,7 +6,6 @@ import logging
 import os
 
 from minirospy.client.log_handlers import RosStreamHandler
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "LoggingException",
@@ -17,8 +16,6 @@ __all__ = [
     "_logging_to_rospy_names",
     "configure_logging",
 ]
-
-__getattr__ = modules_on_first_use("rosgraph.roslogging", "datetime inspect logging os rospkg sys time yaml")
 
 
 class LoggingException(Exception):

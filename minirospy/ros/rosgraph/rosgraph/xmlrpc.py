@@ -15,7 +15,6 @@ from xmlrpc.server import SimpleXMLRPCServer as SimpleXMLRPCServer
 
 from minirospy.ros.ros_names import isstring
 from minirospy.ros.rosgraph.rosgraph.network import create_local_xmlrpc_uri, get_bind_address
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "SilenceableXMLRPCRequestHandler",
@@ -24,11 +23,6 @@ __all__ = [
     "XmlRpcNode",
     "isstring",
 ]
-
-__getattr__ = modules_on_first_use(
-    "rosgraph.xmlrpc",
-    "_thread errno logging platform rosgraph select socket socketserver traceback",
-)
 
 _log = logging.getLogger("xmlrpc")
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from minirospy.base.environment import DEFAULT_MASTER_PORT
 from minirospy.base.private_files import open_text
-from minirospy.ros.submodules import modules_on_first_use
 
 if TYPE_CHECKING:
     from minirospy.ros.roslaunch.roslaunch import arg_dump as arg_dump
@@ -54,10 +53,6 @@ __all__ = [
     "roslaunch_core",
     "write_pid_file",
 ]
-
-__getattr__ = modules_on_first_use(
-    "roslaunch", "logging os roslaunch_param_dump=roslaunch.param_dump rospkg sys traceback"
-)
 
 NAME = "roslaunch"
 

@@ -24,7 +24,6 @@ from minirospy.ros.roslaunch.roslaunch.core import (
     printlog,
 )
 from minirospy.ros.roslaunch.roslaunch.xmlloader import ConfigError, XmlLoader
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "DEFAULT_MASTER_PORT",
@@ -37,8 +36,6 @@ __all__ = [
     "local_machine",
     "namespaces_of",
 ]
-
-__getattr__ = modules_on_first_use("roslaunch.config", "logging os rosgraph roslaunch rospkg types")
 
 LaunchFile = str | tuple[str, Sequence[str]]
 """A launch file, or a launch file with its arguments ``["name:=value", ...]``."""

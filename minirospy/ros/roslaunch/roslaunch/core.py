@@ -16,7 +16,6 @@ from minirospy.base.environment import Environment, is_own_host
 from minirospy.ros.roslaunch.launcher.command import node_environment
 from minirospy.ros.roslaunch.launcher.output import ERROR, Output
 from minirospy.ros.roslaunch.launcher.spec import MachineSpec, NodeSpec, TestSpec
-from minirospy.ros.submodules import modules_on_first_use
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 if TYPE_CHECKING:
@@ -48,8 +47,6 @@ __all__ = [
     "printlog_bold",
     "setup_env",
 ]
-
-__getattr__ = modules_on_first_use("roslaunch.core", "logging os re rosgraph rospkg socket sys")
 
 PHASE_SETUP, PHASE_RUN, PHASE_TEARDOWN = "setup", "run", "teardown"
 

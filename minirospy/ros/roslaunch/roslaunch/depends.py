@@ -8,11 +8,8 @@ from minirospy.base.errors import MinirospyError
 from minirospy.ros.roslaunch.commands.roslaunch_deps import main as roslaunch_deps_main
 from minirospy.ros.roslaunch.launcher.depends import file_needs, missing_declarations, package_of
 from minirospy.ros.roslaunch.roslaunch.substitution_args import chosen_packages
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = ["NAME", "RoslaunchDeps", "RoslaunchDepsException", "roslaunch_deps", "roslaunch_deps_main"]
-
-__getattr__ = modules_on_first_use("roslaunch.depends", "os rospkg sys")
 
 NAME = "roslaunch-deps"
 

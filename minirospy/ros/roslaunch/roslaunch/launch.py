@@ -24,7 +24,6 @@ from minirospy.ros.roslaunch.roslaunch.pmon import (
     start_process_monitor,
 )
 from minirospy.ros.roslaunch.roslaunch.pmon import ProcessListener as ROSLaunchListener
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "Machine",
@@ -40,11 +39,6 @@ __all__ = [
     "_unify_clear_params",
     "start_process_monitor",
 ]
-
-__getattr__ = modules_on_first_use(
-    "roslaunch.launch",
-    "logging os re rosgraph rospkg socket subprocess sys time traceback",
-)
 
 _POLL_SECONDS = 0.05
 

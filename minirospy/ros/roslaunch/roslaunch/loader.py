@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from minirospy.ros.roslaunch.launcher import substitution
-from minirospy.ros.submodules import modules_on_first_use
 
 if TYPE_CHECKING:
     import rosparam as rosparam
@@ -15,8 +14,6 @@ if TYPE_CHECKING:
     from minirospy.ros.roslaunch.roslaunch.xmlloader import XmlParseException as LoadException
 
 __all__ = ["LoadException", "Param", "RLException", "XmlParseException", "convert_value"]
-
-__getattr__ = modules_on_first_use("roslaunch.loader", "errno os sys yaml")
 
 
 def convert_value(value: str, type_: str) -> object:

@@ -16,12 +16,9 @@ from minirospy.ros.roslaunch.roslaunch.config import LaunchFile, ROSLaunchConfig
 from minirospy.ros.roslaunch.roslaunch.core import RLException
 from minirospy.ros.roslaunch.roslaunch.launch import ROSLaunchRunner, master_options, replacement_of
 from minirospy.ros.roslaunch.roslaunch.pmon import ProcessListener, ProcessMonitor
-from minirospy.ros.submodules import modules_on_first_use
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = ["RLException", "ROSLaunchParent", "load_config_default"]
-
-__getattr__ = modules_on_first_use("roslaunch.parent", "logging roslaunch")
 
 
 class ROSLaunchParent:

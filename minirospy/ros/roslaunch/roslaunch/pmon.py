@@ -28,7 +28,6 @@ from minirospy.ros.roslaunch.launcher.runner import Launcher, RunOptions
 from minirospy.ros.roslaunch.launcher.spec import LaunchSpec, NodeSpec
 from minirospy.ros.roslaunch.roslaunch.core import Node, RLException
 from minirospy.ros.roslaunch.roslaunch.node_args import NodeParamsException
-from minirospy.ros.submodules import modules_on_first_use
 from minirospy.workspace.packages import Packages
 
 __all__ = [
@@ -45,8 +44,6 @@ __all__ = [
     "shutdown_process_monitor",
     "start_process_monitor",
 ]
-
-__getattr__ = modules_on_first_use("roslaunch.pmon", "atexit logging os roslib signal sys time traceback")
 
 
 _BAR = "=" * 80

@@ -15,7 +15,6 @@ from minirospy.ros.roslaunch.launcher.output import Output, warn_of_large_logs
 from minirospy.ros.roslaunch.roslaunch.config import LaunchFile, load_config_default
 from minirospy.ros.roslaunch.roslaunch.core import RLException
 from minirospy.ros.roslaunch.roslaunch.substitution_args import chosen_packages
-from minirospy.ros.submodules import modules_on_first_use
 from minirospy.runtime.rpc.master_proxy import MasterProxy
 
 __all__ = [
@@ -28,11 +27,6 @@ __all__ = [
     "resolve_launch_arguments",
     "update_terminal_name",
 ]
-
-__getattr__ = modules_on_first_use(
-    "roslaunch.rlutil",
-    "os rosclean rosgraph roslaunch roslib rospkg sys time",
-)
 
 
 def check_log_disk_usage() -> None:

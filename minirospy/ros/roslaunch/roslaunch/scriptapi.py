@@ -8,11 +8,8 @@ from minirospy.ros.roslaunch.roslaunch.parent import ROSLaunchParent
 from minirospy.ros.roslaunch.roslaunch.pmon import Process
 from minirospy.ros.roslaunch.roslaunch.rlutil import get_or_generate_uuid
 from minirospy.ros.roslaunch.roslaunch.xmlloader import XmlLoader
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = ["Master", "Node", "RLException", "ROSLaunch"]
-
-__getattr__ = modules_on_first_use("roslaunch.scriptapi", "roslaunch")
 
 
 class ROSLaunch:

@@ -20,7 +20,6 @@ from minirospy.ros.catkin.catkin.find_in_workspaces import find_in_workspaces
 from minirospy.ros.roslaunch.launcher.substitution import convert
 from minirospy.ros.roslaunch.roslaunch.loader import convert_value
 from minirospy.ros.rospkg.rospkg.rospack import RosPack
-from minirospy.ros.submodules import modules_on_first_use
 from minirospy.workspace.packages import Packages
 
 __all__ = [
@@ -54,8 +53,6 @@ __all__ = [
     "convert_value",
     "resolve_args",
 ]
-
-__getattr__ = modules_on_first_use("roslaunch.substitution_args", "math os rosgraph rospkg")
 
 Context: TypeAlias = dict[str, dict[str, str]]
 """The values of args and anonymous names, under the keys ``arg`` and ``anon``; ``filename`` is the launch file."""

@@ -32,7 +32,6 @@ from minirospy.ros.roslaunch.roslaunch.substitution_args import (
     SubstitutionException,
     chosen_packages,
 )
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "ArgException",
@@ -45,11 +44,6 @@ __all__ = [
     "XmlLoader",
     "XmlParseException",
 ]
-
-__getattr__ = modules_on_first_use(
-    "roslaunch.xmlloader",
-    "itertools loader=roslaunch.loader logging substitution_args=roslaunch.substitution_args sys traceback",
-)
 
 
 class XmlParseException(RLException):

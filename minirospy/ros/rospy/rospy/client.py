@@ -33,7 +33,6 @@ from minirospy.client import (
 from minirospy.client.params import UNSPECIFIED as _unspecified
 from minirospy.client.params import Unspecified as _Unspecified
 from minirospy.ros.rospy.rospy.msproxy import get_master
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "DEBUG",
@@ -70,8 +69,3 @@ __all__ = [
     "spin",
     "wait_for_message",
 ]
-
-__getattr__ = modules_on_first_use(
-    "rospy.client",
-    "logging os random rosgraph roslib rospy socket struct sys time yaml",
-)

@@ -3,8 +3,5 @@
 from minirospy.client.length_prefix import deserialize_messages, serialize_message
 from minirospy.client.topics import AnyMsg
 from minirospy.core.idl.message import args_kwds_to_message
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = ["AnyMsg", "args_kwds_to_message", "deserialize_messages", "serialize_message"]
-
-__getattr__ = modules_on_first_use("rospy.msg", "genpy logging rospy struct time traceback types")

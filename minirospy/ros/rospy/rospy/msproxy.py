@@ -13,12 +13,9 @@ from typing import Any
 from minirospy.base.errors import RpcFault, RpcUnreachable
 from minirospy.client.params import as_xmlrpc_client, check_sendable, get_param_cached
 from minirospy.client.session import current_session
-from minirospy.ros.submodules import modules_on_first_use
 from minirospy.runtime.rpc.client import RpcClient
 
 __all__ = ["MasterProxy"]
-
-__getattr__ = modules_on_first_use("rospy.msproxy", "rospy")
 
 _NAMES_FIRST = frozenset(
     {

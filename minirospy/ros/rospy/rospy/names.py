@@ -26,7 +26,6 @@ from minirospy.ros.ros_names import (
     ns_join,
 )
 from minirospy.ros.rosgraph.rosgraph.names import resolve_name as resolve_name_for
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "ANYTYPE",
@@ -64,8 +63,6 @@ __all__ = [
     "valid_name_validator_resolved",
     "valid_name_validator_unresolved",
 ]
-
-__getattr__ = modules_on_first_use("rospy.names", "os rosgraph struct sys")
 
 
 def _set_caller_id(caller_id: str) -> None:

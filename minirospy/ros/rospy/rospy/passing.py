@@ -9,26 +9,18 @@ import sys
 from collections.abc import Callable
 from importlib import import_module
 
-from minirospy.ros.submodules import modules_on_first_use
-
 __all__ = ["core_dir", "core_getattr", "service_dir", "service_getattr", "topics_dir", "topics_getattr"]
 
 
-def _passing_on(
-    name: str, source: str, modules: str
-) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` for the module ``name``, which also exports the public names of ``source``.
-
-    ``modules``: see :func:`modules_on_first_use`.
-    """
-    find_module = modules_on_first_use(name, modules)
+def _passing_on(name: str, source: str) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
+    """Return ``__getattr__`` and ``__dir__`` for the module ``name``, which also exports the public names of ``source``."""
 
     def get(attribute: str) -> object:
         if not attribute.startswith("_"):
             module = import_module(source)
             if hasattr(module, attribute):
                 return getattr(module, attribute)
-        return find_module(attribute)
+        raise AttributeError(f"module {name!r} has no attribute {attribute!r}")
 
     def names() -> list[str]:
         public = (each for each in dir(import_module(source)) if not each.startswith("_"))
@@ -37,11 +29,6 @@ def _passing_on(
     return get, names
 
 
-core_getattr, core_dir = _passing_on(
-    "rospy.core",
-    "rospy.names",
-    "atexit functools inspect logging os pickle rosgraph rospkg rospy signal struct sys threading time traceback types "
-    "urlparse=urllib.parse warnings xmlrpcclient=xmlrpc.client",
-)
-service_getattr, service_dir = _passing_on("rospy.service", "rospy.core", "")
-topics_getattr, topics_dir = _passing_on("rospy.topics", "rospy.core", "genpy select")
+core_getattr, core_dir = _passing_on("rospy.core", "rospy.names")
+service_getattr, service_dir = _passing_on("rospy.service", "rospy.core")
+topics_getattr, topics_dir = _passing_on("rospy.topics", "rospy.core")

@@ -5,10 +5,7 @@ from minirospy.ros.rospy.rospy.logger_level_service_caller import (
     LoggerLevelServiceCaller,
     ROSConsoleException,
 )
-from minirospy.ros.submodules import modules_on_first_use
 
 NAME = "rosconsole"
 
 __all__ = ["NAME", "LoggerLevelServiceCaller", "ROSConsoleException", "main"]
-
-__getattr__ = modules_on_first_use("rospy.rosconsole", "os re rosgraph rospy socket sys")

@@ -9,7 +9,6 @@ from minirospy.base import times
 from minirospy.base.clock import SimulatedClock, WallClock
 from minirospy.client.session import current_session
 from minirospy.client.time import Duration, Time, get_rostime, get_time, is_wallclock
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "Duration",
@@ -24,8 +23,6 @@ __all__ = [
     "switch_to_wallclock",
     "wallsleep",
 ]
-
-__getattr__ = modules_on_first_use("rospy.rostime", "genpy rospy sys threading time traceback")
 
 
 def wallsleep(duration: float) -> None:

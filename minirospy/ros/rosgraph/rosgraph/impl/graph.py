@@ -10,14 +10,8 @@ from collections.abc import Iterable, Iterator
 
 from minirospy.introspect.graph import in_namespace
 from minirospy.ros.rosgraph.rosgraph.masterapi import Master
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = ["BadNode", "Edge", "EdgeList", "Graph", "edge_args", "node_topic", "topic_node"]
-
-__getattr__ = modules_on_first_use(
-    "rosgraph.impl.graph",
-    "itertools logging random rosgraph socket sys time traceback",
-)
 
 _CALLER_ID = "/rosgraph"
 

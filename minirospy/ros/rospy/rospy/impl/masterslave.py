@@ -10,16 +10,8 @@ from typing import Any, cast
 
 from minirospy.client.session import current_session
 from minirospy.ros.rosgraph.rosgraph.xmlrpc import XmlRpcHandler
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = ["LOG_API", "MSG", "STATUS", "VAL", "ROSHandler"]
-
-__getattr__ = modules_on_first_use(
-    "rospy.impl.masterslave",
-    "atexit errno functools inspect itertools logging os pickle rosgraph rospkg rospy signal socket "
-    "struct sys threading time traceback types urlparse=urllib.parse warnings "
-    "xmlrpcclient=xmlrpc.client",
-)
 
 STATUS, MSG, VAL = 0, 1, 2
 LOG_API = True

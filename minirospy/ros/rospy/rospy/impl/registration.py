@@ -6,14 +6,8 @@ from typing import Any
 
 from minirospy.client.services import Service
 from minirospy.client.session import current_session
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = ["Registration", "get_service_manager", "get_topic_manager"]
-
-__getattr__ = modules_on_first_use(
-    "rospy.impl.registration",
-    "errno logging socket sys threading time traceback xmlrpcclient=xmlrpc.client",
-)
 
 
 class Registration:

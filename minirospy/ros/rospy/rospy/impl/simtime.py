@@ -2,11 +2,8 @@
 
 from minirospy.base.errors import ROSInitException
 from minirospy.client.startup import start_clock
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = ["init_simtime"]
-
-__getattr__ = modules_on_first_use("rospy.impl.simtime", "rosgraph rospy traceback")
 
 
 def init_simtime() -> bool:

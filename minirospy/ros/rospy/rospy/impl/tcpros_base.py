@@ -5,7 +5,6 @@ from minirospy.client.length_prefix import deserialize_messages, serialize_messa
 from minirospy.client.tcpros import TCPROSTransport, TCPROSTransportProtocol, recv_buff
 from minirospy.ros.rosgraph.rosgraph.network import read_ros_handshake_header, write_ros_handshake_header
 from minirospy.ros.rospy.rospy.impl.transport import DEFAULT_BUFF_SIZE, TCPROS
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "DEFAULT_BUFF_SIZE",
@@ -21,10 +20,3 @@ __all__ = [
     "serialize_message",
     "write_ros_handshake_header",
 ]
-
-__getattr__ = modules_on_first_use(
-    "rospy.impl.tcpros_base",
-    "atexit errno functools inspect logging os pickle rosgraph rospkg rospy select signal socket "
-    "struct sys threading time traceback types urlparse=urllib.parse warnings "
-    "xmlrpcclient=xmlrpc.client",
-)

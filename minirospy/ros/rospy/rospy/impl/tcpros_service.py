@@ -19,7 +19,6 @@ from minirospy.core.idl.protocols import Message
 from minirospy.core.idl.service import to_response
 from minirospy.ros.rospy.rospy.impl.registration import get_service_manager
 from minirospy.ros.rospy.rospy.impl.transport import DEFAULT_BUFF_SIZE
-from minirospy.ros.submodules import modules_on_first_use
 
 __all__ = [
     "DEFAULT_BUFF_SIZE",
@@ -40,11 +39,6 @@ __all__ = [
     "recv_buff",
     "wait_for_service",
 ]
-
-__getattr__ = modules_on_first_use(
-    "rospy.impl.tcpros_service",
-    "genpy io logging rosgraph rospy socket struct sys threading time traceback",
-)
 
 ServiceImpl = Service  # in ROS, the base class of Service
 
