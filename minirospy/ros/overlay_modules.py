@@ -44,7 +44,7 @@ _INTERNAL = {
     "kdl_parser_py": "tree",
     "message_filters": "stamps",
     "rosauth": "authentication",
-    "rosbag": "exceptions internals opening private readers",
+    "rosbag": "exceptions internals opening private readers records",
     "rospy": "live passing",
     "rostopic": "echo rates",
     "smach_ros": "callbacks pickled",

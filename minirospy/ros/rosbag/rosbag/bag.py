@@ -44,6 +44,52 @@ from minirospy.ros.rosbag.rosbag.private import (
     nanoseconds_of,
 )
 from minirospy.ros.rosbag.rosbag.readers import _BagReader, _BagReader200
+from minirospy.ros.rosbag.rosbag.records import _CHUNK_INDEX_VERSION as _CHUNK_INDEX_VERSION
+from minirospy.ros.rosbag.rosbag.records import _FILE_HEADER_LENGTH as _FILE_HEADER_LENGTH
+from minirospy.ros.rosbag.rosbag.records import _INDEX_VERSION as _INDEX_VERSION
+from minirospy.ros.rosbag.rosbag.records import _OP_CHUNK as _OP_CHUNK
+from minirospy.ros.rosbag.rosbag.records import _OP_CHUNK_INFO as _OP_CHUNK_INFO
+from minirospy.ros.rosbag.rosbag.records import _OP_CODES as _OP_CODES
+from minirospy.ros.rosbag.rosbag.records import _OP_CONNECTION as _OP_CONNECTION
+from minirospy.ros.rosbag.rosbag.records import _OP_FILE_HEADER as _OP_FILE_HEADER
+from minirospy.ros.rosbag.rosbag.records import _OP_INDEX_DATA as _OP_INDEX_DATA
+from minirospy.ros.rosbag.rosbag.records import _OP_MSG_DATA as _OP_MSG_DATA
+from minirospy.ros.rosbag.rosbag.records import _OP_MSG_DEF as _OP_MSG_DEF
+from minirospy.ros.rosbag.rosbag.records import _VERSION as _VERSION
+from minirospy.ros.rosbag.rosbag.records import _build_header_from_str as _build_header_from_str
+from minirospy.ros.rosbag.rosbag.records import _decode_bytes as _decode_bytes
+from minirospy.ros.rosbag.rosbag.records import _decode_str as _decode_str
+from minirospy.ros.rosbag.rosbag.records import _median as _median
+from minirospy.ros.rosbag.rosbag.records import _pack_time as _pack_time
+from minirospy.ros.rosbag.rosbag.records import _pack_uint8 as _pack_uint8
+from minirospy.ros.rosbag.rosbag.records import _pack_uint32 as _pack_uint32
+from minirospy.ros.rosbag.rosbag.records import _pack_uint64 as _pack_uint64
+from minirospy.ros.rosbag.rosbag.records import _peek_next_header_op as _peek_next_header_op
+from minirospy.ros.rosbag.rosbag.records import _read as _read
+from minirospy.ros.rosbag.rosbag.records import _read_bytes_field as _read_bytes_field
+from minirospy.ros.rosbag.rosbag.records import _read_field as _read_field
+from minirospy.ros.rosbag.rosbag.records import _read_header as _read_header
+from minirospy.ros.rosbag.rosbag.records import _read_record_data as _read_record_data
+from minirospy.ros.rosbag.rosbag.records import _read_sized as _read_sized
+from minirospy.ros.rosbag.rosbag.records import _read_str_field as _read_str_field
+from minirospy.ros.rosbag.rosbag.records import _read_time as _read_time
+from minirospy.ros.rosbag.rosbag.records import _read_time_field as _read_time_field
+from minirospy.ros.rosbag.rosbag.records import _read_uint8 as _read_uint8
+from minirospy.ros.rosbag.rosbag.records import _read_uint8_field as _read_uint8_field
+from minirospy.ros.rosbag.rosbag.records import _read_uint32 as _read_uint32
+from minirospy.ros.rosbag.rosbag.records import _read_uint32_field as _read_uint32_field
+from minirospy.ros.rosbag.rosbag.records import _read_uint64 as _read_uint64
+from minirospy.ros.rosbag.rosbag.records import _read_uint64_field as _read_uint64_field
+from minirospy.ros.rosbag.rosbag.records import _skip_record as _skip_record
+from minirospy.ros.rosbag.rosbag.records import _skip_sized as _skip_sized
+from minirospy.ros.rosbag.rosbag.records import _time_to_str as _time_to_str
+from minirospy.ros.rosbag.rosbag.records import _unpack_time as _unpack_time
+from minirospy.ros.rosbag.rosbag.records import _unpack_uint8 as _unpack_uint8
+from minirospy.ros.rosbag.rosbag.records import _unpack_uint32 as _unpack_uint32
+from minirospy.ros.rosbag.rosbag.records import _unpack_uint64 as _unpack_uint64
+from minirospy.ros.rosbag.rosbag.records import _write_header as _write_header
+from minirospy.ros.rosbag.rosbag.records import _write_record as _write_record
+from minirospy.ros.rosbag.rosbag.records import _write_sized as _write_sized
 
 if TYPE_CHECKING:
     from minirospy.base.times import Time
@@ -135,17 +181,25 @@ class Bag(OpenedBag):
 
         if not f:
             raise ValueError("filename (or stream) is invalid")
+        self._open(f, mode, allow_unindexed)
+
+    def _open(self, f: FileArgument, mode: str, allow_unindexed: bool) -> None:
+        """Open the bag, also again after close()."""
         opening = {"r": self._open_read, "w": self._open_write, "a": self._open_append}
         if mode not in opening:
             raise ValueError(f'mode "{mode}" is invalid')
+        self._mode = mode
+        self._source, self._writer = None, None
+        self._written.clear()
+        self._clear_index()
         try:
             with as_ros_errors():
                 opening[mode](f, allow_unindexed)
             self._create_reader()
-            # minirospy reads the index on demand, but a program's subclass may read it now to show the progress.
-            if mode == "r" and not skip_index and isinstance(self._reader, _BagReader200):
+            # minirospy reads the index on demand, but a program's subclass may read it now, to show the progress.
+            if mode == "r" and not self._skip_index and isinstance(self._reader, _BagReader200):
                 self._reader.prepare()
-            self._connection_indexes_read = not skip_index
+            self._connection_indexes_read = not self._skip_index
         except BaseException:
             self._version = None
             self._close_file()
@@ -306,6 +360,16 @@ class Bag(OpenedBag):
             writer.write(number, nanoseconds, body)
         except BagError as error:
             raise_as_ros(error)
+
+    def _write_connection_record(self, connection_info: _ConnectionInfo, encrypt: bool = False) -> None:
+        """Add a connection for the messages of its topic and type that are written from now on."""
+        if self._file is None:
+            raise ValueError(CLOSED)
+        if self._writer is None:
+            raise self._not_writable()
+        with as_ros_errors():
+            number = self._writer.add_connection(connection_info.topic, connection_info.header)
+        self._written[connection_info.topic, connection_info.md5sum] = number
 
     def reindex(self) -> Iterator[int]:
         """Rebuild the index. Yield the file positions while reading, so that the caller can show the progress.

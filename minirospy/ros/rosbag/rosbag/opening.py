@@ -22,6 +22,7 @@ FileArgument: TypeAlias = str | os.PathLike[str] | BinaryIO
 """A bag's source or target: a path or an open file."""
 
 CLOSED = "I/O operation on closed bag"
+FIRST_RECORD = len("#ROSBAG V2.0\n")  # position of the file header's record
 
 
 class OpenedBag(PrivateBag):
@@ -37,7 +38,22 @@ class OpenedBag(PrivateBag):
         self._source: BagReader | None = None
         """The file's reader. It is not named ``_reader``, because programs may replace the attribute of that name."""
         self._writer: BagWriter | None = None
-        self._is_read = False  # set if a read may have moved the file's position since the last write
+        self._file_header_pos = FIRST_RECORD
+        self._is_read = False  # whether a read may have moved the file's position since the last write
+
+    @property
+    def _index_data_pos(self) -> int:
+        """The position of the connection records and chunk infos; 0 while the bag is written, and if it has no index."""
+        return (
+            self._source.index_position
+            if isinstance(self._source, ChunkedReader) and self._mode == "r"
+            else 0
+        )
+
+    @property
+    def _output_file(self) -> BinaryIO | None:
+        """The file, as in the real module if no chunk is open."""
+        return self._file
 
     def _current(self) -> BagReader:
         """Return the reader, which also has the connections and chunks written so far."""
@@ -104,12 +120,17 @@ class OpenedBag(PrivateBag):
 
     def _take(self, f: Any, mode: str) -> BinaryIO:
         """Return ``f`` if it is an open file; otherwise, open it as a path."""
-        if not isinstance(f, io.IOBase):
+        if not self._is_file(f):
             self._filename = f
             return cast("BinaryIO", open(f, mode))
         if isinstance(f, io.TextIOBase):
             raise ROSBagException("In Python 3 the bag file must be opened in binary mode")
         return cast("BinaryIO", f)
+
+    @staticmethod
+    def _is_file(f: object) -> bool:
+        """Return whether ``f`` is an open file, and not a path."""
+        return isinstance(f, io.IOBase)
 
     def _open_file(self) -> BinaryIO:
         if self._file is None:

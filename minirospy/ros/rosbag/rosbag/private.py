@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 from minirospy.base.names import canonicalize
 from minirospy.base.times import Time
@@ -52,6 +53,7 @@ class BagMessageWithConnectionHeader(NamedTuple):
 class PrivateBag(ABC):
     """The private names in rosbag.Bag."""
 
+    _file: BinaryIO | None
     _connection_indexes_read = False  # True once the index has been read, or if it is read on demand
     _chunks_of_program: Iterable[_ChunkInfo] | None = None
     """The list of chunks that a program has set in place of the bag's own; None if it has not."""
@@ -84,8 +86,33 @@ class PrivateBag(ABC):
         self._chunks_of_program = chunks
 
     @property
+    def _connection_count(self) -> int:
+        return len(self._current().connections)
+
+    @property
+    def _chunk_count(self) -> int:
+        return len(self._current().chunks)
+
+    @property
+    def _topic_connections(self) -> dict[str, _ConnectionInfo]:
+        """The newest connection of each topic, for writing."""
+        return {connection.topic: connection for connection in self._connections.values()}
+
+    def _clear_index(self) -> None:
+        """Forget the list of chunks that a program has set."""
+        self._chunks_of_program = None
+
+    @contextlib.contextmanager
+    def _position_kept(self) -> Iterator[None]:
+        """Restore the file's position: the program may read records there, and in the real module, this data is in memory."""
+        position = self._file.tell() if self._file else 0
+        yield
+        if self._file:
+            self._file.seek(position)
+
+    @property
     def _chunk_headers(self) -> dict[int, _ChunkHeader]:
-        with as_ros_errors():
+        with as_ros_errors(), self._position_kept():
             headers = self._current().chunk_headers()
         return {position: _ChunkHeader.of(each) for position, each in headers.items()}
 
@@ -192,7 +219,7 @@ class PrivateBag(ABC):
         return map(indexes[0].entry, merge_entries(parts, backwards=backwards))
 
     def _indexes(self, numbers: Iterable[int]) -> list[_Index]:
-        with as_ros_errors():
+        with as_ros_errors(), self._position_kept():
             return list(map(_Index, self._current().index(numbers)))
 
 

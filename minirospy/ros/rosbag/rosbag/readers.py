@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from minirospy.ros.rosbag.rosbag import records
+from minirospy.ros.rosbag.rosbag.internals import _ChunkHeader, _ChunkInfo, _ConnectionInfo
 
 if TYPE_CHECKING:
     from minirospy.base.times import Time
@@ -59,3 +62,42 @@ class _BagReader200(_BagReader):
             # The first iteration reads the whole index, in one pass through the file.
             if not self.bag._connection_indexes_read:
                 self.bag._connection_indexes_read = self.bag._connection_indexes is not None
+
+    def read_file_header_record(self) -> None:
+        """Read the file header's record at the file's position."""
+        records._read_header(self.bag._open_file(), records._OP_FILE_HEADER)
+        records._skip_sized(self.bag._open_file())
+
+    def read_chunk_header(self) -> _ChunkHeader:
+        """Return the chunk header at the file's position. Raise ROSBagFormatException if there is none."""
+        file = self.bag._open_file()
+        header = records._read_header(file, records._OP_CHUNK)
+        compression = records._read_str_field(header, "compression")
+        size = records._read_uint32_field(header, "size")
+        compressed_size = records._read_uint32(file)
+        return _ChunkHeader(compression, compressed_size, size, file.tell())
+
+    def read_connection_record(self, f: BinaryIO, encrypt: bool = False) -> _ConnectionInfo:
+        """Return the connection whose record is next in ``f``. Raise ROSBagFormatException if there is none."""
+        header = records._read_header(f, records._OP_CONNECTION)
+        number = records._read_uint32_field(header, "conn")
+        topic = records._read_str_field(header, "topic")
+        fields = records._read_header(f)
+        return _ConnectionInfo(
+            number, topic, {name: value.decode("utf-8", "replace") for name, value in fields.items()}
+        )
+
+    def read_chunk_info_record(self) -> _ChunkInfo:
+        """Return the chunk info at the file's position. Raise ROSBagFormatException if there is none."""
+        file = self.bag._open_file()
+        header = records._read_header(file, records._OP_CHUNK_INFO)
+        info = _ChunkInfo(
+            records._read_uint64_field(header, "chunk_pos"),
+            records._read_time_field(header, "start_time"),
+            records._read_time_field(header, "end_time"),
+        )
+        records._read_uint32(file)  # the length of the counts
+        for _ in range(records._read_uint32_field(header, "count")):
+            number = records._read_uint32(file)
+            info.connection_counts[number] = records._read_uint32(file)
+        return info

@@ -1,6 +1,6 @@
 """rosgraph: the Master API, graph names and environment variables, for Python programs."""
 
-import sys
+import sys as sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 

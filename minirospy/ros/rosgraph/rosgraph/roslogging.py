@@ -20,8 +20,8 @@ __all__ = [
     "renew_latest_logdir",
 ]
 
-_FILE_BYTES = 50_000_000  # of a log file, before another is begun
-_FILE_BACKUPS = 4
+_FILE_BYTES = 50_000_000  # size of a log file before another is started
+_FILE_BACKUPS = 4  # number of earlier log files that are kept
 _FORMAT = "[%(name)s][%(levelname)s] %(asctime)s: %(message)s"
 
 

@@ -92,7 +92,7 @@ class ROSLaunchRunner:
         for node in config.nodes:
             node.give_name()
         self._launcher = ApiLauncher(config.spec, self._environment, self._options, run_id)
-        self.pm: ProcessMonitor | None = ProcessMonitor(self._launcher)
+        self.pm: ProcessMonitor | None = ProcessMonitor(launcher=self._launcher)
 
     def launch(self) -> tuple[list[str], list[str]]:
         """Start everything; return the names of the started processes and of the nodes that failed to start.

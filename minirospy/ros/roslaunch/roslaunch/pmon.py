@@ -5,15 +5,17 @@ Source: http://wiki.ros.org/roslaunch/API%20Usage.
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import signal
 import subprocess
+import sys
 import threading
 import time
 import traceback
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import FrameType
 from typing import ClassVar
 
@@ -29,16 +31,23 @@ from minirospy.ros.roslaunch.roslaunch.node_args import NodeParamsException
 from minirospy.workspace.packages import Packages
 
 __all__ = [
+    "DeadProcess",
+    "FatalProcessLaunch",
     "Process",
     "ProcessListener",
     "ProcessMonitor",
     "RLException",
     "_init_signal_handlers",
+    "_shutting_down",
     "pmon_shutdown",
     "rl_signal",
     "shutdown_process_monitor",
     "start_process_monitor",
 ]
+
+
+_BAR = "=" * 80
+_POLL_SECONDS = 0.1  # between checks of a program's own processes
 
 
 class ProcessListener:
@@ -57,7 +66,7 @@ class ApiLauncher(Launcher):
         super().__init__(spec, environment, Packages(environment), options, Output(title=False))
         self.run_id = run_id
         self.listeners: list[ProcessListener] = []
-        self.known: dict[str, Process] = {}
+        self.known: dict[str, LaunchedProcess] = {}
 
     def command(self, node: NodeSpec) -> list[str]:
         """Return a node's command. Raise LaunchError if it cannot be built."""
@@ -74,7 +83,7 @@ class ApiLauncher(Launcher):
 
     def _start_process(self, node: NodeSpec, name: str) -> processes.Process:
         process = super()._start_process(node, name)
-        self.known.setdefault(name, Process(self, node, name)).process = process
+        self.known.setdefault(name, LaunchedProcess(self, node, name)).process = process
         return process
 
     def _on_end(self, process: processes.Process) -> None:
@@ -85,15 +94,117 @@ class ApiLauncher(Launcher):
                 self._output.warn(f"ERROR: a process listener failed\n{traceback.format_exc()}")
 
 
+class FatalProcessLaunch(RLException):
+    """A process failed to start, and the launch cannot continue."""
+
+
 class Process:
-    """A node's process, which is either running, or created by create_node_process() and not started yet."""
+    """A process that a ProcessMonitor watches: programs override start(), stop() and is_alive()."""
+
+    def __init__(
+        self,
+        package: str,
+        name: str,
+        args: Sequence[str],
+        env: Mapping[str, str],
+        respawn: bool = False,
+        respawn_delay: float = 0.0,
+        required: bool = False,
+    ) -> None:
+        self.package = package
+        self.name = name
+        self.args = args
+        self.env = env
+        self.respawn = respawn
+        self.respawn_delay = respawn_delay
+        self.required = required
+
+        self.lock = threading.Lock()
+        self.exit_code: int | None = None
+        self.spawn_count = 0  # how many times the process was started
+        self.time_of_death: float | None = None  # time.time() of its exit
+
+    def __str__(self) -> str:
+        return f"Process<{self.name}>"
+
+    def get_info(self) -> dict[str, object]:
+        """Return the process's details."""
+        keys = (
+            "spawn_count",
+            "args",
+            "env",
+            "package",
+            "name",
+            "alive",
+            "respawn",
+            "respawn_delay",
+            "required",
+        )
+        info = {key: self.is_alive() if key == "alive" else getattr(self, key) for key in keys}
+        if self.exit_code is not None:
+            info["exit_code"] = self.exit_code
+        return info
+
+    def start(self) -> bool | None:
+        """Start the process; return whether it is running."""
+        self.spawn_count += 1
+        return None
+
+    def is_alive(self) -> bool:
+        """Return whether the process is running; when it no longer is, set ``time_of_death``."""
+        if self.time_of_death is None:
+            self.time_of_death = time.time()
+        return False
+
+    def should_respawn(self) -> float | bool:
+        """Return the seconds until the process may be restarted, or False if it must not be."""
+        if not self.respawn:
+            return False
+        return (self.time_of_death or time.time()) + self.respawn_delay - time.time()
+
+    def stop(self, errors: list[str] | None = None) -> None:
+        """Terminate the process; append descriptions of errors to ``errors``."""
+
+    def get_exit_description(self) -> str:
+        """Return a description of how the process exited."""
+        if self.exit_code is None:
+            return "process has died"
+        return (
+            f"process has died with exit code {self.exit_code}"
+            if self.exit_code
+            else "process has finished cleanly"
+        )
+
+
+class DeadProcess(Process):
+    """A process that has exited, in a monitor's ``dead_list``."""
+
+    def __init__(self, p: Process) -> None:
+        super().__init__(p.package, p.name, p.args, p.env, p.respawn, p.respawn_delay, p.required)
+        self.exit_code, self.spawn_count = p.exit_code, p.spawn_count
+        self.lock = p.lock
+
+    def start(self) -> bool:
+        """Raise RLException: a process that has exited cannot be started."""
+        raise RLException("call to start on dead process!")
+
+    def is_alive(self) -> bool:
+        """Return False."""
+        return False
+
+
+class LaunchedProcess(Process):
+    """A node's process: running, or created by create_node_process() and not started yet."""
 
     def __init__(self, launcher: ApiLauncher, node: NodeSpec, name: str) -> None:
+        # As properties, `args`, `env`, `spawn_count` and `exit_code` follow the process: do not set them.
         self.name = name
         self.package = node.package
         self.respawn = node.respawn
         self.respawn_delay = node.respawn_delay
         self.required = node.required
+        self.lock = threading.Lock()
+        self.time_of_death = None
         self.log_output = node.output != "screen"
         self.cwd = node.cwd if node.cwd == "node" else None
         self.run_id = launcher.run_id
@@ -101,9 +212,6 @@ class Process:
         self._launcher = launcher
         self._node = node
         self.process: processes.Process | None = None  # the most recently started process
-
-    def __str__(self) -> str:
-        return f"Process<{self.name}>"
 
     @property
     def started(self) -> bool:
@@ -126,22 +234,22 @@ class Process:
         return self.process.pid if self.process else -1
 
     @property
-    def args(self) -> list[str]:
+    def args(self) -> list[str]:  # type: ignore[override]
         """The node's command."""
         return list(self.process.command if self.process else self._launcher.command(self._node))
 
     @property
-    def env(self) -> dict[str, str]:
+    def env(self) -> dict[str, str]:  # type: ignore[override]
         """The node's environment variables."""
         return self._launcher.variables(self._node)
 
     @property
-    def spawn_count(self) -> int:
+    def spawn_count(self) -> int:  # type: ignore[override]
         """Return how many times the process was started."""
         return self.process.starts if self.process else 0
 
     @property
-    def exit_code(self) -> int | None:
+    def exit_code(self) -> int | None:  # type: ignore[override]
         """The exit status; None while the process is running."""
         return self.process.exit_code if self.process else None
 
@@ -204,14 +312,42 @@ class ProcessMonitor:
     """The processes of a launch."""
 
     _living: ClassVar[weakref.WeakSet[ProcessMonitor]] = weakref.WeakSet()
-    """The monitors whose processes a signal terminates."""
+    """The monitors whose processes are terminated by a signal, or by pmon_shutdown(): not those that a program has made."""
 
-    def __init__(self, launcher: ApiLauncher) -> None:
-        self._launcher = launcher
+    def __init__(self, name: str = "ProcessMonitor", *, launcher: ApiLauncher | None = None) -> None:
+        self.name = name
+        self._launcher = launcher or ApiLauncher(LaunchSpec(), Environment.read())
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
-        self.is_watching = False  # set once watch() has been called
-        self._living.add(self)
+        self.is_watching = False  # whether watch() was called
+        if launcher is not None:
+            self._living.add(self)
+
+        # Processes of the program's own classes; the launcher has the others
+        self.plock = threading.RLock()
+        self._own: list[Process] = []
+        self._own_dead: list[Process] = []
+        self.core_procs: list[Process] = []
+        self._is_complete = False  # no more processes will be registered
+        self._own_thread: threading.Thread | None = None
+
+    daemon = True  # as threading.Thread has it, ROS's base class
+
+    def getName(self) -> str:
+        """Return the monitor's name."""
+        return self.name
+
+    def has_main_thread_jobs(self) -> bool:
+        """Return whether the main thread has something to do: never."""
+        return False
+
+    def do_main_thread_jobs(self) -> None:
+        """Do nothing: no process is started by the main thread only."""
+
+    @property
+    def listeners(self) -> list[ProcessListener]:
+        """The objects that are notified when processes exit."""
+        return self._launcher.listeners
 
     @property
     def done(self) -> bool:
@@ -226,13 +362,17 @@ class ProcessMonitor:
     @property
     def procs(self) -> list[Process]:
         """The watched processes."""
-        return [self._launcher.known[process.name] for process in tuple(self._launcher.processes)]
+        launched = [self._launcher.known[process.name] for process in tuple(self._launcher.processes)]
+        return [*launched, *self._own]
 
     @property
     def dead_list(self) -> list[Process]:
         """The exited processes."""
         watched = self.get_active_names()
-        return [each for each in self._launcher.known.values() if each.started and each.name not in watched]
+        launched = [
+            each for each in self._launcher.known.values() if each.started and each.name not in watched
+        ]
+        return [*launched, *self._own_dead]
 
     def get_active_names(self) -> list[str]:
         """Return the names of the watched processes."""
@@ -255,19 +395,49 @@ class ProcessMonitor:
         if not isinstance(name, str):
             raise RLException(f"kill_process takes in a process name but was given: {name}")
         process = self.get_process(name)
+        if not isinstance(process, LaunchedProcess):
+            Output(title=False).print(f"[{name}] kill requested")
         if process:
-            process.stop()
+            process.stop([])
         return process is not None
 
     def register(self, p: Process) -> None:
-        """Watch a process from create_node_process(); call this before the process's start()."""
+        """Watch a process; call this before the start() of one from create_node_process().
+
+        Raise RLException if another process has its name, or after a shutdown.
+        """
         if self.done:
             raise RLException(f"cannot add process [{p.name}] after process monitor has been shut down")
-        p.register(self._launcher)
+        if isinstance(p, LaunchedProcess):
+            p.register(self._launcher)
+            return
+        with self.plock:
+            if self.has_process(p.name):
+                text = f"cannot add process with duplicate name '{p.name}'"
+                logging.getLogger("roslaunch.pmon").error(
+                    "%s.register[%s] failed %s", self.name, p.name, text
+                )
+                raise RLException(text)
+            self._own.append(p)
+            if self.is_watching:
+                self._watch_own()
+
+    def register_core_proc(self, p: Process) -> None:
+        """Watch a process that belongs to the launch itself, such as the master."""
+        self.register(p)
+        self.core_procs.append(p)
+
+    def unregister(self, p: Process) -> None:
+        """Stop watching a process, without terminating it. Raise ValueError if it is not watched."""
+        with self.plock:
+            self._own.remove(p)
 
     def registrations_complete(self) -> None:
         """Let the monitor stop after the last process, because no more processes will be registered."""
-        self._launcher.supervisor.end_with_nodes()
+        with self.plock:
+            self._is_complete = True
+            if not self._own:
+                self._launcher.supervisor.end_with_nodes()
 
     def add_process_listener(self, l: ProcessListener) -> None:
         """Add a listener, which is notified when a process exits."""
@@ -289,9 +459,88 @@ class ProcessMonitor:
         self._thread = threading.Thread(target=watch, name="roslaunch", daemon=True)
         self.is_watching = True
         self._thread.start()
+        with self.plock:
+            if self._own:
+                self._watch_own()
+
+    def start(self) -> None:
+        """Watch the processes, as :meth:`watch` does."""
+        self.watch()
+
+    def _watch_own(self) -> None:
+        if self._own_thread is None:
+            self._own_thread = threading.Thread(target=self._run_own, name=self.name, daemon=True)
+            self._own_thread.start()
+
+    def _run_own(self) -> None:
+        """Poll the program's own processes until the monitor stops."""
+        respawning: set[Process] = set()
+        while not self._ended.wait(_POLL_SECONDS) and not self.is_shutdown:
+            for process in tuple(self._own):
+                try:
+                    self._poll_own(process, respawning)
+                except Exception:  # noqa: BLE001 - the program's own class; the other processes are still watched
+                    Output(title=False).warn(f"ERROR: [{process.name}]\n{traceback.format_exc()}")
+                    self._remove_own(process)
+            with self.plock:
+                is_over = self._is_complete and not self._own
+            if is_over:
+                self._launcher.supervisor.end_with_nodes()
+
+    def _poll_own(self, process: Process, respawning: set[Process]) -> None:
+        if process not in respawning:
+            if process.is_alive():
+                return
+            self._report_exit(process)
+            if process.required:
+                self.shutdown()
+                return
+        seconds = process.should_respawn()
+        if seconds is False:
+            process.stop([])
+            self._remove_own(process)
+        elif seconds <= 0:
+            respawning.discard(process)
+            Output(title=False).print(f"[{process.name}] restarting process")
+            process.stop([])
+            process.start()
+        else:
+            respawning.add(process)
+
+    def _report_exit(self, process: Process) -> None:
+        text = process.get_exit_description()
+        output = Output(title=False)
+        if process.required:
+            output.warn(
+                f"{_BAR}REQUIRED process [{process.name}] has died!\n{text}\nInitiating shutdown!\n{_BAR}"
+            )
+        elif process.exit_code:
+            output.warn(f"[{process.name}] {text}")
+        else:
+            output.print(f"[{process.name}] {text}", bold=True)
+        for listener in tuple(self._launcher.listeners):
+            listener.process_died(process.name, process.exit_code or 0)
+
+    def _remove_own(self, process: Process) -> None:
+        with self.plock:
+            if process in self._own:
+                self._own.remove(process)
+                self._own_dead.append(DeadProcess(process))
 
     def close(self) -> None:
         """Terminate the remaining processes in the calling thread."""
+        errors: list[str] = []
+        # The core's processes last, the others in the reverse order of their registration.
+        others = [each for each in reversed(self._own) if each not in self.core_procs]
+        for process in (*others, *(each for each in self.core_procs if each in self._own)):
+            Output(title=False).print(f"[{process.name}] killing on exit")
+            try:
+                process.stop(errors)
+            except Exception:  # noqa: BLE001 - the program's own class; the other processes end, too
+                errors.append(traceback.format_exc())
+            self._remove_own(process)
+        for error in errors:
+            Output(title=False).warn(error)
         self._launcher.close()
         self._ended.set()
 
@@ -326,9 +575,14 @@ class ProcessMonitor:
         return [monitor for monitor in cls._living if not monitor.done]
 
 
-def start_process_monitor() -> ProcessMonitor:
-    """Return a monitor for processes from create_node_process()."""
-    monitor = ProcessMonitor(ApiLauncher(LaunchSpec(), Environment.read()))
+_shutting_down = False  # programs set it to False to launch again after a signal
+
+
+def start_process_monitor() -> ProcessMonitor | None:
+    """Return a monitor that watches registered processes, or None if the program has set ``_shutting_down``."""
+    if getattr(sys.modules.get("roslaunch.pmon"), "_shutting_down", False):
+        return None
+    monitor = ProcessMonitor(launcher=ApiLauncher(LaunchSpec(), Environment.read()))
     monitor.watch()
     return monitor
 
@@ -343,8 +597,8 @@ def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
     return True
 
 
-def create_node_process(run_id: str | None, node: Node, master_uri: str) -> Process:
-    """Return a process for a node; it is not started yet. Raise NodeParamsException if the node has no program."""
+def create_node_process(run_id: str | None, node: Node, master_uri: str) -> LaunchedProcess:
+    """Return a process for a node, not started yet. Raise NodeParamsException if the node has no program."""
     node.give_name()
     launcher = ApiLauncher(
         LaunchSpec(), Environment.read()._replace(master_uri=master_uri), run_id=run_id or ""
@@ -353,7 +607,7 @@ def create_node_process(run_id: str | None, node: Node, master_uri: str) -> Proc
         launcher.command(node.spec)
     except MinirospyError as error:
         raise NodeParamsException(str(error)) from error
-    return Process(launcher, node.spec, launcher.process_name(node.spec))
+    return LaunchedProcess(launcher, node.spec, launcher.process_name(node.spec))
 
 
 def pmon_shutdown() -> None:
