@@ -166,7 +166,7 @@ print(max(sizes))
     def test_timeouts_run_on_simulated_time(self) -> None:
         said = run("""
 import minirospy.base.clock
-import socket
+from minirospy.client.session import current_session
 clock = current_session().clock = minirospy.base.clock.SimulatedClock(10**9)
 client.send_goal(TestGoal(3))
 answers = []
