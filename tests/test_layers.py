@@ -50,7 +50,7 @@ LEAVES = {
 }
 """Parts that can be deleted: nothing outside imports one, except for functions of `cli/`, which run it. Name -> its paths."""
 LEAF_PATHS = sorted(path for paths in LEAVES.values() for path in paths)
-SYSTEM_PACKAGES = {"catkin", "python_orocos_kdl", "rospkg"}
+SYSTEM_PACKAGES = {"catkin", "catkin_pkg", "python_orocos_kdl", "rospkg"}
 """Real ROS has these from the system or for each package: a package.xml uses rosdep's name, or none."""
 UNNAMED = {
     ("camera_info_manager_py", "camera_calibration_parsers"): "both read the files of cameras' calibrations",
