@@ -20,6 +20,7 @@ from minirospy.base.errors import ManifestError
 from minirospy.base.xml_text import MAX_LEVELS, XmlError, new_parser
 
 __all__ = [
+    "EMAIL",
     "PACKAGE_NAME",
     "VARIABLES",
     "Dependency",
@@ -257,7 +258,7 @@ _REPLACED = {
 _VERSIONS = {"version_lt", "version_lte", "version_eq", "version_gte", "version_gt"}
 _CONDITIONAL = {*_ALL_KINDS, "conflict", "replace", "group_depend", "member_of_group"}
 _VERSION = re.compile(r"^\d+\.\d+\.\d+$")
-_EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-a-z\d%]+(\.[-a-z\d%]+)*\.[a-z]{2,}", re.ASCII | re.IGNORECASE)
+EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-a-z\d%]+(\.[-a-z\d%]+)*\.[a-z]{2,}", re.ASCII | re.IGNORECASE)
 """Addresses that catkin accepts; catkin exits with an error for any other address."""
 
 
@@ -340,7 +341,7 @@ class _Reader:
                 self._problem(element, f"maintainer '{element.text}' has no email")
         for element in self._elements("maintainer") + self._elements("author"):
             email = element.attributes.get("email")
-            if email and not _EMAIL.fullmatch(email):
+            if email and not EMAIL.fullmatch(email):
                 self._problem(
                     element, f'Invalid email "{email}" for person "{element.text}" (ROS refuses the package)'
                 )

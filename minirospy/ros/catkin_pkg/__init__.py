@@ -1,0 +1,1 @@
+"""The Python package catkin_pkg, for programs and setup.py files that import it."""
