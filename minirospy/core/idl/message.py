@@ -14,7 +14,6 @@ from minirospy.base.errors import (
     DeserializationError,
     MessageException,
     SerializationError,
-    SerializationOverflowError,
 )
 from minirospy.base.times import Duration, Time, TVal
 from minirospy.core.idl.protocols import is_message, is_stamped
@@ -124,13 +123,16 @@ class Message:
         return self._slot_types
 
     def _check_types(self, exc: Exception | None = None) -> None:
-        """Raise SerializationError for the first field with an invalid value, or for ``exc`` if there is no such field."""
+        """Raise SerializationError for the first field with an invalid value, or for ``exc`` if there is no such field.
+
+        A number that exceeds a float32 is an OverflowError, as in genpy, which does not convert struct's.
+        """
         # After an error, find the field that cannot be written; otherwise check everything that genpy checks.
         checks = _STRICT_CHECKS if exc is None else _CHECKS
         for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
             _check_field(name, type_, getattr(self, name), checks)
         if isinstance(exc, OverflowError):
-            raise SerializationOverflowError(str(exc))
+            raise OverflowError(str(exc))
         if exc is not None:
             raise SerializationError(str(exc))
 
