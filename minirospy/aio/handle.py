@@ -66,7 +66,7 @@ def pieces_of(message: Message) -> Pieces:
     pieces = Pieces()
     try:
         message.serialize(pieces)
-    except SerializationError as error:
+    except (SerializationError, OverflowError) as error:
         raise ROSSerializationException(str(error)) from error
     return pieces
 

@@ -53,7 +53,6 @@
     |   +-- TimeoutException            a buffer server that does not respond
     +-- MessageException                genpy's tree: values and bytes that do not match a message
         +-- SerializationError
-        |   +-- SerializationOverflowError
         +-- DeserializationError
 """
 
@@ -106,7 +105,6 @@ __all__ = [
     "RpcUnreachable",
     "RvizFileError",
     "SerializationError",
-    "SerializationOverflowError",
     "ServiceException",
     "SourceError",
     "ThreadLimitError",
@@ -543,13 +541,6 @@ class MessageException(Exception):
 
 class SerializationError(MessageException):
     """A message contains a value that its definition does not allow."""
-
-
-class SerializationOverflowError(SerializationError, OverflowError):
-    """A number exceeds a float32's range.
-
-    Programs written for genpy expect an OverflowError, minirospy's code a SerializationError.
-    """
 
 
 class DeserializationError(MessageException):

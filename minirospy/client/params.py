@@ -12,6 +12,7 @@ from minirospy.base.errors import MasterUnreachableError, ROSException, RpcError
 from minirospy.client.identity import warn_of_illegal_name
 from minirospy.client.session import current_session
 from minirospy.core.graph.parameter_cache import NOT_SET
+from minirospy.core.wire.xmlrpc_writer import is_numpy
 
 if TYPE_CHECKING:
     import datetime
@@ -89,7 +90,7 @@ def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
 
 
 def set_param(param_name: str, param_value: object) -> None:
-    """Set a parameter; a dictionary sets a whole namespace.
+    """Set a parameter; a dictionary sets a whole namespace. Numpy's numbers and arrays become numbers and lists.
 
     Raise TypeError or OverflowError if XML-RPC has no type for a value, ROSException if the master fails.
     """
@@ -244,6 +245,8 @@ def check_sendable(value: object) -> None:
     elif isinstance(value, list | tuple):
         for item in value:
             check_sendable(item)
+    elif is_numpy(value):
+        check_sendable(value.tolist())  # type: ignore[attr-defined]
     elif not (isinstance(value, float | bytes | bytearray) or _is_date(value) or _is_wrapper(value)):
         raise TypeError(f"cannot marshal {type(value)} objects")
 

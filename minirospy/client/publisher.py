@@ -16,7 +16,6 @@ from minirospy.base.errors import (
     ROSException,
     ROSSerializationException,
     SerializationError,
-    SerializationOverflowError,
 )
 from minirospy.client.connection import Connection, connection_to_subscriber
 from minirospy.client.session import Session, current_session
@@ -331,9 +330,6 @@ class PublishedTopic(SharedTopic):
         pieces = Pieces()
         try:
             message.serialize(pieces)
-        except SerializationOverflowError:
-            # rospy does not convert struct's OverflowError, so programs catch that class.
-            raise
         except SerializationError as error:
             if not self._has_header or getattr(message.header, "frame_id", "") is not None:
                 raise self._refused(message, error) from None

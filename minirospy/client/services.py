@@ -390,7 +390,7 @@ class ServiceProxy(Generic[_S_co]):
         number_header(request, self._calls + 1)
         try:
             request.serialize(buffer)
-        except SerializationError:
+        except (SerializationError, OverflowError):
             # Connect first, as rospy does, so that an error about a missing service or wrong type precedes
             # serialization errors.
             if self._client is None:

@@ -58,6 +58,33 @@ for value in (numpy.float64(2.5), Level.HIGH, {"gain": numpy.float64(1e-9)}, [nu
 """) == ["2.5", "2", "{'gain': 1e-09}", "['a']"]
 
 
+def test_numpys_numbers_and_arrays_become_numbers_and_lists(master: str) -> None:
+    pytest.importorskip("numpy")
+    assert run("""
+import numpy as np, rosgraph, rosparam, rospy
+rospy.init_node("case", disable_rosout=True)
+values = [np.int8(-5), np.float32(1.5), np.bool_(True), np.array(3), np.arange(3), np.eye(2), np.array([]),
+          {"gains": np.array([1, 2]), "deep": [np.float16(0.5), (np.uint8(7),)]}, np.array(["a", "bc"])]
+for value in values:
+    rospy.set_param("/p", value)
+    print(rospy.get_param("/p"))
+rosparam.upload_params("/q", {"a": np.arange(2), "b": np.int64(1)})
+rosgraph.Master("/case").setParam("/q/c", np.ones(1))
+print(rospy.get_param("/q"))
+for value in (np.int64(2**40), np.array([2**40]), np.complex128(1j), np.array([1, None])):
+    try:
+        rospy.set_param("/p", value)
+    except (TypeError, OverflowError) as error:
+        print(type(error).__name__, error)
+""") == [
+        "-5", "1.5", "True", "3", "[0, 1, 2]", "[[1.0, 0.0], [0.0, 1.0]]", "[]",
+        "{'gains': [1, 2], 'deep': [0.5, [7]]}", "['a', 'bc']",
+        "{'a': [0, 1], 'b': 1, 'c': [1.0]}",
+        "OverflowError int exceeds XML-RPC limits", "OverflowError int exceeds XML-RPC limits",
+        "TypeError cannot marshal <class 'complex'> objects", "TypeError cannot marshal None unless allow_none is enabled",
+    ]  # fmt: skip
+
+
 CACHED = """
 import os
 import threading

@@ -257,9 +257,12 @@ class _Writer:
         if leaf.type.length is not None:
             with self._source.block(f"if len({name}) != {leaf.type.length}:"):
                 field = leaf.path.rpartition(".")[2]
-                self._line(
-                    f'raise ValueError(f"{field} has {{len({name})}} values instead of {leaf.type.length}")'
-                )
+                if leaf.is_numbers:
+                    self._line(f'{name} = {self._source.use("_flat")}("{field}", {name}, {leaf.type.length})')
+                else:
+                    self._line(
+                        f'raise ValueError(f"{field} has {{len({name})}} values instead of {leaf.type.length}")'
+                    )
         return name
 
     def _encoded(self, name: str, path: str) -> str:

@@ -72,6 +72,15 @@ _HELPERS = {
         '    numbers = _numbers(letter, len(values), "<" if letter == "f" else _NATIVE)',
         "    return _struct_I.pack(len(values)) + numbers.pack(*values)",
     ],
+    "_flat": [
+        "",
+        "",
+        "def _flat(name: str, values: Any, count: int) -> Any:",
+        '    """The numbers of an array of more dimensions, such as a 6x6 matrix of numpy, row by row."""',
+        '    if getattr(values, "size", 0) == count:',
+        "        return list(values.flat)",
+        '    raise ValueError(f"{name} has {len(values)} values instead of {count}")',
+    ],
     "_octets": [
         "",
         "",

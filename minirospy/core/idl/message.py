@@ -5,6 +5,7 @@ The names and rules are genpy's, because user code relies on them: http://docs.r
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import ModuleType
@@ -14,7 +15,6 @@ from minirospy.base.errors import (
     DeserializationError,
     MessageException,
     SerializationError,
-    SerializationOverflowError,
 )
 from minirospy.base.times import Duration, Time, TVal
 from minirospy.core.idl.protocols import is_message, is_stamped
@@ -124,16 +124,16 @@ class Message:
         return self._slot_types
 
     def _check_types(self, exc: Exception | None = None) -> None:
-        """Raise SerializationError for the first field with an invalid value.
+        """Raise SerializationError for the first field with an invalid value, or for ``exc`` if there is no such field.
 
-        If there is no such field, raise it for ``exc``, if given.
+        A number that exceeds a float32 is an OverflowError, as in genpy, which does not convert struct's.
         """
         # After an error, find the field that cannot be written; otherwise check everything that genpy checks.
         checks = _STRICT_CHECKS if exc is None else _CHECKS
         for name, type_ in zip(self.__slots__, self._get_types(), strict=True):
             _check_field(name, type_, getattr(self, name), checks)
         if isinstance(exc, OverflowError):
-            raise SerializationOverflowError(str(exc))
+            raise OverflowError(str(exc))
         if exc is not None:
             raise SerializationError(str(exc))
 
@@ -473,8 +473,25 @@ def _check_array(name: str, type_: str, value: object, checks: Mapping[str, _Che
         and not hasattr(value, "tolist")
     ):
         raise SerializationError(f"field {name} must be a list or tuple type")
-    for item in cast("Iterable[object]", value):
+    for item in _items_of_array(name, type_, value, checks):
         _check_field(f"{name}[]", base, item, checks)
+
+
+def _items_of_array(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> Iterable[object]:
+    """Return the items of an array; for numpy's arrays of more dimensions, the numbers, which are written row by row.
+
+    Raise SerializationError if a fixed-length field cannot be filled from the array's shape.
+    """
+    shape: tuple[int, ...] = getattr(value, "shape", ())
+    if len(shape) < 2:
+        return cast("Iterable[object]", value)
+    length = type_.partition("[")[2]
+    # Serializing counts rows first: a column of the right length is refused there, with each row as a number.
+    is_refused = checks is _CHECKS and length == str(shape[0])
+    if length and (is_refused or length != str(math.prod(shape))):
+        hint = ": use reshape(-1)" if is_refused and length == str(math.prod(shape)) else ""
+        raise SerializationError(f"field {name} has shape {shape} instead of {length} values{hint}")
+    return cast("Iterable[object]", getattr(value, "flat", value))
 
 
 # --- filling

@@ -12,7 +12,7 @@ from minirospy.base.errors import RpcProtocolError
 from minirospy.base.steps import ALONE, Need, Steps
 from minirospy.core.wire.xmlrpc_reader import MAX_DEPTH, DateTime
 
-__all__ = ["Output", "escape", "write", "write_in_steps"]
+__all__ = ["Output", "escape", "is_numpy", "write", "write_in_steps"]
 
 _STEP_BYTES = 8192
 _STEP_ITEMS = 300
@@ -107,6 +107,11 @@ def write(value: object, parts: list[str], depth: int) -> None:
     if writer is None:
         writer = _writer_of_kin(value)
     writer(value, parts, depth + 1)
+
+
+def is_numpy(value: object) -> bool:
+    """Return whether ``value.tolist()`` returns a numpy number or array as Python's: not for those without a counterpart."""
+    return hasattr(value, "dtype") and hasattr(value, "tolist") and type(value.tolist()) is not type(value)
 
 
 class Output:
@@ -208,7 +213,7 @@ def _write_bytes_in_steps(value: bytes, out: Output) -> Steps[None]:
 
 
 def _writer_of_kin(value: object) -> _Writer:
-    """Return the writer for a subclass of a known type, for a date, or for one of xmlrpc.client's wrappers."""
+    """Return the writer for a subclass of a known type, a date, a wrapper of xmlrpc.client, or numpy's numbers and arrays."""
     for kind, writer in _WRITERS.items():
         if isinstance(value, kind):
             return writer
@@ -222,4 +227,6 @@ def _writer_of_kin(value: object) -> _Writer:
         return lambda date, parts, _: parts.append(
             f"<value><dateTime.iso8601>{escape(date.value)}</dateTime.iso8601></value>"
         )
+    if is_numpy(value):
+        return lambda array, parts, depth: write(array.tolist(), parts, depth)
     raise RpcProtocolError(f"XML-RPC has no type for {type(value).__name__}: {str(value)[:60]}")

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sensor_msgs.msg import Image, JointState, LaserScan
+from geometry_msgs.msg import PoseWithCovariance
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import CameraInfo, Image, JointState, LaserScan
 
 from minirospy.base.errors import SerializationError
 
@@ -43,3 +45,40 @@ def test_an_image_of_any_shape() -> None:
 def test_value_that_is_not_bytes_is_refused(data: Any) -> None:
     with pytest.raises(SerializationError):
         written(Image(data=data))
+
+
+def test_matrix_in_a_field_of_fixed_length_is_written_row_by_row() -> None:
+    numbers = np.arange(36.0)
+    flat = written(PoseWithCovariance(covariance=numbers.tolist()))
+    for shape in ((6, 6), (1, 36), (4, 9), (2, 3, 6)):
+        assert written(PoseWithCovariance(covariance=numbers.reshape(shape))) == flat
+    assert written(PoseWithCovariance(covariance=np.asfortranarray(numbers.reshape(6, 6)))) == flat
+    assert written(PoseWithCovariance(covariance=numbers.reshape(6, 6).astype("int8"))) == flat
+    nested = Odometry()
+    nested.pose.covariance = numbers.reshape(6, 6).T
+    assert Odometry().deserialize(written(nested)).pose.covariance[:3] == (0.0, 6.0, 12.0)
+    camera = CameraInfo().deserialize(written(CameraInfo(K=np.eye(3), P=np.eye(3, 4, dtype="float32"))))
+    assert camera.K == (1, 0, 0, 0, 1, 0, 0, 0, 1)
+    assert camera.P == (1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0)
+    PoseWithCovariance(covariance=np.eye(6))._check_types()
+
+
+@pytest.mark.parametrize(
+    ("shape", "text"),
+    [
+        ((6, 5), "field covariance has shape (6, 5) instead of 36 values"),
+        ((36, 2), "field covariance has shape (36, 2) instead of 36 values"),
+        ((36, 1), "field covariance has shape (36, 1) instead of 36 values: use reshape(-1)"),
+    ],
+)
+def test_matrix_of_another_count_is_refused_with_its_shape(shape: tuple[int, ...], text: str) -> None:
+    with pytest.raises(SerializationError) as error:
+        written(PoseWithCovariance(covariance=np.zeros(shape)))
+    assert str(error.value) == text
+
+
+def test_count_of_a_flat_array_is_named() -> None:
+    with pytest.raises(SerializationError, match=r"^covariance has 35 values instead of 36$"):
+        written(PoseWithCovariance(covariance=np.zeros(35)))
+    with pytest.raises(SerializationError, match=r"^field K\[\] must be float type$"):
+        written(CameraInfo(K=[[1.0, 0.0, 0.0]] * 3))

@@ -18,6 +18,7 @@ import yaml as yaml
 
 from minirospy.base.errors import MasterUnreachableError, MinirospyError, NotFoundError, ValueTextError
 from minirospy.client.params import as_xmlrpc_client, check_sendable
+from minirospy.core.wire.xmlrpc_writer import is_numpy
 from minirospy.introspect import parameters
 from minirospy.introspect.graph import Graph
 from minirospy.introspect.values import (
@@ -122,7 +123,9 @@ def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
 
 
 def _with_bytes(value: object) -> object:
-    """Return a value with each Binary replaced by bytes."""
+    """Return a value with each Binary replaced by bytes, and numpy's numbers and arrays by Python's."""
+    if is_numpy(value):
+        return _with_bytes(value.tolist())  # type: ignore[attr-defined]
     if isinstance(value, Binary):
         return value.data
     if isinstance(value, dict):
