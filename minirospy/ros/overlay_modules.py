@@ -190,21 +190,19 @@ def _text(name: str, source: Path) -> str:
         lines += ["", "__all__ = [", *_wrapped(f'"{each}"' for each in listed(source)), "]"]
     if is_package and "." not in name:
         lines += [
+            *([""] if lines[-1] else []),
+            "from minirospy.ros.submodules import offer_standard_library",
             "",
-            "from minirospy.ros.submodules import offer_standard_library as _offer_standard_library",
-            "",
-            "_offer_standard_library()",
+            "offer_standard_library()",
         ]
-    if passed_on:
-        lines += [
-            "",
+    later = {each: place for each, place in later.items() if each not in names_here}
+    if later or passed_on:
+        starred = [
             f"__all__ {'=' if public is None else '+='} [",
             *_wrapped(f'"{each}"' for each in passed_on),
             "]",
         ]
-    later = {each: place for each, place in later.items() if each not in names_here}
-    if later:
-        lines += _text_of_later(name, later, has_hook=hook is not None)
+        lines += _text_of_later(name, later, starred if passed_on else [], has_hook=hook is not None)
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
@@ -236,7 +234,7 @@ def _submodules(package: str) -> dict[str, str]:
     return {name: f"{package}.{name}" for name in sorted(names)}
 
 
-def _text_of_later(module: str, names: dict[str, str], *, has_hook: bool) -> list[str]:
+def _text_of_later(module: str, names: dict[str, str], starred: list[str], *, has_hook: bool) -> list[str]:
     """Return the lines that find these names at first use; type checkers and editors do not see them."""
     missing = f"raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")"
     return [
@@ -249,6 +247,7 @@ def _text_of_later(module: str, names: dict[str, str], *, has_hook: bool) -> lis
         "    _LATER = {",
         *(f"    {line}" for line in _wrapped(f'"{name}": "{place}"' for name, place in names.items())),
         "    }",
+        *(f"    {line}" for line in starred),
         "",
         "    def __getattr__(name):",
         "        if name in _LATER:",
