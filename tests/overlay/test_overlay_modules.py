@@ -34,6 +34,7 @@ def names_of(path: Path) -> list[str]:
     return found[0] if found else []
 
 
+@pytest.mark.filterwarnings("ignore:roslib.rospack is deprecated")
 @pytest.mark.parametrize("name", NAMES)
 def test_module_offers_what_its_source_names(name: str) -> None:
     module = importlib.import_module(name)

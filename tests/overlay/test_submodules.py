@@ -30,6 +30,7 @@ from sensor_msgs.msg import JointState
 RECORD: dict[str, list[str]] = json.loads((Path(__file__).parent / "submodules.json").read_text())
 
 
+@pytest.mark.filterwarnings("ignore:roslib.rospack is deprecated")
 @pytest.mark.parametrize("module", RECORD["offered"])
 def test_submodule_of_real_ros_is_offered(module: str) -> None:
     importlib.import_module(module)

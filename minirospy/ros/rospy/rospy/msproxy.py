@@ -10,15 +10,16 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from minirospy.base.errors import RpcFault, RpcUnreachable
+from minirospy.base.errors import ROSException, RpcFault, RpcUnreachable
 from minirospy.client.params import as_xmlrpc_client, check_sendable, get_param_cached
 from minirospy.client.session import current_session
 from minirospy.runtime.rpc.client import RpcClient
 
-__all__ = ["MasterProxy"]
+__all__ = ["MasterProxy", "_master_arg_remap"]
 
-_NAMES_FIRST = frozenset(
-    {
+_master_arg_remap = {
+    method: [0]
+    for method in (
         "deleteParam",
         "getParam",
         "getPublishedTopics",
@@ -35,8 +36,8 @@ _NAMES_FIRST = frozenset(
         "unregisterService",
         "unregisterSubscriber",
         "unsubscribeParam",
-    }
-)  # methods whose first argument is a name in the graph
+    )
+}  # method -> the positions of its arguments that are names of graph resources, without the caller's name
 
 
 class ServerProxy:
@@ -76,7 +77,8 @@ class MasterProxy:
 
     Results are ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``.
     ``proxy[key]``, ``proxy[key] = value``, ``del proxy[key]`` (KeyError), ``key in proxy`` and iteration
-    access the parameters. Errors: see :class:`ServerProxy`.
+    access the parameters. A program may replace ``target``. Errors: see :class:`ServerProxy`, and ROSException if the
+    master refuses a question about parameters.
     """
 
     def __init__(self, uri: str) -> None:
@@ -88,8 +90,10 @@ class MasterProxy:
         method = getattr(self.target, name)
 
         def call(*args: Any) -> Any:
-            if args and name in _NAMES_FIRST:
-                args = (current_session().resolve(args[0]), *args[1:])
+            positions = _master_arg_remap.get(name)
+            if positions:
+                resolve = current_session().resolve
+                args = tuple(resolve(each) if at in positions else each for at, each in enumerate(args))
             return method(current_session().name, *args)
 
         return call
@@ -108,12 +112,16 @@ class MasterProxy:
             raise KeyError(key)
 
     def __contains__(self, key: str) -> bool:
-        code, _, value = self.hasParam(key)
-        return code == 1 and bool(value)
+        code, text, value = self.hasParam(key)
+        if code != 1:
+            raise ROSException(f"cannot check parameter on server: {text}")
+        return bool(value)
 
     def __iter__(self) -> Iterator[str]:
-        code, _, value = self.getParamNames()
-        return iter(value if code == 1 else [])
+        code, text, value = self.getParamNames()
+        if code != 1:
+            raise ROSException(f"cannot retrieve parameter names: {text}")
+        return iter(value)
 
     def search_param(self, key: str) -> str | None:
         """Return the name of the closest parameter, searched upwards from this node's namespace, or None if there is none."""
