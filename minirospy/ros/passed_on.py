@@ -377,10 +377,11 @@ PASSED_ON = {
         "__future__": "print_function",
         "builtins": "basestring=str unicode=str",
         "roslaunch.core": (
-            "PHASE_RUN PHASE_SETUP PHASE_TEARDOWN TEST_TIME_LIMIT_DEFAULT add_printerrlog_handler "
-            "add_printlog_handler clear_printerrlog_handlers clear_printlog_handlers generate_run_id "
-            "get_master_uri_env is_machine_local local_machine printerrlog printlog printlog_bold "
-            "setup_env"
+            "Executable PHASE_RUN PHASE_SETUP PHASE_TEARDOWN RosbinExecutable TEST_TIME_LIMIT_DEFAULT "
+            "add_printerrlog_handler add_printlog_handler clear_printerrlog_handlers "
+            "clear_printlog_handlers generate_run_id get_master_uri_env is_child_mode is_machine_local "
+            "local_machine printerrlog printlog printlog_bold remap_localhost_uri rle_wrapper "
+            "set_child_mode setup_env"
         ),
         "roslaunch.nodeprocess": "DEFAULT_TIMEOUT_SIGINT DEFAULT_TIMEOUT_SIGTERM create_node_process",
         "roslaunch.rlutil": "update_terminal_name",
@@ -395,7 +396,7 @@ PASSED_ON = {
         "rosgraph.names": (
             "PRIV_NAME canonicalize_name is_legal_name load_mappings make_global_ns ns_join"
         ),
-        "roslaunch.core": "PHASE_SETUP",
+        "roslaunch.core": "PHASE_SETUP RosbinExecutable",
     },
     "roslaunch.node_args": {
         "": (
@@ -412,10 +413,11 @@ PASSED_ON = {
         "__future__": "print_function",
         "builtins": "basestring=str unicode=str",
         "roslaunch.core": (
-            "PHASE_RUN PHASE_SETUP PHASE_TEARDOWN Param TEST_TIME_LIMIT_DEFAULT Test "
-            "add_printerrlog_handler add_printlog_handler clear_printerrlog_handlers "
-            "clear_printlog_handlers generate_run_id get_master_uri_env is_machine_local local_machine "
-            "printerrlog printlog printlog_bold setup_env"
+            "Executable PHASE_RUN PHASE_SETUP PHASE_TEARDOWN Param RosbinExecutable "
+            "TEST_TIME_LIMIT_DEFAULT Test add_printerrlog_handler add_printlog_handler "
+            "clear_printerrlog_handlers clear_printlog_handlers generate_run_id get_master_uri_env "
+            "is_child_mode is_machine_local local_machine printerrlog printlog printlog_bold "
+            "remap_localhost_uri rle_wrapper set_child_mode setup_env"
         ),
         "roslaunch.node_args": "create_local_process_args",
         "rosmaster.master_api": "NUM_WORKERS",
@@ -490,7 +492,7 @@ PASSED_ON = {
         "": (
             "exceptions=roslib.exceptions gentools=roslib.gentools launcher=roslib.launcher "
             "manifest=roslib.manifest message=roslib.message msgs=roslib.msgs names=roslib.names "
-            "network=roslib.network packages=roslib.packages rosenv=roslib.rosenv "
+            "network=roslib.network packages=roslib.packages rosenv=roslib.rosenv roslib "
             "scriptutil=roslib.scriptutil srvs=roslib.srvs stacks=roslib.stacks"
         ),
     },
@@ -510,9 +512,7 @@ PASSED_ON = {
     "roslib.msgs": {
         "": "os roslib rospkg sys",
         "__future__": "print_function",
-        "genmsg.base": "COMMENTCHAR CONSTCHAR",
         "io": "StringIO",
-        "roslib.srvs": "VERBOSE",
     },
     "roslib.names": {
         "": "os re sys",
@@ -949,7 +949,10 @@ PASSED_ON = {
         ),
         "__future__": "print_function",
         "io": "StringIO",
-        "rosunit.core": "create_xml_runner rostest_name_from_path xml_results_file",
+        "rosunit.core": (
+            "create_xml_runner printerrlog printlog printlog_bold rostest_name_from_path "
+            "xml_results_file"
+        ),
     },
     "rosunit.core": {
         "": "errno os rospkg sys",
@@ -968,6 +971,7 @@ PASSED_ON = {
         "": "atexit time traceback",
         "__future__": "with_statement",
         "queue": "Empty Queue",
+        "rosunit.core": "printerrlog printlog printlog_bold",
         "threading": "Lock RLock Thread",
     },
     "rosunit.pyunit": {
@@ -993,6 +997,10 @@ PASSED_ON = {
             "socket sys traceback"
         ),
         "__future__": "print_function",
+    },
+    "roswtf.context": {
+        "": "os rosgraph roslaunch rospkg sys",
+        "roswtf.model": "WtfWarning",
     },
     "roswtf.environment": {
         "": "os socket stat string sys",
@@ -1040,7 +1048,7 @@ PASSED_ON = {
         "__future__": "absolute_import",
     },
     "tf2_ros": {
-        "": "actionlib rosgraph rospy tf2=tf2_py threading",
+        "": "actionlib rosgraph rospy tf2=tf2_py tf2_ros threading",
         "__future__": "absolute_import print_function",
         "copy": "deepcopy",
     },

@@ -184,7 +184,6 @@ SUBMODULES = {
     "roslaunch.child": "roslaunch.parent.ROSLaunchParent launches files, on other machines by ssh, too",
     "roslaunch.remoteprocess": "roslaunch.parent.ROSLaunchParent starts nodes on other machines by ssh",
     "roslaunch.netapi": "`rosnode list` lists the nodes; a roslaunch does not serve its list of processes",
-    "roswtf.context": "`roswtf` and `minirospy doctor` make the checks, and roswtf.model has the classes of errors",
 }
 """Submodules of ROS packages that minirospy's packages lack, with their replacements. `overlay/` has a module for each."""
 

@@ -92,58 +92,6 @@ REASONS = {
     "TIMEOUT_READY": "not used by rospy itself",
     "python3": "a leftover of Python 2",
     "ComparableMixin": "the inside of rosbag's index entries",
-    **dict.fromkeys(
-        (
-            "argv_publish",
-            "file_yaml_arg",
-            "param_publish",
-            "param_publish_once",
-            "stdin_publish",
-            "stdin_yaml_arg",
-            "wait_for_subscriber",
-            "SUBSCRIBER_TIMEOUT",
-        ),
-        "the inside of the command rostopic",
-    ),
-    **dict.fromkeys(
-        (
-            "lookup_uri",
-            "rosnode_debugnode",
-        ),
-        "the inside of the command rosnode",
-    ),
-    **dict.fromkeys(
-        (
-            "construct_angle_degrees",
-            "construct_angle_radians",
-            "construct_yaml_binary",
-            "represent_foo",
-            "represent_xml_binary",
-        ),
-        "given to PyYAML when rosparam is imported",
-    ),
-    **dict.fromkeys(
-        (
-            "MAX_DEFAULT_NON_FLOW_ITEMS",
-            "RosMsgProtoArgsException",
-            "RosMsgProtoException",
-            "construct_ordered_mapping",
-            "construct_yaml_map_with_ordered_dict",
-            "create_names_filter",
-            "fullusage",
-            "get_array_type_instance",
-            "init_rosmsg_proto",
-            "represent_ordered_mapping",
-            "rosmsg_cmd_list",
-            "rosmsg_cmd_md5",
-            "rosmsg_cmd_package",
-            "rosmsg_cmd_packages",
-            "rosmsg_cmd_prototype",
-            "rosmsg_cmd_show",
-            "rosmsg_debug",
-        ),
-        "the inside of the commands rosmsg and rosmsg-proto",
-    ),
     "compute_md5_v1": "the md5sum before ROS 1.0",
     **dict.fromkeys(
         (
@@ -179,13 +127,56 @@ REASONS = {
         "genmsg's inside",
     ),
     **dict.fromkeys(("compute_full_type_name", "compute_md5_v2"), "not used by genmsg itself"),
-    **dict.fromkeys(
-        ("ROS_LOG_DIR", "makedirs_with_parent_perms", "renew_latest_logdir"), "the inside of rospy's logging"
-    ),
+    **dict.fromkeys(("ROS_LOG_DIR",), "the inside of rospy's logging"),
 }
 """The reasons why names in real rospy are not offered, by name: only rospy itself uses them."""
 
-LEFT_OUT: list[tuple[str, str, str]] = []
+LEFT_OUT = [
+    (
+        "actionlib",
+        "s_goalcount s_goalcount_lock ActionServer.publish_status_async",
+        "the inside of actionlib",
+    ),
+    ("bondpy", "BondSM_sm", "the inside of Bond's state machine"),
+    ("camera_calibration_parsers", "camera_calibration_parsers_wrapper", "the module in C++"),
+    (
+        "dynamic_reconfigure",
+        "ParameterGenerator.deleteobsolete ParameterGenerator.deleteoneobsolete ParameterGenerator.mkdir",
+        "the generator's inside",
+    ),
+    ("genpy.generator", "*", "genpy's own compiler; ours is minirospy.core.idl"),
+    ("image_geometry.cameramodels", "cv2", "passed on from OpenCV, which is not needed here"),
+    ("resource_retriever", "r", "a variable of the module's own loop"),
+    ("rosbag.bag", "AES gnupg roslz4", "passed on from libraries that are not needed here"),
+    ("rosbag.rosbag_main", "*", "the inside of the command rosbag"),
+    ("roslaunch.config", "load_roscore", "there is no launch file for the master's own nodes"),
+    ("roslaunch.launch", "*", "the inside of roslaunch's runner"),
+    ("roslaunch.loader", "*", "the inside of roslaunch's reader; ours is minirospy.ros.roslaunch.launcher"),
+    ("roslaunch.nodeprocess", "*", "the inside of roslaunch's processes"),
+    ("roslaunch.pmon", "*", "the inside of roslaunch's processes"),
+    ("roslaunch.remote", "*", "the inside of roslaunch's processes on other machines"),
+    ("roslaunch.server", "*", "the inside of roslaunch's processes on other machines"),
+    (
+        "roslaunch.xmlloader",
+        "*",
+        "the inside of roslaunch's reader; ours is minirospy.ros.roslaunch.launcher",
+    ),
+    ("roslib", "manifestlib stack_manifest Manifest.xml", "of rosbuild: use rospkg"),
+    ("rosmaster.master_api", "apivalidate ROSMasterHandler.param_update_task", "the inside of rosmaster"),
+    ("rosmaster.threadpool", "*", "the inside of the pool of threads"),
+    ("rospkg.distro", "*", "the distributions before catkin, whose files are no longer on the web"),
+    ("rospkg.manifest", "*", "of rosbuild"),
+    ("rospkg.os_detect", "distro", "passed on from the library distro, which is not needed here"),
+    ("rospkg.rospack", "*", "of rosbuild"),
+    ("rospy.impl", "*", "rospy's threads and sockets; ours are minirospy.runtime"),
+    ("rospy.rosconsole", "*", "the inside of the command rosconsole"),
+    ("rostest.rostest_main", "write_bad_filename_failure", "the inside of the command rostest"),
+    ("rosunit.baretest", "*", "the inside of the command rosunit"),
+    ("rosunit.junitxml", "RE_XML_ILLEGAL pattern", "the source of invalid_chars"),
+    ("rosunit.pmon", "*", "the inside of the command rosunit"),
+    ("rosunit.rosunit_main", "BareTestCase", "the inside of the command rosunit"),
+    ("", "logger", "the module's own logger"),
+]
 """(module or start of it, names or "*", the reason why they are not offered)."""
 
 MEMBERS_INSIDE = {
@@ -383,7 +374,7 @@ def passed_on() -> str:
                 place = re.sub(r"^(\w+\.(?:msg|srv))\._\w+:", r"\1:", ELSEWHERE.get(place, place))  # noqa: PLW2901
                 place = re.sub(r"^_(io|heapq|bisect|queue|functools):", r"\1:", place)  # noqa: PLW2901
                 start, _, inner = place.partition(":")
-                if start == module or start.partition(".")[0] in NOT_EVERYWHERE:
+                if (start == module and inner) or start.partition(".")[0] in NOT_EVERYWHERE:
                     continue
                 if start in overlay_modules.modules() and inner:
                     if inner not in overlay_modules.exported(overlay_modules.modules()[start]):

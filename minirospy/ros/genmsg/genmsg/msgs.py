@@ -47,7 +47,7 @@ PRIMITIVE_TYPES = [
 ]  # fmt: skip
 
 BUILTIN_TYPES = [*PRIMITIVE_TYPES, "time", "duration"]
-_RANGES = {
+RANGES = {
     **{f"int{bits}": (-(1 << bits - 1), (1 << bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, (1 << bits) - 1) for bits in (8, 16, 32, 64)},
     "byte": (-128, 127),
@@ -259,7 +259,7 @@ def _check_value(type_: str, value: str) -> None:
         float(value)
     elif type_ == "bool":
         ast.literal_eval(value)
-    elif type_ in _RANGES:
-        low, high = _RANGES[type_]
+    elif type_ in RANGES:
+        low, high = RANGES[type_]
         if not low <= int(value) <= high:
             raise ValueError(f"cannot coerce [{value}] to {type_} (out of bounds)")

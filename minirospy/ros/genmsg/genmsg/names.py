@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 
 __all__ = [
+    "BASE_RESOURCE_NAME_LEGAL_CHARS_P",
     "PRN_SEPARATOR",
+    "RESOURCE_NAME_LEGAL_CHARS_P",
     "is_legal_resource_base_name",
     "is_legal_resource_name",
     "package_resource_name",
@@ -15,6 +17,8 @@ __all__ = [
 ]
 
 PRN_SEPARATOR = "/"
+RESOURCE_NAME_LEGAL_CHARS_P = re.compile(r"^[A-Za-z][\w_\/]*$")
+BASE_RESOURCE_NAME_LEGAL_CHARS_P = re.compile(r"^[A-Za-z][\w_]*$")
 
 
 def resource_name(res_pkg_name: str, name: str, my_pkg: str | None = None) -> str:

@@ -1,6 +1,6 @@
 """rosgraph.rosgraph_main: the command `rosgraph`."""
 
-__all__ = ["rosgraph_main"]
+__all__ = ["fullusage", "rosgraph_main"]
 
 
 def rosgraph_main() -> None:
@@ -10,3 +10,8 @@ def rosgraph_main() -> None:
     from minirospy.ros.rosgraph.commands.rosgraph import main
 
     sys.exit(main())
+
+
+def fullusage() -> None:
+    """Print the usage of `rosgraph`."""
+    print("rosgraph is a command-line tool for debugging the ROS Computation Graph.\n\nUsage:\n\trosgraph\n")

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from minirospy.base.environment import DEFAULT_MASTER_PORT
 from minirospy.base.private_files import open_text
 
 if TYPE_CHECKING:
+    import logging
+
     from minirospy.ros.roslaunch.roslaunch import arg_dump as arg_dump
     from minirospy.ros.roslaunch.roslaunch import config as config
     from minirospy.ros.roslaunch.roslaunch import core as core
@@ -49,6 +52,7 @@ __all__ = [
     "XmlLoader",
     "XmlParseException",
     "configure_logging",
+    "handle_exception",
     "main",
     "roslaunch_core",
     "write_pid_file",
@@ -76,3 +80,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     from minirospy.ros.roslaunch.commands import roslaunch
 
     return roslaunch.main(None if argv is None else argv[1:])
+
+
+def handle_exception(
+    roslaunch_core: Any, logger: logging.Logger | None, msg: str, e: BaseException
+) -> NoReturn:
+    """Print an error to stderr, write its traceback to the log, and exit."""
+    import traceback
+
+    roslaunch_core.printerrlog(msg + str(e))
+    roslaunch_core.printerrlog("The traceback for the exception was written to the log file")
+    if logger:
+        logger.error(traceback.format_exc())
+    sys.exit(1)

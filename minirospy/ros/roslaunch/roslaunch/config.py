@@ -5,7 +5,7 @@ Source: http://wiki.ros.org/roslaunch/API%20Usage.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from minirospy.base.environment import DEFAULT_MASTER_PORT, DISTRO, ROS_VERSION, Environment
 from minirospy.base.errors import LaunchError
@@ -30,6 +30,7 @@ __all__ = [
     "Master",
     "RLException",
     "ROSLaunchConfig",
+    "calculate_env_loader",
     "get_roscore_filename",
     "is_machine_local",
     "load_config_default",
@@ -71,6 +72,12 @@ class ROSLaunchConfig:
             kind = "core node" if core else "node"
             printlog(f"Added {kind} of type [{node.package}/{node.type}] in namespace [{node.namespace}]")
         (self.nodes_core if core else self.nodes).append(node)
+
+    def add_executable(self, exe: object) -> None:
+        """Add a command that runs with the launch. Raise ValueError if it is None."""
+        if not exe:
+            raise ValueError("exe is None")
+        self.executables.append(exe)
 
     def add_test(self, test: Test, verbose: bool = True) -> None:
         """Add a test."""
@@ -212,3 +219,10 @@ def namespaces_of(name: str) -> list[str]:
     """Return the namespaces that contain a global name, the root first."""
     parts = name.strip("/").split("/")[:-1]
     return ["/", *("/" + "/".join(parts[: i + 1]) for i in range(len(parts)))]
+
+
+def calculate_env_loader(env: Mapping[str, str] | None = None) -> str:
+    """Return the path of the distribution's script that sets the environment on another machine."""
+    from minirospy.ros.rospkg.rospkg.distro import current_distro_codename
+
+    return f"/opt/ros/{current_distro_codename()}/env.sh"

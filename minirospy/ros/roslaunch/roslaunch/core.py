@@ -8,7 +8,7 @@ import logging
 import socket
 import uuid
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 from xml.sax.saxutils import escape
 
@@ -35,17 +35,22 @@ __all__ = [
     "RLException",
     "RosbinExecutable",
     "Test",
+    "_xml_escape",
     "add_printerrlog_handler",
     "add_printlog_handler",
     "clear_printerrlog_handlers",
     "clear_printlog_handlers",
     "generate_run_id",
     "get_master_uri_env",
+    "is_child_mode",
     "is_machine_local",
     "local_machine",
     "printerrlog",
     "printlog",
     "printlog_bold",
+    "remap_localhost_uri",
+    "rle_wrapper",
+    "set_child_mode",
     "setup_env",
 ]
 
@@ -496,3 +501,65 @@ def _clear(*, errors: bool) -> None:
     Output.handlers[:] = [
         each for each in Output.handlers if not (isinstance(each, _Handler) and each.errors == errors)
     ]
+
+
+_child_mode = [False]
+
+
+def is_child_mode() -> bool:
+    """Return whether this process runs the nodes of a launch on another machine."""
+    return _child_mode[0]
+
+
+def set_child_mode(child_mode: bool) -> None:
+    """Set the value of :func:`is_child_mode`."""
+    _child_mode[0] = child_mode
+
+
+def rle_wrapper(fn: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that calls ``fn`` and raises RLException for every exception."""
+
+    def call(*args: object) -> object:
+        try:
+            return fn(*args)
+        except Exception as error:
+            raise RLException(f"ERROR: {error}") from error
+
+    return call
+
+
+def remap_localhost_uri(uri: str, force_localhost: bool = False) -> str:
+    """Return a URI on localhost with this machine's address in place of it; others unchanged, unless ``force_localhost``."""
+    parts = urlsplit(uri)
+    if force_localhost or parts.hostname == "localhost":
+        return f"http://{Environment.read().host}:{parts.port}/"
+    return uri
+
+
+def _xml_escape(s: object) -> object:
+    """Return a string with XML's entities; other values unchanged."""
+    from xml.sax.saxutils import escape
+
+    return escape(s, {'"': "&quot;"}) if isinstance(s, str) else s
+
+
+class Executable:
+    """A command of a launch that is no node."""
+
+    def __init__(self, cmd: str, args: Sequence[str], phase: str = PHASE_RUN) -> None:
+        """``phase``: whether the command runs before, during or after the launch."""
+        self.command = cmd
+        self.args = args
+        self.phase = phase
+
+    def __repr__(self) -> str:
+        return f"{self.command} {' '.join(self.args)}"
+
+
+class RosbinExecutable(Executable):
+    """A command in the folder `bin` of ROS."""
+
+    def __repr__(self) -> str:
+        return f"ros/bin/{super().__repr__()}"
+
+    __str__ = __repr__

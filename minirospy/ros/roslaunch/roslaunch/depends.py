@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
 
 from minirospy.base.errors import MinirospyError
 from minirospy.ros.roslaunch.commands.roslaunch_deps import main as roslaunch_deps_main
-from minirospy.ros.roslaunch.launcher.depends import file_needs, missing_declarations, package_of
+from minirospy.ros.roslaunch.launcher.depends import FileNeeds, file_needs, missing_declarations, package_of
 from minirospy.ros.roslaunch.roslaunch.substitution_args import chosen_packages
 
-__all__ = ["NAME", "RoslaunchDeps", "RoslaunchDepsException", "roslaunch_deps", "roslaunch_deps_main"]
+__all__ = [
+    "NAME",
+    "RoslaunchDeps",
+    "RoslaunchDepsException",
+    "calculate_missing",
+    "fullusage",
+    "parse_launch",
+    "print_deps",
+    "rl_file_deps",
+    "roslaunch_deps",
+    "roslaunch_deps_main",
+]
 
 NAME = "roslaunch-deps"
 
@@ -61,3 +73,63 @@ def roslaunch_deps(
         raise RoslaunchDepsException(str(error)) from error
     found = {file: RoslaunchDeps(what.nodes, what.includes, what.packages) for file, what in needs.items()}
     return package_of(files[0]), found, {package: set(names) for package, names in missing.items()}
+
+
+def parse_launch(launch_file: str, file_deps: dict[str, RoslaunchDeps], verbose: bool) -> None:
+    """Add the dependencies of a launch file and of each file that it includes to ``file_deps``.
+
+    Raise RoslaunchDepsException if a file is invalid.
+    """
+    if verbose:
+        print(f"processing launch {launch_file}")
+    try:
+        needs = file_needs([launch_file], chosen_packages())
+    except MinirospyError as error:
+        raise RoslaunchDepsException(str(error)) from error
+    for file, what in needs.items():
+        if verbose and file != launch_file:
+            print(f"processing included launch {file}")
+        file_deps[file] = RoslaunchDeps(what.nodes, what.includes, what.packages)
+
+
+def rl_file_deps(file_deps: dict[str, RoslaunchDeps], launch_file: str, verbose: bool = False) -> None:
+    """Add the dependencies of a launch file, as :func:`parse_launch` does."""
+    parse_launch(launch_file, file_deps, verbose)
+
+
+def fullusage() -> None:
+    """Print the usage of `roslaunch-deps`."""
+    print(f"Usage:\n\t{NAME} [options] <file-or-package>\n")
+
+
+def print_deps(base_pkg: object, file_deps: Mapping[str, RoslaunchDeps], verbose: bool) -> None:
+    """Print the packages that launch files need, in one line; with ``verbose`` before it each program and file."""
+    if verbose:
+        for file, deps in file_deps.items():
+            for package, program in deps.nodes:
+                print(f"{package} [{package}/{program}]")
+            package_name = package_of(file)
+            if package_name is None:
+                print(f"ERROR: cannot determine package for [{package_name}]", file=sys.stderr)
+            else:
+                print(f"{package_name} [{file}]")
+        print("-" * 80)
+    print(" ".join({package for deps in file_deps.values() for package in deps.pkgs}))
+
+
+def calculate_missing(
+    base_pkg: object,
+    missing: dict[str, set[str]],
+    file_deps: Mapping[str, RoslaunchDeps],
+    use_test_depends: bool = False,
+) -> dict[str, set[str]]:
+    """Add the packages that launch files need, but their package.xml does not declare, to ``missing``; return it."""
+    for file, deps in file_deps.items():
+        package = package_of(file)
+        if package is None:
+            print(f"ERROR: cannot determine package for [{package}]", file=sys.stderr)
+            continue
+        needs = FileNeeds(tuple(deps.nodes), tuple(deps.includes), tuple(deps.pkgs))
+        found = missing_declarations({file: needs}, tests=use_test_depends)
+        missing.setdefault(package, set()).update(found.get(package, ()))
+    return missing

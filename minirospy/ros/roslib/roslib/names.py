@@ -1,7 +1,9 @@
 """roslib.names: rosgraph's functions for names, and resource names (``package/name``)."""
 
 from minirospy.ros.genmsg.genmsg.names import (
+    BASE_RESOURCE_NAME_LEGAL_CHARS_P,
     PRN_SEPARATOR,
+    RESOURCE_NAME_LEGAL_CHARS_P,
     is_legal_resource_base_name,
     is_legal_resource_name,
     package_resource_name,
@@ -11,7 +13,9 @@ from minirospy.ros.genmsg.genmsg.names import (
 )
 from minirospy.ros.rosgraph.rosgraph.names import (
     ANYTYPE,
+    BASE_NAME_LEGAL_CHARS_P,
     GLOBALNS,
+    NAME_LEGAL_CHARS_P,
     PRIV_NAME,
     REMAP,
     SEP,
@@ -32,10 +36,14 @@ from minirospy.ros.rosgraph.rosgraph.names import (
 
 __all__ = [
     "ANYTYPE",
+    "BASE_NAME_LEGAL_CHARS_P",
+    "BASE_RESOURCE_NAME_LEGAL_CHARS_P",
     "GLOBALNS",
+    "NAME_LEGAL_CHARS_P",
     "PRIV_NAME",
     "PRN_SEPARATOR",
     "REMAP",
+    "RESOURCE_NAME_LEGAL_CHARS_P",
     "SEP",
     "TYPE_SEPARATOR",
     "anonymous_name",
@@ -47,6 +55,7 @@ __all__ = [
     "is_legal_resource_base_name",
     "is_legal_resource_name",
     "is_private",
+    "isstring",
     "load_mappings",
     "make_caller_id",
     "make_global_ns",
@@ -60,3 +69,8 @@ __all__ = [
 ]
 
 TYPE_SEPARATOR = PRN_SEPARATOR
+
+
+def isstring(s: object) -> bool:
+    """Return whether a value is a str."""
+    return isinstance(s, str)

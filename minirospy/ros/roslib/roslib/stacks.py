@@ -21,9 +21,11 @@ __all__ = [
     "STACK_FILE",
     "InvalidROSStackException",
     "ROSStackException",
+    "_get_cmake_version",
     "expand_to_packages",
     "get_stack_dir",
     "get_stack_version",
+    "get_stack_version_by_dir",
     "list_stacks",
     "list_stacks_by_path",
     "stack_of",
@@ -130,3 +132,26 @@ def _packages(env: Mapping[str, str] | None) -> dict[str, str]:
     """Return the folders of all rosbuild packages."""
     folders = (folder for path in _folders(env) for folder in folders_with(MANIFEST_FILE, path))
     return {os.path.basename(folder): folder for folder in folders}
+
+
+def get_stack_version_by_dir(stack_dir: str) -> str | None:
+    """Return the version of the stack in a folder: that of its stack.xml, else that of its CMakeLists.txt, else None."""
+    from minirospy.ros.rospkg.rospkg.manifest import parse_manifest_file
+
+    if os.path.isfile(os.path.join(stack_dir, STACK_FILE)):
+        version = parse_manifest_file(stack_dir, STACK_FILE).version
+        if version:
+            return str(version)
+    path = os.path.join(stack_dir, "CMakeLists.txt")
+    if not os.path.isfile(path):
+        return None
+    with open(path, encoding="utf-8") as stream:
+        return _get_cmake_version(stream.read())
+
+
+def _get_cmake_version(text: str) -> str | None:
+    """Return the version in the `rosbuild_make_distribution` of a CMakeLists.txt; None if it has none."""
+    for line in text.split("\n"):
+        if line.strip().startswith("rosbuild_make_distribution"):
+            return line.partition("(")[2].partition(")")[0] or None
+    return None

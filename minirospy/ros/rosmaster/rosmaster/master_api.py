@@ -7,9 +7,11 @@ Source: http://wiki.ros.org/ROS/Master_API.
 from __future__ import annotations
 
 import contextlib
+import logging
 import queue
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 from xmlrpc.client import Error
 
@@ -20,12 +22,60 @@ from minirospy.core.graph.parameters import ParameterTree, ParameterUpdate
 from minirospy.core.graph.registry import NodeShutdown
 from minirospy.ros.rosmaster.rosmaster.util import xmlrpcapi
 
-__all__ = ["LOG_API", "MSG", "NUM_WORKERS", "STATUS", "VAL", "ROSMasterHandler"]
+__all__ = [
+    "LOG_API",
+    "MSG",
+    "NUM_WORKERS",
+    "STATUS",
+    "VAL",
+    "ROSMasterHandler",
+    "mloginfo",
+    "mlogwarn",
+    "publisher_update_task",
+    "service_update_task",
+]
 
 STATUS, MSG, VAL = 0, 1, 2
 NUM_WORKERS = 3
 LOG_API = False
 _CALLER_ID = "/master"
+
+
+_logger = logging.getLogger("rosmaster.master")
+
+
+def mloginfo(msg: str, *args: object) -> None:
+    """Log a message of the master."""
+    _logger.info(msg, *args)
+
+
+def mlogwarn(msg: str, *args: object) -> None:
+    """Log and print a warning of the master."""
+    _logger.warning(msg, *args)
+    print("WARN: " + (msg % args if args else str(msg)))
+
+
+def publisher_update_task(api: str, topic: str, pub_uris: Sequence[str]) -> None:
+    """Send the URIs of a topic's publishers to the node at ``api``. Raise OSError if it does not respond."""
+    node: Any = xmlrpcapi(api)
+    call = f"publisherUpdate[{topic}] -> {api} {pub_uris}"
+    mloginfo(call)
+    start = time.time()
+    result = "exception"
+    try:
+        result = f"result={node.publisherUpdate(_CALLER_ID, topic, pub_uris)}"
+    except Exception as error:
+        result = f"exception={error}"
+        raise
+    finally:
+        mloginfo("%s: sec=%0.2f, %s", call, time.time() - start, result)
+
+
+def service_update_task(api: str, service: str, uri: str) -> None:
+    """Send a service's URI to the node at ``api``. Raise OSError if it does not respond."""
+    node: Any = xmlrpcapi(api)
+    mloginfo("serviceUpdate[%s, %s] -> %s", service, uri, api)
+    node.serviceUpdate(_CALLER_ID, service, uri)
 
 
 class _Api(MasterApi):
@@ -69,15 +119,6 @@ class ROSMasterHandler:
         self._lock = threading.Lock()
         threading.Thread(target=self._notify, name="rosmaster", daemon=True).start()
 
-    def __getattr__(self, name: str) -> Callable[..., tuple[int, str, object]]:
-        # Provide one method for each call in the table.
-        if name.startswith("_") or name not in self._api.dispatcher.methods:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        return lambda *args: self._call(name, args)
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._api.dispatcher.methods]
-
     def _ready(self, uri: str) -> None:
         self.uri = self._api.where = uri
 
@@ -115,6 +156,21 @@ class ROSMasterHandler:
             with self._lock:
                 publishers = self._api.registry.publisher_uris(notice.topic)
             node.publisherUpdate(_CALLER_ID, notice.topic, publishers)
+
+
+def _method(name: str) -> Callable[..., tuple[int, str, object]]:
+    """Return the method of ROSMasterHandler for a call of the Master API."""
+
+    def call(*args: Any, **kwds: object) -> tuple[int, str, object]:
+        handler, *rest = args
+        return cast("ROSMasterHandler", handler)._call(name, tuple(rest))
+
+    call.__name__ = name
+    return call
+
+
+for _name in _Api().dispatcher.methods:
+    setattr(ROSMasterHandler, _name, _method(_name))
 
 
 def _value(tree: ParameterTree, key: str) -> object:

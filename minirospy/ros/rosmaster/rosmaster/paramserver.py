@@ -6,10 +6,18 @@ Keys are global names. A notify task is called with a list that has an entry ([(
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
+from minirospy.base.names import canonicalize
 from minirospy.core.graph.parameters import ParameterTree, ParameterUpdate
 
-__all__ = ["GLOBALNS", "SEP", "ParamDictionary"]
+__all__ = [
+    "GLOBALNS",
+    "SEP",
+    "ParamDictionary",
+    "_compute_all_keys",
+    "compute_param_updates",
+]
 
 GLOBALNS = SEP = "/"
 
@@ -85,3 +93,45 @@ class ParamDictionary:
         ]
         if found and notify_task:
             notify_task(found)
+
+
+def compute_param_updates(
+    subscribers: Any, param_key: str, param_value: object, caller_id_to_ignore: str | None = None
+) -> list[tuple[list[tuple[str, str]], str, object]]:
+    """Return ([(node, API)], key, value) for each subscribed key that setting ``param_key`` changes.
+
+    ``subscribers``: subscribed key -> [(node, API)], with ``iterkeys()`` as rosmaster's tables, or a dictionary.
+    """
+    if not subscribers:
+        return []
+    if param_key != SEP:
+        param_key = canonicalize(param_key) + SEP
+    keys = _compute_all_keys(param_key, param_value) if isinstance(param_value, dict) else None
+    updates: list[tuple[list[tuple[str, str]], str, object]] = []
+    for subscribed in subscribers.iterkeys() if hasattr(subscribers, "iterkeys") else subscribers:
+        namespace = subscribed if subscribed.endswith(SEP) else subscribed + SEP
+        if param_key.startswith(namespace):
+            nodes = [each for each in subscribers[subscribed] if each[0] != caller_id_to_ignore]
+            updates.append((nodes, param_key, param_value))
+        elif keys is not None and namespace.startswith(param_key) and subscribed not in keys:
+            updates.append((subscribers[subscribed], subscribed, {}))  # it was deleted
+    for key in keys or ():
+        if key in subscribers:
+            value: Any = param_value
+            for name in filter(None, key[len(param_key) :].split(SEP)):
+                value = value[name]
+            updates.append((subscribers[key], key, value))
+    return updates
+
+
+def _compute_all_keys(
+    param_key: str, param_value: dict[str, Any], all_keys: list[str] | None = None
+) -> list[str]:
+    """Return the keys, each with a slash at its end, of a dictionary's values and namespaces below ``param_key``."""
+    found = [] if all_keys is None else all_keys
+    for name, value in param_value.items():
+        key = f"{param_key.rstrip(SEP)}{SEP}{name}{SEP}"
+        found.append(key)
+        if isinstance(value, dict):
+            _compute_all_keys(key, value, found)
+    return found

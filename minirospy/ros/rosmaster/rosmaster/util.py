@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import errno
+import socket
 import threading
+from typing import Any
 from urllib.parse import urlparse
 from xmlrpc.client import ServerProxy
 
-__all__ = ["remove_server_proxy", "xmlrpcapi"]
+__all__ = [
+    "close_half_closed_sockets",
+    "remove_server_proxy",
+    "xmlrpcapi",
+]
+
+_CLOSE_WAIT = 8  # Linux: the other end has closed the connection
 
 
 class _Proxies(threading.local):
@@ -29,3 +38,22 @@ def xmlrpcapi(uri: str | None) -> ServerProxy | None:
 def remove_server_proxy(uri: str) -> None:
     """Remove the proxy for a URI; call this when its server has exited."""
     _PROXIES.by_uri.pop(uri, None)
+
+
+def close_half_closed_sockets() -> None:
+    """Close the connections of this thread's proxies whose servers have closed them."""
+    if not hasattr(socket, "TCP_INFO"):
+        return
+    for proxy in _PROXIES.by_uri.values():
+        transport: Any = proxy("transport")
+        connection = transport._connection and transport._connection[1]
+        if connection is None or connection.sock is None:
+            continue
+        try:
+            state = connection.sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO)
+        except OSError as error:
+            if error.errno == errno.ENOPROTOOPT:
+                return
+            raise
+        if state == _CLOSE_WAIT:
+            transport.close()

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "createXMLRunner",
+    "getErrors",
     "printRostestSummary",
     "printSummary",
     "printlog",
@@ -57,3 +58,7 @@ def printlogerr(msg: str, *args: object) -> None:
 def printRostestSummary(result: unittest.TestResult, rostest_results: Result) -> None:
     """Print a run's summary: the runner's result, and the results that the test nodes reported."""
     print_runner_summary(result, rostest_results, "ROSTEST")
+
+
+def getErrors() -> None:
+    """Return None: the errors are in `rostest.runner.getResults()`."""

@@ -16,6 +16,7 @@ from minirospy.base import private_files
 from minirospy.base.xml_text import XmlError, check_xml
 
 __all__ = [
+    "NOT_IN_XML",
     "Result",
     "TestCaseResult",
     "TestError",
@@ -34,7 +35,7 @@ __all__ = [
 ]
 
 _WIDTH = 80
-_NOT_IN_XML = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+NOT_IN_XML = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _RED, _GREEN = "1;31", "32"
 
 
@@ -313,7 +314,7 @@ def print_summary(junit_results: Result, runner_name: str = "ROSUNIT") -> None:
 
 def filter_nonprintable_text(text: str) -> str:
     """Return a string in which characters that XML does not allow are written as ``&#x001B;``."""
-    return _NOT_IN_XML.sub(lambda match: f"&#x{ord(match[0]):04X};", text)
+    return NOT_IN_XML.sub(lambda match: f"&#x{ord(match[0]):04X};", text)
 
 
 def failure_junit_xml(
