@@ -111,18 +111,17 @@ class TestEcho:
         assert "- Translation: [0.5, 0.0, 0.0]\n- Rotation: in Quaternion [0.0, 0.0, 0.0, 1.0]\n" in read
 
     def test_echo_of_tf2_tools_ends_after_its_limit(self, start: Start) -> None:
+        """Frames without a connection do not end it. Both programs run meanwhile, for ten seconds."""
+        start(*STATIC, *words("0 0 0 0 0 0 p q"), "__name:=other")
+        wait_for("q")
         program = start("tf2_tools", "echo.py", *words("a c -r 1 -l 10 -p 3"))
+        apart = start("tf2_tools", "echo.py", *words("a q -r 1 -l 10"), "__name:=apart")
         output, errors = program.communicate(timeout=SECONDS)
         assert program.returncode == 0
         assert POSE in output
         assert "Traceback" not in errors
-
-    def test_frames_without_a_connection_do_not_end_it(self, start: Start) -> None:
-        start(*STATIC, *words("0 0 0 0 0 0 p q"), "__name:=other")
-        wait_for("q")
-        program = start("tf2_tools", "echo.py", *words("a q -r 1 -l 10"))
-        _, errors = program.communicate(timeout=SECONDS)
-        assert program.returncode == 0
+        _, errors = apart.communicate(timeout=SECONDS)
+        assert apart.returncode == 0
         assert "not part of the same tree" in errors
         assert "Traceback" not in errors
 
