@@ -162,6 +162,8 @@ def find_mutants(module: str, tree: ast.Module) -> Iterator[Mutant]:
         if id(node) in skipped:
             continue
         skipped |= {id(each) for part in _untested(node) for each in ast.walk(part)}
+        if id(node) in skipped:
+            continue
         for what, apply in _faults(node):
             line: int = getattr(node, "lineno", 0)
             yield Mutant(module, number, line, what, apply)
@@ -178,6 +180,8 @@ def _untested(node: ast.AST) -> Iterator[ast.AST]:
             yield node
         case ast.Call(func=ast.Name(id="getattr"), args=[ast.Name(id="os"), *_]):
             # Skip code for some systems only.
+            yield node
+        case ast.Call(func=ast.Name(id="TypeVar")):
             yield node
         case ast.Expr(value=ast.Constant()) | ast.ImportFrom() | ast.Import():
             yield node
@@ -494,8 +498,8 @@ class Mutants:
                 for index in indexes
             }
             # A test of a documented limit executes no line of the module.
-            test_file = "test_" + mutant.module.rpartition(".")[2]
-            found |= {index for index, item in enumerate(session.items) if item.path.stem == test_file}
+            tested = "_" + mutant.module.rpartition(".")[2]
+            found |= {index for index, item in enumerate(session.items) if item.path.stem.endswith(tested)}
         else:
             first, last = _span(statement)
             if isinstance(statement, ast.If | ast.While | ast.For | ast.With | ast.Try | ast.Match):

@@ -70,7 +70,7 @@ def width_of(text: str) -> int:
         return 1
     if len(text) == 1:
         # Do not use the size of a single-character string, because Python 3.12 and later also store its UTF-8 copy.
-        return 1 if text <= "\xff" else 2 if text <= "\uffff" else 4
+        return 1 if ord(text) <= 0xFF else 2 if ord(text) <= 0xFFFF else 4
     # In other strings, such a copy can only make this value too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
     return found if found <= 2 else 4

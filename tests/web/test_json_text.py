@@ -14,6 +14,9 @@ from hypothesis import strategies as st
 
 from minirospy.web import json_text
 from minirospy.web.json_text import (
+    MAX_QUICK_CHARACTERS,
+    MAX_QUICK_STRINGS,
+    MAX_QUICK_VALUES,
     dump_json,
     dump_json_in_pieces,
     is_quick_text,
@@ -103,6 +106,33 @@ def test_one_call_of_the_library_parses_a_piece_at_most(monkeypatch: pytest.Monk
     assert max(lengths) <= 8 + 2
 
 
+@pytest.mark.parametrize(
+    ("text", "calls"),
+    [
+        ("[1,2]", ["[1,2]"]),
+        ("[1,2,3,4,5,6]", ["[1,2,3,4]", "[5,6]"]),
+        ("[1,2,[3,4],5]", ["[1,2]", "[3,4]", "[5]"]),
+        ('[1,"a",2,3]', ["[1]", "[2,3]"]),
+        ("[123456789,1,2,3,4,5,6]", ["[1,2,3,4]", "[5,6]"]),
+        ("[[]]", []),
+    ],
+)
+def test_library_parses_the_numbers_between_other_values(
+    text: str, calls: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A piece has eight characters and ends after a comma; a longer number is parsed by itself."""
+    found: list[str] = []
+    loads = json.loads
+
+    def noting(part: str) -> Any:
+        found.append(part)
+        return loads(part)
+
+    monkeypatch.setattr(json, "loads", noting)
+    assert load_json_in_pieces(text) == loads(text)
+    assert found == calls
+
+
 def test_too_many_values_are_refused() -> None:
     for load in (load_json, load_json_in_pieces):
         with pytest.raises(ValueError, match="more than 1000000 values"):
@@ -121,6 +151,15 @@ def test_large_texts_of_few_values_are_quick() -> None:
     assert not is_quick_text('{"data": "' + "A" * 5_000_000 + '"}')
 
 
+@pytest.mark.parametrize("mark", [",", "[", "{"])
+def test_limits_of_quick_texts_are_exact(mark: str) -> None:
+    assert is_quick_text(mark * MAX_QUICK_CHARACTERS)
+    assert not is_quick_text(mark * (MAX_QUICK_CHARACTERS + 1))
+    assert is_quick_text((mark * MAX_QUICK_VALUES).ljust(MAX_QUICK_STRINGS, "X"))
+    assert not is_quick_text((mark * (MAX_QUICK_VALUES + 1)).ljust(MAX_QUICK_STRINGS, "X"))
+    assert not is_quick_text("X" * (MAX_QUICK_STRINGS + 1))
+
+
 WIDE = "\U0001f600"
 
 
@@ -135,8 +174,10 @@ def slow_width(text: str) -> int:
 @example("a", 1000)
 @example("\x80", 1)
 @example("\xff", 1)
+@example("\xff", 2)
 @example("\u0100", 1)
 @example("\uffff", 1)
+@example("\uffff", 2)
 @example("\U00010000", 1)
 @example("\xff", 99)
 @example("\xff", 100)
@@ -179,6 +220,16 @@ def test_strings_are_limited() -> None:
     assert load_json(f'{text},""]') == [0] + [""] * 2_000_000
     with pytest.raises(ValueError, match="more than 2000000 strings"):
         load_json(f'{text},{{"":""}}]')
+
+
+def test_only_marks_count_as_values() -> None:
+    text = '"' + "X" * 100 + '"'
+    assert load_json(text, max_values=10, max_collections=10) == "X" * 100
+
+
+def test_short_text_may_have_too_many_strings() -> None:
+    with pytest.raises(ValueError, match="more than 2000000 strings"):
+        load_json('"' * 4_000_001)
 
 
 def test_lists_and_objects_count_together() -> None:
@@ -232,6 +283,67 @@ def test_large_value_becomes_a_text_in_pieces(value: object, monkeypatch: pytest
     # The piece has 65,536 characters, each of which may become a pair of escapes.
     assert longest <= 12 * 65_536
     assert len(expected) < 13 * 65_536 or longest < len(expected) / 2
+
+
+@pytest.mark.parametrize(
+    ("value", "pieces"),
+    [
+        ([1] * 10, ["[", ",".join("1" * 10), "]"]),
+        ([1] * 21, ["[", ",".join("1" * 10), "," + ",".join("1" * 10), ",1", "]"]),
+        ("x" * 40, [f'"{"x" * 40}"']),
+        ("x" * 41, ['"', "x" * 40, "x", '"']),
+        ({}, ["{}"]),
+        ({"a": 1, "b": []}, ['{"a":', "1", ',"b":', "[", "]", "}"]),
+        # Each string counts as one value, plus one for every four characters.
+        ([""] * 10, ["[", ",".join(['""'] * 10), "]"]),
+        (["abc"] * 21, ["[", ",".join(['"abc"'] * 10), "," + ",".join(['"abc"'] * 10), ',"abc"', "]"]),
+        (["abcd"] * 6, ["[", ",".join(['"abcd"'] * 5), ',"abcd"', "]"]),
+        (["x" * 39], ["[", f'"{"x" * 39}"', "]"]),
+        (["x" * 40], ["[", "", f'"{"x" * 40}"', "]"]),
+        (["", "x" * 40, ""], ["[", '""', ",", f'"{"x" * 40}"', ',""', "]"]),
+        (["x" * 40, "", "x" * 40], ["[", "", f'"{"x" * 40}"', ',""', ",", f'"{"x" * 40}"', "]"]),
+        (["", *[1] * 10], ["[", '"",' + ",".join("1" * 9), ",1", "]"]),
+        # Each list or dictionary counts as one value, plus one for each element, plus the strings and lists in it.
+        ([[]] * 11, ["[", ",".join(["[]"] * 10), ",[]", "]"]),
+        ([[1]] * 6, ["[", ",".join(["[1]"] * 5), ",[1]", "]"]),
+        ([{"a": 1}] * 6, ["[", ",".join(['{"a":1}'] * 5), ',{"a":1}', "]"]),
+        ([[1] * 9], ["[", f"[{','.join('1' * 9)}]", "]"]),
+        ([[1] * 10], ["[", "", "[", ",".join("1" * 10), "]", "]"]),
+        ([["x" * 39]], ["[", "", "[", f'"{"x" * 39}"', "]", "]"]),
+        ([["x" * 28]], ["[", f'["{"x" * 28}"]', "]"]),
+        ([[""] * 4], ["[", '["","","",""]', "]"]),
+        ([[""] * 5], ["[", "", "[", '"","","","",""', "]", "]"]),
+        ([{"a": [1] * 7}], ["[", '{"a":[1,1,1,1,1,1,1]}', "]"]),
+        ([{"a": [1] * 8}], ["[", "", '{"a":', "[", ",".join("1" * 8), "]", "}", "]"]),
+    ],
+)
+def test_pieces_are_as_large_as_allowed(
+    value: object, pieces: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(json_text, "_PIECE_VALUES", 10)
+    monkeypatch.setattr(json_text, "_PIECE_CHARACTERS", 40)
+    assert list(json_text._pieces(value)) == pieces
+    assert "".join(pieces) == dump_json(value)
+
+
+def test_size_of_a_large_value_is_not_counted_to_the_end() -> None:
+    counted = 0
+
+    class Element(str):
+        __slots__ = ()
+
+        def __len__(self) -> int:
+            nonlocal counted
+            counted += 1
+            return super().__len__()
+
+    values: list[object] = [Element() for _ in range(2000)]
+    assert json_text._size(values) > 1000
+    assert counted == 0
+    assert json_text._size(values[:500]) == 1001
+    assert counted == 500
+    assert json_text._size(values[:800]) == 1001
+    assert counted == 700
 
 
 def test_values_that_are_no_json_are_refused_in_pieces_too() -> None:

@@ -136,9 +136,10 @@ def test_cleared_queue_holds_nothing() -> None:
     queue.put_answer((b"123",))
     queue.clear()
     assert (len(queue), queue.size, queue.answers, queue.dropped) == (0, 0, 0, 0)
-    queue.put("a", (b"12",))
+    queue.put("a", (b"12",), newest_only=True)
     assert queue.pop() == (b"12",)
     assert queue.pop() is None
+    assert queue.dropped == 0
 
 
 def test_limits_are_those_that_are_documented() -> None:
@@ -153,6 +154,9 @@ def test_messages_may_fill_the_bound_exactly() -> None:
     queue.put("b", (b"789",))
     assert (queue.size, queue.dropped) == (10, 1)
     assert drained(queue) == [b"123", b"789"]
+    for data in (b"123", b"456"):
+        queue.put("a", (data,))
+    assert drained(queue) == [b"123", b"456"]
 
 
 def test_piece_is_large_from_exactly_that_size() -> None:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import logging
+
 import pytest
 from websockets.exceptions import NegotiationError
 from websockets.frames import Opcode
 
 from minirospy.web.access import Refusal
-from minirospy.web.server.account import Account
+from minirospy.web.server.account import LARGE_PIECE, Account
 from minirospy.web.server.jobs import Jobs
 from minirospy.web.server.liveness import Liveness, Verdict
 from minirospy.web.server.pipe import Endpoints
 from minirospy.web.server.request import RequestHead, read_head, refusal_response
-from minirospy.web.server.websocket import Message, Ping, WebSocket
+from minirospy.web.server.websocket import FrameRate, Message, Ping, WebSocket
 
 HANDSHAKE = (
     b"GET /a%20b?token=x&id=1&id=2 HTTP/1.1\r\nHost: localhost\r\nUpgrade: WebSocket\r\nConnection: Upgrade\r\n"
@@ -68,6 +70,15 @@ def test_request_that_arrives_in_parts_is_read_when_it_is_complete() -> None:
     assert (parsed.peer_port, parsed.address, parsed.port) == (5, "6.7.8.9", 10)
 
 
+def test_requests_and_frames_are_not_logged(caplog: pytest.LogCaptureFixture) -> None:
+    """A request contains a token."""
+    caplog.set_level(logging.DEBUG)
+    websocket = opened()
+    assert events(websocket, frame(1, b"a")) == [Message(True, b"a")]
+    assert not websocket._frames.debug
+    assert not caplog.records
+
+
 def test_bytes_that_are_no_request_raise_value_error() -> None:
     websocket = WebSocket(lambda _: None, 1000, 100)
     websocket.feed(b"SSH-2.0\r\n\r\n")
@@ -93,6 +104,8 @@ def test_messages_are_joined_from_their_fragments_around_pings() -> None:
     assert events(websocket, frame(1, b"a", is_final=False)) == []
     assert websocket.unfinished == 1
     assert events(websocket, frame(9, b"p") + frame(0, b"b", is_final=False)) == [Ping(b"p")]
+    # The connection responds to pings, not the library.
+    assert websocket.data_to_send() == ()
     assert events(websocket, frame(0, b"c") + frame(2, b"d") + frame(10, b"")) == [
         Message(True, b"abc"),
         Message(False, b"d"),
@@ -113,6 +126,18 @@ def test_frames_are_counted_in_each_second() -> None:
     assert rate.seconds_left(10.75) == 0.25
     rate.update(11.0)
     assert not rate.is_used_up
+
+
+def test_first_second_allows_all_frames() -> None:
+    rate = FrameRate(1)
+    assert not rate.is_used_up
+    assert rate.seconds_left(0.25) == 0.75
+
+
+def test_ping_is_a_frame_with_its_data() -> None:
+    websocket = opened()
+    websocket.ping(b"abc")
+    assert websocket.data_to_send() == (bytes((0x80 | Opcode.PING, 3)) + b"abc",)
 
 
 def test_message_over_the_limit_closes_the_websocket() -> None:
@@ -175,12 +200,17 @@ def test_client_is_pinged_then_disconnected_if_it_does_not_answer() -> None:
     assert liveness.check(1061.0, 0.0, is_full=False) is Verdict.PING
     assert liveness.check(1061.0, 0.0, is_full=False) is Verdict.PING
     assert liveness.check(1061.1, 0.0, is_full=False) is Verdict.SILENT
+    # All pings have been answered before the machine is suspended.
+    liveness.heard(1062.0)
+    assert liveness.check(2000.0, 0.0, is_full=False) is Verdict.PING
 
 
 def test_client_that_reads_nothing_is_not_pinged_and_then_disconnected() -> None:
     liveness = Liveness(60.0, 0.0)
     assert liveness.check(60.0, 0.0, is_full=True) is Verdict.WAIT
     assert liveness.check(60.1, 0.0, is_full=True) is Verdict.STUCK
+    assert liveness.check(100.0, 40.0, is_full=True) is Verdict.WAIT
+    assert liveness.check(100.1, 40.0, is_full=True) is Verdict.STUCK
     assert liveness.check(60.1, 0.0, is_full=False) is Verdict.PING
 
 
@@ -200,6 +230,20 @@ def test_oldest_work_is_dropped_beyond_the_bounds() -> None:
     assert jobs.clear() == 1000
     assert not jobs
     assert jobs.size == account.total == 0
+
+
+def test_messages_may_fill_the_bound_exactly() -> None:
+    jobs = Jobs(1000, Account().open("a", lambda: None))
+    assert [jobs.add(lambda: None, bytes(500)) for _ in range(3)] == [0, 0, 1]
+
+
+def test_message_is_large_from_exactly_that_size() -> None:
+    account = Account()
+    jobs = Jobs(10_000_000, account.open("a", lambda: None))
+    jobs.add(lambda: None, bytes(LARGE_PIECE))
+    assert (jobs.size, account.total) == (500, LARGE_PIECE)
+    jobs.add(lambda: None, bytes(LARGE_PIECE - 1))
+    assert (jobs.size, account.total) == (1000 + LARGE_PIECE - 1, LARGE_PIECE)
 
 
 def test_large_message_that_waits_for_the_turns_of_several_clients_counts_once() -> None:

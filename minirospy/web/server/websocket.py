@@ -180,8 +180,6 @@ def _select(
     return select(names)  # type: ignore[return-value]
 
 
-_QUIET = logging.getLogger("minirospy.web.websockets")
-# The library logs each frame at DEBUG, and logs headers, which contain tokens.
-_QUIET.addHandler(logging.NullHandler())
-_QUIET.propagate = False
-_QUIET.setLevel(logging.CRITICAL)
+# The library logs each frame at DEBUG, and logs headers, which contain tokens. This logger is not in the hierarchy of
+# loggers, so that no configuration of them can show its messages, which are all below CRITICAL.
+_QUIET = logging.Logger(__name__, logging.CRITICAL)
