@@ -51,7 +51,7 @@ LEAVES = {
 """Parts that can be deleted, with their paths. Nothing outside a part imports it, except for functions in `cli/` that run it."""
 LEAF_PATHS = sorted(path for paths in LEAVES.values() for path in paths)
 SYSTEM_PACKAGES = {"catkin", "catkin_pkg", "python_orocos_kdl", "rospkg"}
-"""Real ROS has these from the system or for each package: a package.xml uses rosdep's name, or none."""
+"""In real ROS, these come from the system or with each package, so a package.xml has rosdep's name for them, or none."""
 UNNAMED = {
     ("camera_info_manager_py", "camera_calibration_parsers"): "both read the files of cameras' calibrations",
     ("catkin", "rosunit"): "run_tests runs the tests of all kinds",

@@ -1,4 +1,4 @@
-"""Submodules that ROS's packages import with themselves: here each is imported when a program first uses it."""
+"""Submodules and other names that ROS's modules import for themselves: here each is imported when a program first uses it."""
 
 from __future__ import annotations
 

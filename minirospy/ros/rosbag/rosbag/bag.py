@@ -196,7 +196,7 @@ class Bag(OpenedBag):
             with as_ros_errors():
                 opening[mode](f, allow_unindexed)
             self._create_reader()
-            # minirospy reads the index on demand, but a program's subclass may read it now, to show the progress.
+            # minirospy reads the index on demand, but a program's subclass may read it now to show the progress.
             if mode == "r" and not self._skip_index and isinstance(self._reader, _BagReader200):
                 self._reader.prepare()
             self._connection_indexes_read = not self._skip_index

@@ -39,7 +39,7 @@ class OpenedBag(PrivateBag):
         """The file's reader. It is not named ``_reader``, because programs may replace the attribute of that name."""
         self._writer: BagWriter | None = None
         self._file_header_pos = FIRST_RECORD
-        self._is_read = False  # whether a read may have moved the file's position since the last write
+        self._is_read = False  # set if a read may have moved the file's position since the last write
 
     @property
     def _index_data_pos(self) -> int:

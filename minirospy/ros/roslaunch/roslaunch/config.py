@@ -73,18 +73,14 @@ class ROSLaunchConfig:
             printlog(f"Added {kind} of type [{node.package}/{node.type}] in namespace [{node.namespace}]")
         (self.nodes_core if core else self.nodes).append(node)
 
-    def add_executable(self, exe: object) -> None:
-        """Add a command that runs with the launch. Raise ValueError if it is None."""
-        if not exe:
-            raise ValueError("exe is None")
-        self.executables.append(exe)
-
     def add_test(self, test: Test, verbose: bool = True) -> None:
         """Add a test."""
         self.tests.append(test)
 
     def add_executable(self, exe: Executable) -> None:
-        """Add a command. Of a program's own, only `rosparam delete` and `rosparam dump` run."""
+        """Add a command. Of a program's own, only `rosparam delete` and `rosparam dump` run. Raise ValueError if it is None."""
+        if not exe:
+            raise ValueError("exe is None")
         self.executables.append(exe)
 
     def add_roslaunch_file(self, f: str) -> None:

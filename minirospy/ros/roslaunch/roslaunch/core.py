@@ -541,25 +541,3 @@ def _xml_escape(s: object) -> object:
     from xml.sax.saxutils import escape
 
     return escape(s, {'"': "&quot;"}) if isinstance(s, str) else s
-
-
-class Executable:
-    """A command of a launch that is no node."""
-
-    def __init__(self, cmd: str, args: Sequence[str], phase: str = PHASE_RUN) -> None:
-        """``phase``: whether the command runs before, during or after the launch."""
-        self.command = cmd
-        self.args = args
-        self.phase = phase
-
-    def __repr__(self) -> str:
-        return f"{self.command} {' '.join(self.args)}"
-
-
-class RosbinExecutable(Executable):
-    """A command in the folder `bin` of ROS."""
-
-    def __repr__(self) -> str:
-        return f"ros/bin/{super().__repr__()}"
-
-    __str__ = __repr__

@@ -194,7 +194,7 @@ class DeadProcess(Process):
 
 
 class LaunchedProcess(Process):
-    """A node's process: running, or created by create_node_process() and not started yet."""
+    """A node's process, which is either running, or created by create_node_process() and not started yet."""
 
     def __init__(self, launcher: ApiLauncher, node: NodeSpec, name: str) -> None:
         # As properties, `args`, `env`, `spawn_count` and `exit_code` follow the process: do not set them.
@@ -319,7 +319,7 @@ class ProcessMonitor:
         self._launcher = launcher or ApiLauncher(LaunchSpec(), Environment.read())
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
-        self.is_watching = False  # whether watch() was called
+        self.is_watching = False  # set once watch() has been called
         if launcher is not None:
             self._living.add(self)
 
@@ -598,7 +598,7 @@ def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
 
 
 def create_node_process(run_id: str | None, node: Node, master_uri: str) -> LaunchedProcess:
-    """Return a process for a node, not started yet. Raise NodeParamsException if the node has no program."""
+    """Return a process for a node; it is not started yet. Raise NodeParamsException if the node has no program."""
     node.give_name()
     launcher = ApiLauncher(
         LaunchSpec(), Environment.read()._replace(master_uri=master_uri), run_id=run_id or ""
