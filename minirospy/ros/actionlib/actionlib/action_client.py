@@ -3,15 +3,13 @@
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 from std_msgs.msg import Header
 
-from minirospy.ros.actionlib.actionlib import (
+from minirospy.ros.actionlib.actionlib.client import ActionClient
+from minirospy.ros.actionlib.actionlib.machine import ClientGoalHandle, CommStateMachine, GoalManager
+from minirospy.ros.actionlib.actionlib.spec import ActionException
+from minirospy.ros.actionlib.actionlib.states import (
     INVALID_TRANSITION,
     NO_TRANSITION,
-    ActionClient,
-    ActionException,
-    ClientGoalHandle,
     CommState,
-    CommStateMachine,
-    GoalManager,
     TerminalState,
     g_goal_id,
     get_name_of_constant,

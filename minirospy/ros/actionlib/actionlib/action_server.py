@@ -2,15 +2,10 @@
 
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
-from minirospy.ros.actionlib.actionlib import (
-    ActionException,
-    ActionServer,
-    GoalIDGenerator,
-    HandleTrackerDeleter,
-    ServerGoalHandle,
-    StatusTracker,
-    nop_cb,
-)
+from minirospy.ros.actionlib.actionlib.goal_id import GoalIDGenerator
+from minirospy.ros.actionlib.actionlib.handle import HandleTrackerDeleter, ServerGoalHandle, StatusTracker
+from minirospy.ros.actionlib.actionlib.server import ActionServer, nop_cb
+from minirospy.ros.actionlib.actionlib.spec import ActionException
 
 __all__ = [
     "ActionException",

@@ -1,5 +1,5 @@
 """The names of actionlib.exceptions."""
 
-from minirospy.ros.actionlib.actionlib import ActionException
+from minirospy.ros.actionlib.actionlib.spec import ActionException
 
 __all__ = ["ActionException"]

@@ -1,5 +1,5 @@
 """The names of actionlib.goal_id_generator."""
 
-from minirospy.ros.actionlib.actionlib import GoalIDGenerator
+from minirospy.ros.actionlib.actionlib.goal_id import GoalIDGenerator
 
 __all__ = ["GoalIDGenerator"]

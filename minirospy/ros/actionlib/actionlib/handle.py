@@ -5,7 +5,7 @@ The transitions are a table in `minirospy.core.graph.goals`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from actionlib_msgs.msg import GoalID, GoalStatus
 
@@ -16,8 +16,9 @@ from minirospy.ros.actionlib.actionlib.goal_id import GoalIDGenerator
 from minirospy.ros.actionlib.actionlib.statuses import status_bytes
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from minirospy.core.idl.protocols import ActionGoal, Message
-    from minirospy.ros.actionlib.actionlib.server import ActionServer
 
 __all__ = ["HandleTrackerDeleter", "ServerGoalHandle", "StatusTracker"]
 
@@ -80,10 +81,25 @@ class StatusTracker:
         return self._bytes
 
 
+class _Server(Protocol):
+    """The action server, as the handles of its goals use it."""
+
+    ActionResultType: type[Message]
+
+    @property
+    def lock(self) -> AbstractContextManager[object]: ...
+
+    def publish_status(self) -> None: ...
+
+    def publish_feedback(self, status: GoalStatus, feedback: Message) -> None: ...
+
+    def publish_result(self, status: GoalStatus, result: Message | None) -> None: ...
+
+
 class HandleTrackerDeleter:
     """Marks a goal as ended when its last handle is deleted."""
 
-    def __init__(self, action_server: ActionServer, status_tracker: StatusTracker) -> None:
+    def __init__(self, action_server: _Server, status_tracker: StatusTracker) -> None:
         self.action_server = action_server
         self.status_tracker: StatusTracker | None = status_tracker
 
@@ -99,7 +115,7 @@ class ServerGoalHandle:
     def __init__(
         self,
         status_tracker: StatusTracker | None = None,
-        action_server: ActionServer | None = None,
+        action_server: _Server | None = None,
         handle_tracker: HandleTrackerDeleter | None = None,
     ) -> None:
         self.status_tracker = status_tracker

@@ -1,5 +1,5 @@
 """The names of actionlib.handle_tracker_deleter."""
 
-from minirospy.ros.actionlib.actionlib import HandleTrackerDeleter
+from minirospy.ros.actionlib.actionlib.handle import HandleTrackerDeleter
 
 __all__ = ["HandleTrackerDeleter"]

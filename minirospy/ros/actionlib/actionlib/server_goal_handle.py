@@ -1,5 +1,5 @@
 """The names of actionlib.server_goal_handle."""
 
-from minirospy.ros.actionlib.actionlib import ServerGoalHandle
+from minirospy.ros.actionlib.actionlib.handle import ServerGoalHandle
 
 __all__ = ["ServerGoalHandle"]

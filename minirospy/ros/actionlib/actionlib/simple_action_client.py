@@ -2,13 +2,9 @@
 
 from actionlib_msgs.msg import GoalStatus
 
-from minirospy.ros.actionlib.actionlib import (
-    ActionClient,
-    CommState,
-    SimpleActionClient,
-    SimpleGoalState,
-    get_name_of_constant,
-)
+from minirospy.ros.actionlib.actionlib.client import ActionClient
+from minirospy.ros.actionlib.actionlib.simple_client import SimpleActionClient
+from minirospy.ros.actionlib.actionlib.states import CommState, SimpleGoalState, get_name_of_constant
 
 __all__ = [
     "ActionClient",

@@ -18,7 +18,6 @@ from typing import TypeAlias
 from minirospy.base import names
 from minirospy.ros.catkin.catkin.find_in_workspaces import find_in_workspaces
 from minirospy.ros.roslaunch.launcher.substitution import convert
-from minirospy.ros.roslaunch.roslaunch.loader import convert_value
 from minirospy.ros.rospkg.rospkg.rospack import RosPack
 from minirospy.workspace.packages import Packages
 
@@ -327,3 +326,11 @@ def _eval(s: str, context: Context) -> str:
     if "__" in s:
         raise SubstitutionException("$(eval ...) may not contain double underscore expressions")
     return str(eval(s, {}, _DictWrapper(args, functions)))  # type: ignore[arg-type]
+
+
+def convert_value(value: str, type_: str) -> object:
+    """Convert a parameter's text to ``type_``: str, int, double, bool, yaml, or auto.
+
+    Raise ValueError if the type is unknown or the text does not match it.
+    """
+    return convert(value, type_)
