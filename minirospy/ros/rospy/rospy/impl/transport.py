@@ -9,9 +9,9 @@ DEFAULT_BUFF_SIZE = 65536
 
 
 def __getattr__(name: str) -> object:
-    # Programs use these names in annotations. Import them on use, because their module imports asyncio.
-    if name in ("Transport", "DeadTransport"):
-        from minirospy.runtime.transport.links import OutLink
+    # Few programs use these classes. Imported on use, so that `import rospy` need not import their module.
+    if name in ("DeadTransport", "ProtocolHandler", "Transport"):
+        from minirospy.client import tcpros
 
-        return OutLink
+        return getattr(tcpros, name)
     raise AttributeError(f"module 'rospy.impl.transport' has no attribute {name!r}")
