@@ -8,9 +8,16 @@ DEFAULT_BUFF_SIZE = 65536
 """The default value for Subscriber's ``buff_size``."""
 
 
+# classes that are imported on use: few programs use them, and `import rospy` need not import their module
+_CLASSES = ("DeadTransport", "ProtocolHandler", "Transport")
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, *_CLASSES])
+
+
 def __getattr__(name: str) -> object:
-    # Few programs use these classes. Imported on use, so that `import rospy` need not import their module.
-    if name in ("DeadTransport", "ProtocolHandler", "Transport"):
+    if name in _CLASSES:
         from minirospy.client import tcpros
 
         return getattr(tcpros, name)
