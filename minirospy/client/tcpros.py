@@ -31,11 +31,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DEFAULT_BUFF_SIZE",
+    "DeadTransport",
+    "ProtocolHandler",
     "ResponseTransport",
     "TCPROSServiceClient",
     "TCPROSTransport",
     "TCPROSTransportProtocol",
     "TCPService",
+    "Transport",
     "recv_buff",
 ]
 
@@ -142,7 +145,89 @@ class TCPService(TCPROSTransportProtocol):
         }
 
 
-class TCPROSTransport:
+class Transport:
+    """The base class of connections; ``direction`` is "i", "o" or "b"."""
+
+    transport_type = "UNKNOWN"
+
+    def __init__(self, direction: str, name: str = "unnamed") -> None:
+        self.name = name
+        self.direction = direction
+        self.id = next(_numbers)
+        self.done = False  # set by close()
+        self.cleanup_cb: Callable[[Any], object] | None = None
+        # Where the connection goes: the peer's URI, and the addresses of the socket
+        self.endpoint_id = ""
+        self.local_endpoint: Any = (0, 0)
+        self.remote_endpoint: Any = (0, 0)
+        # The number of bytes and messages in both directions
+        self.stat_bytes = self.stat_num_msg = 0
+
+    def fileno(self) -> int | None:
+        """Return the socket's file descriptor, or None if there is none."""
+        return None
+
+    def set_cleanup_callback(self, cleanup_callback: Callable[[Any], object]) -> None:
+        """Call a function with this object when the connection is closed."""
+        self.cleanup_cb = cleanup_callback
+
+    def close(self) -> None:
+        """Close the connection."""
+        self.done = True
+        if self.cleanup_cb:
+            self.cleanup_cb(self)
+
+    def write_data(self, data: bytes) -> None:
+        """Send bytes; a subclass overrides this."""
+        raise Exception("not implemented")
+
+    def get_transport_info(self) -> str:
+        """Return a description of the connection, for getBusInfo; a subclass overrides this."""
+        raise NotImplementedError
+
+
+class DeadTransport(Transport):
+    """The statistics of a connection that was closed."""
+
+    def __init__(self, transport: Transport) -> None:
+        super().__init__(transport.direction, transport.name)
+        self.transport_type = transport.transport_type
+        self.id = transport.id
+        self.done = True
+        self.endpoint_id = transport.endpoint_id
+        self.local_endpoint, self.remote_endpoint = transport.local_endpoint, transport.remote_endpoint
+        self.stat_bytes, self.stat_num_msg = transport.stat_bytes, transport.stat_num_msg
+
+    def get_transport_info(self) -> str:
+        """Return a description of the connection, for getBusInfo."""
+        host, port = (*self.remote_endpoint, None)[:2]
+        return f"Closed {self.transport_type} connection on port {self.local_endpoint[1]} to [{host}:{port}]"
+
+
+class ProtocolHandler:
+    """The base class of a transport's handler."""
+
+    def shutdown(self) -> None:
+        """Stop; a subclass overrides this."""
+
+    def create_transport(self, topic: str, pub_uri: str, protocol_params: list[Any]) -> Any:
+        """Connect to a publisher; a subclass overrides this."""
+        raise Exception("interface impl")
+
+    def supports(self, protocol: str) -> bool:
+        """Return whether a protocol is supported."""
+        return False
+
+    def get_supported(self) -> list[Any]:
+        """Return the protocols to offer, each with its parameters."""
+        return []
+
+    def init_publisher(self, topic: str, protocol: list[Any]) -> Any:
+        """Accept connections of subscribers; a subclass overrides this."""
+        raise Exception("interface impl")
+
+
+class TCPROSTransport(Transport):
     """A connection that blocks its thread: :meth:`connect`, :meth:`send_message`, :meth:`receive_once`, :meth:`close`.
 
     Raise TransportInitError if ``name`` is empty.
@@ -155,10 +240,8 @@ class TCPROSTransport:
     ) -> None:
         if not name:
             raise TransportInitError("Unable to initialize transport: name is not set")
+        super().__init__(protocol.direction, name)
         self.protocol = protocol
-        self.name = name
-        self.direction = protocol.direction
-        self.id = next(_numbers)
         self.buff_size = protocol.buff_size
         # The peer's connection header, None until it has been received, and the fields from it
         self.header: Mapping[str, str] | None = header
@@ -171,15 +254,9 @@ class TCPROSTransport:
         # The socket while the connection is open, and the buffers for received data and for data to send
         self.socket: socket.socket | None = None
         self.read_buff, self.write_buff = BytesIO(), BytesIO()
-        # Where the connection goes: the peer's URI, the address that connect() was called with, and the socket's
         self.endpoint_id = "unknown"
-        self.dest_address: tuple[str, int] | None = None
-        self.local_endpoint: Any = (None, None)
-        self.remote_endpoint: Any = (None, None)
-        # The number of bytes and messages in both directions
-        self.stat_bytes = self.stat_num_msg = 0
-        self.done = False  # set by close()
-        self.cleanup_cb: Callable[[TCPROSTransport], object] | None = None
+        self.dest_address: tuple[str, int] | None = None  # the address that connect() was called with
+        self.local_endpoint = self.remote_endpoint = (None, None)
 
     def fileno(self) -> int | None:
         """Return the socket's file descriptor, or None if the connection is not open."""
@@ -197,10 +274,6 @@ class TCPROSTransport:
         self.endpoint_id = endpoint_id
         with contextlib.suppress(OSError):
             self.local_endpoint, self.remote_endpoint = sock.getsockname(), sock.getpeername()
-
-    def set_cleanup_callback(self, cleanup_callback: Callable[[TCPROSTransport], object]) -> None:
-        """Set the function to call, with this object, when the connection is closed."""
-        self.cleanup_cb = cleanup_callback
 
     def get_transport_info(self) -> str:
         """Return a description of the connection, for getBusInfo."""
@@ -329,14 +402,12 @@ class TCPROSTransport:
         """Close the connection. Idempotent."""
         if self.done:
             return
-        self.done = True
         sock, self.socket = self.socket, None
         if sock is not None:
             with contextlib.suppress(OSError):
                 sock.shutdown(socket.SHUT_RDWR)
             sock.close()
-        if self.cleanup_cb:
-            self.cleanup_cb(self)
+        super().close()
 
     def _open_socket(self) -> socket.socket:
         if self.socket is None:

@@ -35,6 +35,8 @@ from minirospy.ros.rosbag.rosbag.internals import _ChunkHeader as _ChunkHeader
 from minirospy.ros.rosbag.rosbag.internals import _ChunkInfo as _ChunkInfo
 from minirospy.ros.rosbag.rosbag.internals import _ConnectionInfo, _get_message_type
 from minirospy.ros.rosbag.rosbag.internals import _IndexEntry as _IndexEntry
+from minirospy.ros.rosbag.rosbag.internals import _IndexEntry102 as _IndexEntry102
+from minirospy.ros.rosbag.rosbag.internals import _IndexEntry200 as _IndexEntry200
 from minirospy.ros.rosbag.rosbag.internals import _message_types as _message_types
 from minirospy.ros.rosbag.rosbag.opening import CLOSED, FileArgument, OpenedBag
 from minirospy.ros.rosbag.rosbag.private import (

@@ -154,6 +154,24 @@ class _IndexEntry:
         return f"{self.time.secs}.{self.time.nsecs}: {place}"
 
 
+class _IndexEntry102(_IndexEntry):
+    """The index entry of a version 1.2 bag: a message's time and position in the file."""
+
+    __slots__ = ()
+
+    def __init__(self, time: Time, offset: int) -> None:
+        super().__init__(time, None, offset)
+
+
+class _IndexEntry200(_IndexEntry):
+    """The index entry of a version 2.0 bag: a message's time, and its position in a chunk."""
+
+    __slots__ = ()
+
+    def __init__(self, time: Time, chunk_pos: int, offset: int) -> None:
+        super().__init__(time, chunk_pos, offset)
+
+
 class _Index(Sequence[_IndexEntry]):
     """A connection's index entries as objects, which are created on access."""
 

@@ -2,8 +2,8 @@
 
 from minirospy.ros.roslaunch.launcher.process import Timeouts
 from minirospy.ros.roslaunch.roslaunch.core import Machine, Master, Node, RLException
+from minirospy.ros.roslaunch.roslaunch.pmon import LaunchedProcess as LocalProcess
 from minirospy.ros.roslaunch.roslaunch.pmon import Process, create_node_process
-from minirospy.ros.roslaunch.roslaunch.pmon import Process as LocalProcess
 
 __all__ = [
     "DEFAULT_TIMEOUT_SIGINT",

@@ -8,10 +8,17 @@ DEFAULT_BUFF_SIZE = 65536
 """The default value for Subscriber's ``buff_size``."""
 
 
-def __getattr__(name: str) -> object:
-    # Programs use these names in annotations. Import them only on use, because their module imports asyncio.
-    if name in ("Transport", "DeadTransport"):
-        from minirospy.runtime.transport.links import OutLink
+# classes that are imported on use: few programs use them, and `import rospy` need not import their module
+_CLASSES = ("DeadTransport", "ProtocolHandler", "Transport")
 
-        return OutLink
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, *_CLASSES])
+
+
+def __getattr__(name: str) -> object:
+    if name in _CLASSES:
+        from minirospy.client import tcpros
+
+        return getattr(tcpros, name)
     raise AttributeError(f"module 'rospy.impl.transport' has no attribute {name!r}")
