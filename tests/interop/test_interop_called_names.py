@@ -42,6 +42,7 @@ NOT_CALLED = (
     ),
     *("rosgraph.rosgraph_main", "roslaunch", "rosmaster.main", "rosmaster.master", "rosmaster.registrations"),
     *(
+        "roslib.network",  # real ROS's functions fail with Python 3
         "rosmaster.threadpool",
         "rospkg.",
         "rospy.impl",
