@@ -993,8 +993,8 @@ PASSED_ON = {
     },
     "roswtf": {
         "": (
-            "environment=roswtf.environment model=roswtf.model os rosgraph rospkg rules=roswtf.rules "
-            "socket sys traceback"
+            "context=roswtf.context environment=roswtf.environment model=roswtf.model os rosgraph "
+            "rospkg rules=roswtf.rules socket sys traceback"
         ),
         "__future__": "print_function",
     },

@@ -43,6 +43,7 @@ NOT_CALLED = (
     ),
     *("rosgraph.rosgraph_main", "roslaunch", "rosmaster.main", "rosmaster.master", "rosmaster.registrations"),
     *(
+        "roslib.network",  # real ROS's functions fail with Python 3
         "rosmaster.threadpool",
         "rospkg.",
         "rospy.impl",
@@ -52,7 +53,11 @@ NOT_CALLED = (
         "rosunit",
     ),
 )
-CALLED = ("rosmaster.master_api", "rospkg.os_detect")  # exceptions to NOT_CALLED
+CALLED = (
+    "dynamic_reconfigure.parameter_generator_catkin",
+    "rosmaster.master_api",
+    "rospkg.os_detect",
+)  # exceptions to NOT_CALLED
 
 
 def callable_names() -> list[list[object]]:
@@ -61,9 +66,10 @@ def callable_names() -> list[list[object]]:
         compare_surface.described_by(python) for python in (compare_surface.REAL_PYTHON, sys.executable)
     )
     found: list[list[object]] = []
-    for module in (
-        each for each in ours if each in real and (not each.startswith(NOT_CALLED) or each in CALLED)
-    ):
+    pages = ("rospy", "modules", "tf")  # rospy first: calls of other modules set parameters
+    for module in sorted(real, key=lambda each: (pages.index(compare_surface.page_of(each)), each)):
+        if module.startswith(NOT_CALLED) and module not in CALLED:
+            continue
         for name, _, state, _ in compare_surface.rows_of(module, real[module], ours[module]):
             owner, _, member = name.partition(".")
             described = real[module][owner]
@@ -124,7 +130,12 @@ def test_calls_have_the_recorded_outcomes(tmp_path: Path) -> None:
         real, ours = (run.result() for run in runs)
     assert real.keys() == ours.keys()
     assert len(real) > 3000
-    differing = {call: [real[call], ours[call]] for call in real if real[call] != ours[call]}
+    # A call that blocks in one of them is not made again, so its difference is not recorded.
+    differing = {
+        call: [real[call], ours[call]]
+        for call in real
+        if real[call] != ours[call] and "waits" not in (real[call], ours[call])
+    }
     known = {
         call: (pair, reason) for reason, pairs in record["differs"].items() for call, pair in pairs.items()
     }

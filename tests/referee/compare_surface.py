@@ -463,13 +463,17 @@ def shown_default(default: Any) -> str:
         return "sys.argv"
     if isinstance(default, set):
         return "{" + ", ".join(sorted(map(repr, default))) + "}"
-    return " ".join(re.sub(r"<.*_?Unspecified object at .*>", "<unspecified>", repr(default)).split())
+    shown = re.sub(r"<.*_?Unspecified object at .*>", "<unspecified>", repr(default))
+    shown = re.sub(r"<function (\S+) at 0x[0-9a-f]+>", r"\1", shown)
+    return " ".join(re.sub(r"<(?:\S+\.)?(\S+) object at 0x[0-9a-f]+>", r"<\1>", shown).split())
 
 
 def compare(real: Any, ours: Any) -> str:
     """Return "same", "wider" (minirospy accepts every call that real rospy accepts) or "differs"."""
     if real == ours or real is None:
         return "same"
+    if isinstance(real, list) and real and all("VAR" in kind for _, _, kind in real):
+        return "same"  # a decorator hides the parameters
     if not isinstance(real, list) or not isinstance(ours, list):
         return "differs"
     kinds = {kind for _, _, kind in ours}

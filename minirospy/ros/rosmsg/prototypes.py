@@ -183,14 +183,14 @@ def represent_ordered_mapping(
     return node
 
 
-def prototype(args: Sequence[str]) -> str | None:
+def prototype(args: list[str] | None) -> str | None:
     """Return what `rosmsg-proto` prints for these arguments.
 
-    On an error, print it to stderr and exit; with ``-s``, return None.
+    None means those of this process. On an error, print it to stderr and exit; with ``-s``, return None.
     """
     init_rosmsg_proto()
     parser = _option_parser()
-    options, words = parser.parse_args(list(args))
+    options, words = parser.parse_args(args)
     try:
         if len(words) < 2:
             raise RosMsgProtoArgsException("Insufficient arguments")

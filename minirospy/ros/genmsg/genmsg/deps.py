@@ -23,41 +23,41 @@ __all__ = [
 
 
 def find_msg_dependencies_with_type(
-    pkg_name: str, msg_file: str, search_path: SearchPath
+    pkg_name: str, msg_file: str, search_paths: SearchPath
 ) -> list[tuple[str, str | None]]:
     """Return (type, file) for each message that the message in ``msg_file`` uses.
 
     Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
     """
     context = MsgContext.create_default()
-    return _needed(context, load_msg_from_file(context, msg_file, _type(pkg_name, msg_file)), search_path)
+    return _needed(context, load_msg_from_file(context, msg_file, _type(pkg_name, msg_file)), search_paths)
 
 
-def find_msg_dependencies(pkg_name: str, msg_file: str, search_path: SearchPath) -> list[str | None]:
+def find_msg_dependencies(pkg_name: str, msg_file: str, search_paths: SearchPath) -> list[str | None]:
     """Return the files that define the messages used by the message in ``msg_file``.
 
     Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
     """
-    return [file for _, file in find_msg_dependencies_with_type(pkg_name, msg_file, search_path)]
+    return [file for _, file in find_msg_dependencies_with_type(pkg_name, msg_file, search_paths)]
 
 
 def find_srv_dependencies_with_type(
-    pkg_name: str, msg_file: str, search_path: SearchPath
+    pkg_name: str, msg_file: str, search_paths: SearchPath
 ) -> list[tuple[str, str | None]]:
     """Return (type, file) for each message that a service uses.
 
     Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
     """
     context = MsgContext.create_default()
-    return _needed(context, load_srv_from_file(context, msg_file, _type(pkg_name, msg_file)), search_path)
+    return _needed(context, load_srv_from_file(context, msg_file, _type(pkg_name, msg_file)), search_paths)
 
 
-def find_srv_dependencies(pkg_name: str, msg_file: str, search_path: SearchPath) -> list[str | None]:
+def find_srv_dependencies(pkg_name: str, msg_file: str, search_paths: SearchPath) -> list[str | None]:
     """Return the files that define the messages used by a service.
 
     Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
     """
-    return [file for _, file in find_srv_dependencies_with_type(pkg_name, msg_file, search_path)]
+    return [file for _, file in find_srv_dependencies_with_type(pkg_name, msg_file, search_paths)]
 
 
 def _type(package: str, file: str) -> str:
@@ -65,9 +65,9 @@ def _type(package: str, file: str) -> str:
 
 
 def _needed(
-    context: MsgContext, spec: MsgSpec | SrvSpec, search_path: SearchPath
+    context: MsgContext, spec: MsgSpec | SrvSpec, search_paths: SearchPath
 ) -> list[tuple[str, str | None]]:
-    load_depends(context, spec, search_path)
+    load_depends(context, spec, search_paths)
     parts = (spec.request, spec.response) if isinstance(spec, SrvSpec) else (spec,)
     names = dict.fromkeys(name for part in parts for name in context.get_all_depends(part.full_name))
     return [(name, context.get_file(name)) for name in names]

@@ -49,7 +49,9 @@ def file_needs(
             dict.fromkeys((node.package, node.type) for node in spec.runnables() if node.file == file)
         )
         includes = tuple(dict.fromkeys(inner for outer, inner in spec.includes if outer == file))
-        called = [*(package for package, _ in nodes), *(package_of(inner) or "" for inner in includes)]
+        own = package_of(file)
+        included = (package_of(inner) for inner in includes)
+        called = [*(package for package, _ in nodes), *(each for each in included if each and each != own)]
         needs[file] = FileNeeds(nodes, includes, tuple(dict.fromkeys(filter(None, called))))
     return needs
 

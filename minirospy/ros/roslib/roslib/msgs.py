@@ -20,7 +20,6 @@ from minirospy.ros.genmsg.genmsg.msgs import (
     TIME,
     TIME_MSG,
     is_builtin,
-    is_header_type,
     is_valid_constant_type,
     is_valid_msg_type,
 )
@@ -221,6 +220,11 @@ def parse_type(type_: str) -> tuple[str, bool, int | None]:
         return base, True, int(rest[:-1])
     except ValueError:
         raise MsgSpecException(f"Invalid array dimension: [{rest[:-1]}]") from None
+
+
+def is_header_type(type_: str) -> bool:
+    """Return whether a type is the header's."""
+    return genmsg.is_header_type(type_)
 
 
 def is_valid_msg_field_name(x: str) -> bool:

@@ -90,8 +90,8 @@ def lookup_uri(master: masterapi.Master, system_state: Sequence[Any], topic: str
     from minirospy.ros.rostopic.rostopic import get_api
 
     for rows in system_state[:2]:
-        for name, names in rows:
-            for node in names if name == topic else ():
+        for row in rows:
+            for node in row[1] if row[0] == topic else ():
                 if get_api(master, node) == uri:
                     return f"{node} ({uri})"
     return uri

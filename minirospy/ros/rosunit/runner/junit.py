@@ -147,19 +147,19 @@ class Result:
         self.system_err = ""
         self.time: float = 0.0
 
-    def accumulate(self, other: Result) -> None:
+    def accumulate(self, r: Result) -> None:
         """Add another suite's results."""
-        self.num_errors += other.num_errors
-        self.num_failures += other.num_failures
-        self.num_tests += other.num_tests
-        self.time += other.time
-        self.test_case_results += other.test_case_results
-        self.system_out = "\n".join(filter(None, (self.system_out, other.system_out)))
-        self.system_err = "\n".join(filter(None, (self.system_err, other.system_err)))
+        self.num_errors += r.num_errors
+        self.num_failures += r.num_failures
+        self.num_tests += r.num_tests
+        self.time += r.time
+        self.test_case_results += r.test_case_results
+        self.system_out = "\n".join(filter(None, (self.system_out, r.system_out)))
+        self.system_err = "\n".join(filter(None, (self.system_err, r.system_err)))
 
-    def add_test_case_result(self, result: TestCaseResult) -> None:
+    def add_test_case_result(self, r: TestCaseResult) -> None:
         """Add a case without changing the counts."""
-        self.test_case_results.append(result)
+        self.test_case_results.append(r)
 
     def add_case(self, case: TestCaseResult) -> None:
         """Add a case and count it."""
