@@ -65,6 +65,9 @@ def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
 
     def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if is_interrupt(error):
+            if sys.flags.inspect:
+                # After `python -i PROGRAM` an interactive session follows.
+                return
             raise SystemExit(0)
         hooks[0](kind, error, trace)
 

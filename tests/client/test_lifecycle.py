@@ -363,6 +363,23 @@ def test_an_interactive_session_keeps_its_variables_after_a_request(master: str)
     )
 
 
+@POSIX_ONLY
+def test_interrupted_program_leads_to_its_interactive_session(master: str) -> None:
+    program = 'import time, rospy; rospy.init_node("program"); print("ready", flush=True); time.sleep(60)'
+    with subprocess.Popen(
+        [sys.executable, "-i", "-c", program],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert read_line(process) == "ready\n"
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate("print(rospy.is_shutdown())\n", timeout=GUARD)
+    assert (process.returncode, output) == (0, "True\n")
+    assert "Error in sys.excepthook" not in errors
+
+
 def request_shutdown(master: str, name: str, reason: str) -> None:
     """Shut the node down as ``rosnode kill`` does."""
     proxy = MasterProxy(master, "/test")
