@@ -263,6 +263,12 @@ class _Collector:
             for path in sorted((self._folder / kind).glob(f"*.{kind}")):
                 if path not in self._definitions:
                     self._warnings.append(f"{path} is not built: no {macro}() names it")
+        from minirospy.core.idl.load import read_definition
+
+        for path in self._definitions:
+            count = f"\n{read_definition(path)}".count("\n---")
+            if path.suffix == ".srv" and count != 1:
+                self.warn(path, 1, f"{count} lines of '---' instead of 1: write request --- response")
         if self._definitions and self._message_depends is None:
             first = next(iter(self._definitions.values()))
             text = (

@@ -431,10 +431,11 @@ def test_mistakes_in_a_message(scene: Scene, text: str, line: int, error: str) -
 def test_mistakes_in_services_and_actions(scene: Scene) -> None:
     folder = scene.messages("p", {"srv/S.srv": "int8 x\n---\nint8 y\nint9 z\n"})
     assert str(mistakes(scene)).startswith(f"{folder / 'srv' / 'S.srv'}:4: ")
-    (folder / "srv" / "S.srv").write_text("int8 x\n")
+    scene.messages("q", {"action/A.action": "int8 x\n"}, "actionlib_msgs")
+    (scene.source / "p" / "srv" / "S.srv").write_text("int8 x\n")
     error = mistakes(scene)
     assert isinstance(error, DefinitionError)
-    assert "write request --- response" in error.text
+    assert "write goal --- result --- feedback" in error.text
 
 
 def test_an_action_needs_actionlib_msgs(scene: Scene) -> None:
@@ -979,6 +980,16 @@ def test_download_that_is_required(scene: Scene, capsys: pytest.CaptureFixture[s
     assert catkin_make(["-C", str(scene.root)]) == 1
     line = f"{folder / 'CMakeLists.txt'}:3: cannot download {scene.root.as_uri()}/none: "
     assert line in capsys.readouterr().err
+
+
+def test_service_without_a_response(scene: Scene) -> None:
+    """As in ROS, it is built; a warning says what may be wrong."""
+    folder = scene.messages("led_msgs", {"srv/Set.srv": "int8 number\n", "srv/Get.srv": "---\nint8 number\n"})
+    report = scene.build()["led_msgs"]
+    line = f"{folder / 'srv' / 'Set.srv'}:1: 0 lines of '---' instead of 1: write request --- response"
+    assert (report.made, report.warnings) == ("2 services", (line,))
+    said = python(scene, "from led_msgs.srv import Set, SetRequest; print(Set._md5sum, SetRequest(3).number)")
+    assert said == "75a636fcea887bd212f6597f4ed40388 3\n"
 
 
 def test_install(scene: Scene) -> None:

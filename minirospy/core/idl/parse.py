@@ -37,9 +37,14 @@ def parse_message(text: str, package: str, name: str, where: str = "") -> Messag
 
 
 def parse_service(text: str, package: str, name: str, where: str = "") -> ServiceSpec:
-    """Parse a .srv text. Raise DefinitionError if it is invalid."""
+    """Parse a .srv text. Raise DefinitionError if it is invalid.
+
+    As in ROS, a text without ``---`` is a request, and all parts after the first ``---`` are the response.
+    """
     where = where or f"{package}/{name}"
-    parts = _split(text, 2, where, "request --- response")
+    (first, *others) = _split(text)
+    line = others[0][1] if others else 1
+    parts = [first, ("".join(part for part, _ in others), line)]
     request, response = (
         _parse(part, package, name + suffix, where, line)
         for (part, line), suffix in zip(parts, ("Request", "Response"), strict=True)
@@ -50,7 +55,11 @@ def parse_service(text: str, package: str, name: str, where: str = "") -> Servic
 def parse_action(text: str, package: str, name: str, where: str = "") -> ActionSpec:
     """Parse a .action text. Raise DefinitionError if it is invalid."""
     where = where or f"{package}/{name}"
-    parts = _split(text, 3, where, "goal --- result --- feedback")
+    parts = _split(text)
+    if len(parts) != 3:
+        raise DefinitionError(
+            where, 1, f"{len(parts) - 1} lines of '---' instead of 2: write goal --- result --- feedback"
+        )
 
     status = "\nHeader header\nactionlib_msgs/GoalStatus status\n"
     texts = {
@@ -75,7 +84,7 @@ def parse_action(text: str, package: str, name: str, where: str = "") -> ActionS
     return ActionSpec(package, name, messages, text)
 
 
-def _split(text: str, count: int, where: str, form: str) -> list[tuple[str, int]]:
+def _split(text: str) -> list[tuple[str, int]]:
     """Return the parts between lines that start with ``---``, each with the number of its first line.
 
     Every line in a part ends with a newline, including the last one in the text, as in genmsg's full texts.
@@ -92,11 +101,6 @@ def _split(text: str, count: int, where: str, form: str) -> list[tuple[str, int]
             current.append(line)
 
     parts.append(("".join(f"{kept}\n" for kept in current), first))
-
-    if len(parts) != count:
-        raise DefinitionError(
-            where, 1, f"{len(parts) - 1} lines of '---' instead of {count - 1}: write {form}"
-        )
 
     return parts
 

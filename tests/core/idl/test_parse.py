@@ -80,10 +80,28 @@ def test_mistakes(text: str, line: int, error: str) -> None:
     assert error in caught.value.text
 
 
-@pytest.mark.parametrize(("text", "parts"), [("int8 a", 0), ("---\n---\n", 2)])
-def test_a_service_has_two_parts(text: str, parts: int) -> None:
-    with pytest.raises(DefinitionError, match=f"{parts} lines of '---' instead of 1"):
-        parse_service(text, "p", "S")
+@pytest.mark.parametrize(
+    ("text", "request_fields", "response_fields"),
+    [
+        ("", [], []),
+        ("int8 a", ["a"], []),
+        ("---\n---\n", [], []),
+        ("int8 a\n---\nint8 b\n---\nint8 c\n", ["a"], ["b", "c"]),
+    ],
+)
+def test_a_service_of_any_number_of_parts(
+    text: str, request_fields: list[str], response_fields: list[str]
+) -> None:
+    """As genmsg: without `---` there is no response; a second one is ignored."""
+    service = parse_service(text, "p", "S")
+    assert [field.name for field in service.request.fields] == request_fields
+    assert [field.name for field in service.response.fields] == response_fields
+
+
+@pytest.mark.parametrize(("text", "parts"), [("int8 a", 0), ("---\n", 1), ("---\n---\n---\n", 3)])
+def test_an_action_has_three_parts(text: str, parts: int) -> None:
+    with pytest.raises(DefinitionError, match=f"{parts} lines of '---' instead of 2"):
+        parse_action(text, "p", "A")
 
 
 def test_lines_are_counted_over_all_parts() -> None:
