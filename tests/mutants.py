@@ -502,7 +502,10 @@ class Mutants:
             found |= {index for index, item in enumerate(session.items) if item.path.stem.endswith(tested)}
         else:
             first, last = _span(statement)
-            if isinstance(statement, ast.If | ast.While | ast.For | ast.With | ast.Try | ast.Match):
+            if isinstance(statement, ast.If | ast.While | ast.For | ast.With):
+                # The lines before the body: a condition may be longer than one line.
+                last = max(mutant.line, statement.body[0].lineno - 1)
+            elif isinstance(statement, ast.Try | ast.Match):
                 last = mutant.line
             found = {
                 index

@@ -274,11 +274,11 @@ def _text_of(value: object, most: int) -> str:
 
 def _cut(value: object, most: int, numbers: Iterator[int]) -> object:
     """Return only the first values in a value from JSON or CBOR, because each one takes at least one character."""
+    # The quotes around a string depend on the quotes in it, including those in the part cut off.
     if isinstance(value, str) and len(value) > most:
-        # The quotes around a string depend on the quotes in it, including those in the part cut off.
-        return value[: most + 1] + "".join(quote for quote in "'\"" if quote in value)
-    if isinstance(value, bytes):
-        return value[: most + 1]
+        return value[:most] + "".join(quote for quote in "'\"" if quote in value)
+    if isinstance(value, bytes) and len(value) > most:
+        return value[:most] + bytes(quote for quote in b"'\"" if quote in value)
     if isinstance(value, list):
         first = itertools.takewhile(lambda _: next(numbers) <= most, value)
         return [_cut(each, most, numbers) for each in first]

@@ -57,6 +57,10 @@ def test_end_of_a_code_is_reported_once() -> None:
     kept.close()
     kept.close()
     assert ended[4:] == ["last"]
+    kept.when_ended(kept.new("token"), lambda: ended.append("oldest"))
+    now = 120.0
+    kept.new("token")
+    assert ended[5:] == ["oldest"]
 
 
 def exchanged(port: int, code: str, *, half_closes: bool = False) -> tuple[int, str]:
