@@ -183,6 +183,9 @@ def _untested(node: ast.AST) -> Iterator[ast.AST]:
             yield node
         case ast.Call(func=ast.Name(id="TypeVar")):
             yield node
+        case ast.Compare(left=ast.Attribute(value=ast.Name(id="sys"), attr="platform")):
+            # Skip the name of another system, which is not this one's with any other text either.
+            yield from node.comparators
         case ast.Expr(value=ast.Constant()) | ast.ImportFrom() | ast.Import():
             yield node
         case ast.If(test=ast.Name(id="TYPE_CHECKING")):
