@@ -1,4 +1,4 @@
-"""cli/catkin_tools: compared with catkin's output for the same folders."""
+"""The tools of catkin, compared with real catkin's output for the same folders."""
 
 from __future__ import annotations
 

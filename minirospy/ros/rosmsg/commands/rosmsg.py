@@ -51,7 +51,7 @@ class _Verbs:
 
     def show(self, type: str | None, raw: bool, bag: str | None) -> None:
         if bag:
-            from minirospy.ros.rosbag.commands.bag_options import show_bag
+            from minirospy.ros.rosbag.commands.read_from_bag import show_bag
 
             for name in _names(type):
                 show_bag(bag, name, raw=raw)

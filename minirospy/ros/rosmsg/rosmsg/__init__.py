@@ -271,7 +271,7 @@ def rosmsg_cmd_show(mode: str, full: object, alias: str = "show") -> int | None:
         parser.error(f"invalid message type '{name}'.\n{hint}")
 
     if options.bag:
-        from minirospy.ros.rosbag.commands.bag_options import show_bag
+        from minirospy.ros.rosbag.commands.read_from_bag import show_bag
 
         if not os.path.exists(options.bag):
             raise ROSMsgException(f"ERROR: bag file [{options.bag}] does not exist")

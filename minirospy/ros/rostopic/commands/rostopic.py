@@ -68,7 +68,7 @@ def _list(
                     f"{option} needs a master: it does not go with -b",
                     f"{option} option is not valid with bags",
                 )
-        from minirospy.ros.rosbag.commands.bag_options import list_bag
+        from minirospy.ros.rosbag.commands.read_from_bag import list_bag
 
         with Graph.open("rostopic", arguments=arguments) as graph:
             list_bag(bag, graph.resolve(namespace) if namespace else None)
@@ -263,7 +263,7 @@ def _echo(
     if bag:
         if offset:
             raise Misuse("--offset does not go with -b", "offset time option is not valid with bag files")
-        from minirospy.ros.rosbag.commands.bag_options import EchoOptions, echo_bag
+        from minirospy.ros.rosbag.commands.read_from_bag import EchoOptions, echo_bag
 
         with Graph.open("rostopic", arguments=arguments) as graph:
             make = partial(make, header_times=False, is_type_known=False)

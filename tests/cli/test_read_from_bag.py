@@ -1,4 +1,4 @@
-"""cli/bag_options: `rostopic list -b`, `rostopic echo -b`, `rosmsg show -b`, without a master."""
+"""`rostopic list -b`, `rostopic echo -b`, `rosmsg show -b`, without a master."""
 
 from __future__ import annotations
 

@@ -1,1 +1,0 @@
-"""The commands of catkin and catkin_tools, for workspaces without CMake."""

@@ -1,1 +1,0 @@
-"""ROS's commands: `roscore`, `rosrun`, `roslaunch`, `rostopic` and others."""
