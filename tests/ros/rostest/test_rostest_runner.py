@@ -5,8 +5,12 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+import rostest.runner
+from rosunit.junitxml import Result
 
 HERE = Path(__file__).parent
 
@@ -94,3 +98,22 @@ def test_programs_launch_and_run_a_test_themselves(tmp_path: Path, monkeypatch: 
     said = run_program(OWN, file, tmp_path, monkeypatch)
     lines = [line for line in said.splitlines() if line.startswith(("STARTED", "PASSED", "WITHOUT"))]
     assert lines == ["STARTED []", "PASSED True", "WITHOUT Exception config not initialized"]
+
+
+def test_programs_add_results_and_launches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs with runners of their own call these private functions of rostest.runner."""
+    from minirospy.ros.rostest.rostest.runner import _Run
+
+    monkeypatch.setattr("minirospy.ros.rostest.rostest.runner._run", _Run())
+    added = Result("one")
+    added.num_tests, added.num_failures = 3, 1
+    rostest.runner._accumulateResults(added)
+    rostest.runner._accumulateResults(added)
+    results = rostest.runner.getResults()
+    assert (results.num_tests, results.num_failures) == (6, 2)
+
+    launch: Any = SimpleNamespace(config="config")
+    rostest.runner._addRostestParent(launch)
+    assert rostest.runner.getRostestParents() == [launch]
+    config: object = rostest.runner.getConfig()
+    assert config == "config"

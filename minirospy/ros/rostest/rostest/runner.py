@@ -21,6 +21,8 @@ from minirospy.ros.rosunit.runner.unit import XML_OUTPUT_FLAG, xml_results_file
 __all__ = [
     "_DEFAULT_TEST_PORT",
     "ROSTestLaunchParent",
+    "_accumulateResults",
+    "_addRostestParent",
     "createUnitTest",
     "failDuplicateRunner",
     "failRunner",
@@ -78,6 +80,17 @@ def getConfig() -> ROSLaunchConfig | None:
 def getRostestParents() -> list[ROSTestLaunchParent]:
     """Return the launches of all tests, so that each can be torn down at the end."""
     return _run.parents
+
+
+def _accumulateResults(results: Result) -> None:
+    """Add a test's results to those of :func:`getResults`."""
+    _run.results.accumulate(results)
+
+
+def _addRostestParent(runner: ROSTestLaunchParent) -> None:
+    """Add a launch to those of :func:`getRostestParents`; its configuration becomes that of :func:`getConfig`."""
+    _run.parents.append(runner)
+    _run.config = runner.config
 
 
 def setTextMode(val: bool) -> None:
@@ -152,7 +165,7 @@ def rostestRunner(test: Test, test_pkg: str, results_base_dir: str | None = None
                 self.tearDown()
                 self.setUp()
                 continue
-            _run.results.accumulate(results)
+            _accumulateResults(results)
             return
 
     return fn
@@ -165,8 +178,7 @@ def setUp(self: RosTestCase) -> None:
     )
     self.test_parent.setUp()
     self.config = self.test_parent.config
-    _run.parents.append(self.test_parent)
-    _run.config = self.config
+    _addRostestParent(self.test_parent)
     printlog("setup[%s] run_id[%s] done", self.test_file, self.test_parent.run_id)
 
 
