@@ -52,12 +52,48 @@ PASSED_ON = {
         "": "os",
         "__future__": "print_function",
         "catkin.workspace": "get_source_paths get_workspaces",
+        "catkin_pkg.packages": "find_packages",
     },
     "catkin.terminal_color": {
         "": "os string",
         "__future__": "print_function",
     },
     "catkin.workspace": {
+        "": "os",
+        "__future__": "print_function",
+    },
+    "catkin_pkg": {
+        "": (
+            "condition=catkin_pkg.condition package=catkin_pkg.package packages=catkin_pkg.packages "
+            "python_setup=catkin_pkg.python_setup topological_order=catkin_pkg.topological_order "
+            "workspaces=catkin_pkg.workspaces"
+        ),
+    },
+    "catkin_pkg.condition": {
+        "": "operator",
+    },
+    "catkin_pkg.package": {
+        "": "dom=xml.dom.minidom os re sys",
+        "__future__": "print_function",
+        "catkin_pkg.condition": "evaluate_condition",
+        "copy": "deepcopy",
+        "xml.parsers.expat": "ExpatError",
+    },
+    "catkin_pkg.packages": {
+        "": "multiprocessing os",
+        "catkin_pkg.package": "parse_package_string",
+    },
+    "catkin_pkg.python_setup": {
+        "": "os sys",
+        "__future__": "print_function",
+    },
+    "catkin_pkg.topological_order": {
+        "": "copy os sys",
+        "__future__": "print_function",
+        "catkin_pkg.packages": "find_packages",
+        "catkin_pkg.workspaces": "get_spaces",
+    },
+    "catkin_pkg.workspaces": {
         "": "os",
         "__future__": "print_function",
     },
@@ -420,6 +456,7 @@ PASSED_ON = {
             "remap_localhost_uri rle_wrapper set_child_mode setup_env"
         ),
         "roslaunch.node_args": "create_local_process_args",
+        "roslaunch.pmon": "FatalProcessLaunch",
         "rosmaster.master_api": "NUM_WORKERS",
         "rospkg.environment": "get_ros_package_path get_ros_root",
         "xml.sax.saxutils": "escape",
@@ -493,7 +530,7 @@ PASSED_ON = {
             "exceptions=roslib.exceptions gentools=roslib.gentools launcher=roslib.launcher "
             "manifest=roslib.manifest message=roslib.message msgs=roslib.msgs names=roslib.names "
             "network=roslib.network packages=roslib.packages rosenv=roslib.rosenv roslib "
-            "scriptutil=roslib.scriptutil srvs=roslib.srvs stacks=roslib.stacks"
+            "rospack=roslib.rospack scriptutil=roslib.scriptutil srvs=roslib.srvs stacks=roslib.stacks"
         ),
     },
     "roslib.gentools": {
@@ -528,6 +565,9 @@ PASSED_ON = {
     },
     "roslib.rosenv": {
         "": "os sys warnings",
+    },
+    "roslib.rospack": {
+        "": "roslib rospkg subprocess sys warnings",
     },
     "roslib.scriptutil": {
         "": "os roslib warnings",
@@ -753,7 +793,6 @@ PASSED_ON = {
             "ANYTYPE GLOBALNS REMAP get_ros_namespace is_global is_private load_mappings make_global_ns "
             "namespace ns_join"
         ),
-        "rosgraph.network": "read_ros_handshake_header write_ros_handshake_header",
         "rosgraph_msgs.msg": "Log",
         "rospy.core": (
             "MASTER_NAME NullHandler ROSRPC add_client_shutdown_hook add_preshutdown_hook "
@@ -765,13 +804,9 @@ PASSED_ON = {
             "logwarn_once logwarn_throttle logwarn_throttle_identical parse_rosrpc_uri register_signals "
             "rospydebug rospyerr rospyinfo rospywarn signal_shutdown xmlrpcapi"
         ),
-        "rospy.exceptions": (
-            "ROSException ROSInitException ROSInternalException TransportException TransportInitError "
-            "TransportTerminated"
-        ),
+        "rospy.exceptions": "ROSException ROSInitException ROSInternalException",
         "rospy.impl.transport": "BIDIRECTIONAL",
         "rospy.impl.validators": "ParameterInvalid",
-        "rospy.msg": "deserialize_messages serialize_message",
         "rospy.names": (
             "SERVICE_ANYTYPE TOPIC_ANYTYPE canonicalize_name get_caller_id=get_name get_mappings "
             "get_name get_namespace get_resolved_mappings global_name initialize_mappings isstring "
@@ -783,9 +818,6 @@ PASSED_ON = {
     "rospy.impl.tcpros_service": {
         "": "genpy io logging rosgraph rospy socket struct sys threading time traceback",
         "rospy.core": "logdebug logerr loginfo logwarn",
-        "rospy.exceptions": "ROSException ROSInterruptException TransportInitError TransportTerminated",
-        "rospy.impl.registration": "get_service_manager",
-        "rospy.impl.tcpros": "DEFAULT_BUFF_SIZE",
         "rospy.service": "logger",
     },
     "rospy.impl.transport": {
