@@ -161,6 +161,12 @@ LEFT_OUT = [
     ("roslib", "manifestlib stack_manifest Manifest.xml", "of rosbuild: use rospkg"),
     ("rosmaster.master_api", "apivalidate ROSMasterHandler.param_update_task", "the inside of rosmaster"),
     ("rosmaster.threadpool", "*", "the inside of the pool of threads"),
+    ("catkin_pkg", "terminal_color", "for the scripts of catkin_pkg"),
+    (
+        "catkin_pkg.condition",
+        "infixNotation pp",
+        "passed on from the library pyparsing, which is not needed here",
+    ),
     ("rospkg.distro", "*", "the distributions before catkin, whose files are no longer on the web"),
     ("rospkg.manifest", "*", "of rosbuild"),
     ("rospkg.os_detect", "distro", "passed on from the library distro, which is not needed here"),

@@ -4,6 +4,7 @@ import os
 import tempfile
 
 from catkin_pkg import package as module
+from catkin_pkg import python_setup
 from catkin_pkg.condition import evaluate_condition
 from catkin_pkg.package import Dependency, InvalidPackage, Package, package_exists_at, parse_package_string
 from catkin_pkg.packages import find_package_paths, find_packages, verify_equal_package_versions
@@ -139,3 +140,23 @@ os.mkdir("../c2")
 with open("../c2/package.xml", "w") as file:
     file.write(PACKAGES["c"])
 outcome("two of a name", lambda: find_packages(".."))
+
+MODEL = '<?xml-model href="http://download.ros.org/schema/package_format2.xsd" schematypens="x"?><package/>'
+show(
+    [
+        module.has_ros_schema_reference_string(text)
+        for text in (MODEL, "<package/>", "", MODEL.replace("2.xsd", "9.xsd"))
+    ]
+)
+show(module.has_ros_schema_reference("../c2"), module.PACKAGE_MANIFEST_SCHEMA_URLS)
+outcome("no file", lambda: module.has_ros_schema_reference("nope"))
+for kind in ("bin", "etc", "include", "lib", "libexec", "share"):
+    show(kind, getattr(python_setup, f"get_global_{kind}_destination")())
+for kind in ("bin", "etc", "include", "lib", "share"):
+    show(kind, getattr(python_setup, f"get_package_{kind}_destination")("pack"))
+show(
+    python_setup.get_package_python_destination("pack").startswith(
+        python_setup.get_global_python_destination()
+    )
+)
+show(sorted(module.parse_package_for_distutils("../c2").items()))

@@ -16,6 +16,7 @@ from minirospy.workspace.manifest import EMAIL, naming_warning
 
 __all__ = [
     "PACKAGE_MANIFEST_FILENAME",
+    "PACKAGE_MANIFEST_SCHEMA_URLS",
     "Dependency",
     "Export",
     "GroupDependency",
@@ -25,12 +26,18 @@ __all__ = [
     "Package",
     "Person",
     "Url",
+    "has_ros_schema_reference",
+    "has_ros_schema_reference_string",
     "package_exists_at",
     "parse_package",
+    "parse_package_for_distutils",
     "parse_package_string",
 ]
 
 PACKAGE_MANIFEST_FILENAME = "package.xml"
+PACKAGE_MANIFEST_SCHEMA_URLS = [
+    f"http://download.ros.org/schema/package_format{number}.xsd" for number in (1, 2, 3)
+]
 
 _VERSIONS = ("version_lt", "version_lte", "version_eq", "version_gte", "version_gt")
 _LISTS = (
@@ -376,16 +383,55 @@ def package_exists_at(path: str) -> bool:
 
 def parse_package(path: str, warnings: list[str] | None = None) -> Package:
     """Return the package of a folder or of a package.xml. Raise InvalidPackage, or OSError if there is no file."""
-    if os.path.isfile(path):
-        filename = path
-    elif package_exists_at(path):
-        filename = os.path.join(path, PACKAGE_MANIFEST_FILENAME)
-    else:
-        raise OSError(
-            f'Path "{path}" is neither a directory containing a "{PACKAGE_MANIFEST_FILENAME}" file nor a file'
-        )
+    filename = _file_of(path)
     with open(filename, "rb") as file:
         return parse_package_string(file.read(), filename, warnings)
+
+
+def parse_package_for_distutils(path: str | None = None) -> dict[str, object]:
+    """Return the arguments of setup(), as its successor `generate_distutils_setup` does, which a printed line names."""
+    from minirospy.ros.catkin_pkg.catkin_pkg.python_setup import generate_distutils_setup
+
+    print(
+        f"WARNING: {os.path.basename(os.path.abspath('.'))}/setup.py: "
+        "catkin_pkg.package.parse_package_for_distutils() is deprecated. "
+        "Please use catkin_pkg.python_setup.generate_distutils_setup(**kwargs) instead."
+    )
+    return generate_distutils_setup(*([] if path is None else [path]))
+
+
+def has_ros_schema_reference(path: str) -> bool:
+    """Return whether the package.xml of a folder, or the file ``path``, refers to ROS's schema. Raise OSError without a file."""
+    with open(_file_of(path), "rb") as file:
+        return has_ros_schema_reference_string(file.read())
+
+
+def has_ros_schema_reference_string(data: str | bytes) -> bool:
+    """Return whether the text of a package.xml refers to ROS's schema in an `xml-model` instruction; False if it is not XML."""
+    hrefs: list[str] = []
+
+    def found(target: str, text: str) -> None:
+        href = re.search(r'href="([A-Za-z0-9._/:]*)"', text)
+        if target == "xml-model" and href:
+            hrefs.append(href[1])
+
+    parser = new_parser()
+    parser.ProcessingInstructionHandler = found
+    try:
+        parser.Parse(data, True)
+    except (ExpatError, XmlError, ValueError, LookupError):
+        return False
+    return any(href in PACKAGE_MANIFEST_SCHEMA_URLS for href in hrefs)
+
+
+def _file_of(path: str) -> str:
+    if os.path.isfile(path):
+        return path
+    if package_exists_at(path):
+        return os.path.join(path, PACKAGE_MANIFEST_FILENAME)
+    raise OSError(
+        f'Path "{path}" is neither a directory containing a "{PACKAGE_MANIFEST_FILENAME}" file nor a file'
+    )
 
 
 def parse_package_string(

@@ -5,9 +5,28 @@ Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.ht
 
 from __future__ import annotations
 
+import sys
+
 from minirospy.ros.catkin_pkg.catkin_pkg.package import InvalidPackage, Person, parse_package
 
-__all__ = ["InvalidPackage", "generate_distutils_setup", "parse_package"]
+__all__ = [
+    "InvalidPackage",
+    "generate_distutils_setup",
+    "get_global_bin_destination",
+    "get_global_etc_destination",
+    "get_global_include_destination",
+    "get_global_lib_destination",
+    "get_global_libexec_destination",
+    "get_global_python_destination",
+    "get_global_share_destination",
+    "get_package_bin_destination",
+    "get_package_etc_destination",
+    "get_package_include_destination",
+    "get_package_lib_destination",
+    "get_package_python_destination",
+    "get_package_share_destination",
+    "parse_package",
+]
 
 
 def generate_distutils_setup(package_xml_path: str = ".", **kwargs: object) -> dict[str, object]:
@@ -37,6 +56,71 @@ def generate_distutils_setup(package_xml_path: str = ".", **kwargs: object) -> d
 
 def _persons(kind: str, persons: list[Person]) -> dict[str, object]:
     if len(persons) != 1:
-        return {kind: ", ".join(map(str, persons))} if persons else {}
+        return {kind: ", ".join(map(str, persons))}
     email = persons[0].email
     return {kind: persons[0].name, **({f"{kind}_email": email} if email is not None else {})}
+
+
+def get_global_bin_destination() -> str:
+    """Return the folder for commands of all packages, relative to the install prefix."""
+    return "bin"
+
+
+def get_global_etc_destination() -> str:
+    """Return the folder for configuration files of all packages, relative to the install prefix."""
+    return "etc"
+
+
+def get_global_include_destination() -> str:
+    """Return the folder for header files of all packages, relative to the install prefix."""
+    return "include"
+
+
+def get_global_lib_destination() -> str:
+    """Return the folder for libraries of all packages, relative to the install prefix."""
+    return "lib"
+
+
+def get_global_libexec_destination() -> str:
+    """Return the folder for programs of all packages, relative to the install prefix."""
+    return "lib"
+
+
+def get_global_share_destination() -> str:
+    """Return the folder for data files of all packages, relative to the install prefix."""
+    return "share"
+
+
+def get_global_python_destination() -> str:
+    """Return the folder for Python modules, relative to the install prefix."""
+    return f"lib/python{sys.version_info[0]}.{sys.version_info[1]}/site-packages"
+
+
+def get_package_bin_destination(pkgname: str) -> str:
+    """Return the folder for a package's programs, relative to the install prefix."""
+    return f"lib/{pkgname}"
+
+
+def get_package_etc_destination(pkgname: str) -> str:
+    """Return the folder for a package's configuration files, relative to the install prefix."""
+    return f"etc/{pkgname}"
+
+
+def get_package_include_destination(pkgname: str) -> str:
+    """Return the folder for a package's header files, relative to the install prefix."""
+    return f"include/{pkgname}"
+
+
+def get_package_share_destination(pkgname: str) -> str:
+    """Return the folder for a package's data files, relative to the install prefix."""
+    return f"share/{pkgname}"
+
+
+def get_package_lib_destination(_pkgname: str) -> str:
+    """Return the folder for a package's libraries, relative to the install prefix."""
+    return get_global_lib_destination()
+
+
+def get_package_python_destination(pkgname: str) -> str:
+    """Return the folder for a package's Python modules, relative to the install prefix."""
+    return f"{get_global_python_destination()}/{pkgname}"
