@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import tracemalloc
+from io import BytesIO
+from typing import BinaryIO
 
 from hypothesis import given
 from hypothesis import strategies as st
 
 from minirospy.web.server.account import LARGE_PIECE, Account
+from minirospy.web.server.files import FileAnswer
 from minirospy.web.server.queue import DEFAULT_LIMIT, ENTRY_BYTES, MAX_ANSWERS, SendQueue
 
 LIMIT = 1_000_000  # bytes in a queue that a test fills
@@ -140,6 +143,26 @@ def test_cleared_queue_holds_nothing() -> None:
     assert queue.pop() == (b"12",)
     assert queue.pop() is None
     assert queue.dropped == 0
+
+
+def test_files_are_answers_of_small_size() -> None:
+    queue = SendQueue()
+    opened: list[str] = []
+
+    def file(name: str) -> FileAnswer:
+        def open_() -> tuple[BinaryIO, int]:
+            opened.append(name)
+            return BytesIO(), 0
+
+        return FileAnswer(open_, lambda _: b"", lambda _: b"")
+
+    answers = [file("a"), file("b")]
+    for answer in answers:
+        queue.put_file(answer)
+    assert (len(queue), queue.size, queue.large) == (2, 0, 0)
+    assert 0 < queue.answers < 10_000
+    assert [queue.pop(), queue.pop(), queue.pop()] == [*answers, None]
+    assert (queue.answers, queue.sent, opened) == (0, 0, [])
 
 
 def test_limits_are_those_that_are_documented() -> None:
