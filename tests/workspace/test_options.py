@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from minirospy.base.errors import BuildError
-from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.parameter_generator_catkin import ParameterGenerator
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.parameter_generator_catkin import (
+    ParameterGenerator,
+)
 from minirospy.workspace.build import Workspace
 from minirospy.workspace.install import install
 from minirospy.workspace.plan import read_plan
