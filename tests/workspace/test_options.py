@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 
 from minirospy.base.errors import BuildError
+from minirospy.ros.dynamic_reconfigure.dynamic_reconfigure.parameter_generator_catkin import (
+    ParameterGenerator,
+)
 from minirospy.workspace.build import Workspace
 from minirospy.workspace.install import install
 from minirospy.workspace.plan import read_plan
@@ -165,3 +168,17 @@ def test_cfg_file_called_by_hand_says_how_it_is_called(scene: Scene) -> None:
     assert done.returncode == 1
     assert "generate_dynamic_reconfigure_options(cfg/NAME.cfg)" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_generator_whose_subclass_does_not_call_init_has_a_group() -> None:
+    class Described(ParameterGenerator):
+        def __init__(self) -> None:
+            self.group = self.Group(self, "Default", "", True, 0, 0)
+
+    first, second = Described(), Described()
+    first.add("brightness", "double", 1, "How bright", 0.5, 0, 1)
+    first.add_group("Colors").add("name", "str", 4, "Which color", "red")
+    description = first.group.to_dict()
+    assert description["parentname"] == "Default"
+    assert [each["name"] for each in first.group.get_parameters()] == ["brightness", "name"]
+    assert second.group.get_parameters() == []

@@ -11,8 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from minirospy.base.environment import Environment
+from minirospy.ros.roslaunch.launcher.load import load_files
 from minirospy.ros.sound_play.sound_play.players import PLAYERS, SPEAKERS, play_command, say_command
 from minirospy.ros.sound_play.sound_play.tones import BUILTIN, wav_of
+from minirospy.workspace.packages import Packages
 from tests.waiting import wait_until
 
 SCRIPTS = Path(__file__).parents[3] / "msgs" / "sound_play" / "scripts"
@@ -88,6 +91,16 @@ def run(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
         stdin=subprocess.DEVNULL,
         env={**os.environ, **environment},
     )
+
+
+def test_launch_file_takes_the_args_of_ross() -> None:
+    args = {"device": "hw:1", "loop_rate": "50", "default_voice": "voice_kal_diphone"}
+    spec = load_files([str(SCRIPTS.parent / "soundplay_node.launch")], args, Packages(Environment.read({})))
+    assert spec.params == {
+        "/soundplay_node/device": "hw:1",
+        "/soundplay_node/loop_rate": 50,
+        "/soundplay_node/default_voice": "voice_kal_diphone",
+    }
 
 
 def test_client_sends_the_documented_requests(master: str) -> None:

@@ -101,15 +101,15 @@ class ParameterGenerator:
             self.groups: list[ParameterGenerator.Group] = []
             self.parameters: list[Entry] = []
             self.srcfile, self.srcline = _source_line()
-            gen._groups[id] = self
+            gen._groups()[id] = self
 
         def get_group(self, id: int) -> ParameterGenerator.Group:
             """Return the group with this ID. Raise KeyError if there is none."""
-            return self.gen._groups[id]
+            return self.gen._groups()[id]
 
         def add_group(self, name: str, type: str = "", state: bool = True) -> ParameterGenerator.Group:
             """Add a subgroup and return it."""
-            group = self.gen.Group(self.gen, name, type, state, len(self.gen._groups), self.id)
+            group = self.gen.Group(self.gen, name, type, state, len(self.gen._groups()), self.id)
             self.groups.append(group)
             return group
 
@@ -193,12 +193,16 @@ class ParameterGenerator:
 
     def __init__(self) -> None:
         """Read the folders from the command line. Raise SystemExit if they are missing."""
-        self._groups: dict[int, ParameterGenerator.Group] = {}
         self.group = self.Group(self, "Default", "", True, 0, 0)
         self.constants: list[Entry] = []
         if len(sys.argv) < 5:
             raise SystemExit(_USAGE)
         self.dynconfpath, self.binary_dir, self.cpp_gen_dir, self.py_gen_dir = sys.argv[1:5]
+
+    def _groups(self) -> dict[int, ParameterGenerator.Group]:
+        """Return the groups by ID. It is created here, since ddynamic_reconfigure_python's subclass does not call __init__."""
+        groups: dict[int, ParameterGenerator.Group] = self.__dict__.setdefault("_groups_by_id", {})
+        return groups
 
     def pytype(self, drtype: str) -> type[Value]:
         """Return the Python type for a parameter type. Raise KeyError if the type is unknown."""
