@@ -168,11 +168,11 @@ def imports(path: Path, *, for_types: bool = True) -> frozenset[str]:
     return frozenset(found)
 
 
-def graph_of_imports(room: str) -> dict[str, set[str]]:
-    """Return the modules of the same room that each module imports, including in functions, but excluding imports for types."""
+def graph_of_imports(room: str, *, for_types: bool = False) -> dict[str, set[str]]:
+    """Return the modules of the same room that each module imports, also in functions and, if ``for_types``, for types only."""
     files = [path for path in FILES if path.relative_to(PACKAGE).with_suffix("").parts[0] == room]
     modules = {module_name(path): path for path in files}
-    found = {module: imports(path, for_types=False) for module, path in modules.items()}
+    found = {module: imports(path, for_types=for_types) for module, path in modules.items()}
     # `from package.module import name` and `from package import module` look alike.
     named = {
         module: set(names) | {name.rpartition(".")[0] for name in names} for module, names in found.items()
@@ -227,6 +227,28 @@ def test_runtime_and_wire_know_no_messages(path: Path) -> None:
 @pytest.mark.parametrize("room", sorted(DEPTH))
 def test_no_room_has_an_import_cycle(room: str) -> None:
     list(graphlib.TopologicalSorter(graph_of_imports(room)).static_order())
+
+
+def circles(graph: dict[str, set[str]]) -> list[set[str]]:
+    """Return the groups of modules that import each other, directly or by other modules."""
+    reached: dict[str, set[str]] = {}
+    for module in graph:
+        found, left = set[str](), [module]
+        while left:
+            more = graph[left.pop()] - found
+            found |= more
+            left += more
+        reached[module] = found
+    groups = [{other for other in reached[module] if module in reached[other]} for module in graph]
+    return [group for number, group in enumerate(groups) if group and group not in groups[:number]]
+
+
+def test_few_modules_import_types_in_a_circle() -> None:
+    """A part and its owner name each other's types in three places only."""
+    found = [circle for room in DEPTH for circle in circles(graph_of_imports(room, for_types=True))]
+    owners = {"minirospy.aio.node", "minirospy.client.session", "minirospy.runtime.rpc.server"}
+    assert [circle for circle in found if not circle & owners] == []
+    assert len(found) == len(owners)
 
 
 def ros_package_of(path: Path) -> str:

@@ -159,4 +159,3 @@ show(
         python_setup.get_global_python_destination()
     )
 )
-show(sorted(module.parse_package_for_distutils("../c2").items()))

@@ -30,7 +30,6 @@ __all__ = [
     "has_ros_schema_reference_string",
     "package_exists_at",
     "parse_package",
-    "parse_package_for_distutils",
     "parse_package_string",
 ]
 
@@ -386,18 +385,6 @@ def parse_package(path: str, warnings: list[str] | None = None) -> Package:
     filename = _file_of(path)
     with open(filename, "rb") as file:
         return parse_package_string(file.read(), filename, warnings)
-
-
-def parse_package_for_distutils(path: str | None = None) -> dict[str, object]:
-    """Return the arguments of setup(), as its successor `generate_distutils_setup` does, which a printed line names."""
-    from minirospy.ros.catkin_pkg.catkin_pkg.python_setup import generate_distutils_setup
-
-    print(
-        f"WARNING: {os.path.basename(os.path.abspath('.'))}/setup.py: "
-        "catkin_pkg.package.parse_package_for_distutils() is deprecated. "
-        "Please use catkin_pkg.python_setup.generate_distutils_setup(**kwargs) instead."
-    )
-    return generate_distutils_setup(*([] if path is None else [path]))
 
 
 def has_ros_schema_reference(path: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 from minirospy.base.names import canonicalize
 from minirospy.base.times import Time
@@ -65,6 +65,18 @@ class PrivateBag(ABC):
     @abstractmethod
     def flush(self) -> None:
         """Write the current chunk to the file."""
+
+    @abstractmethod
+    def read_messages(
+        self,
+        topics: str | Iterable[str] | None,
+        start_time: Time | None,
+        end_time: Time | None,
+        connection_filter: ConnectionFilter | None,
+        raw: bool,
+        return_connection_header: bool,
+    ) -> Iterator[Any]:
+        """Yield messages in time order."""
 
     @property
     @abstractmethod

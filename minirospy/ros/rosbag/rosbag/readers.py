@@ -11,7 +11,7 @@ from minirospy.ros.rosbag.rosbag.internals import _ChunkHeader, _ChunkInfo, _Con
 if TYPE_CHECKING:
     from minirospy.base.times import Time
     from minirospy.core.bag.base import Position
-    from minirospy.ros.rosbag.rosbag.bag import Bag
+    from minirospy.ros.rosbag.rosbag.opening import OpenedBag
     from minirospy.ros.rosbag.rosbag.private import (
         BagMessage,
         BagMessageWithConnectionHeader,
@@ -24,7 +24,7 @@ __all__: list[str] = []
 class _BagReader:
     """The reader for ``bag``, for any format version."""
 
-    def __init__(self, bag: Bag) -> None:
+    def __init__(self, bag: OpenedBag) -> None:
         self.bag = bag
 
     def seek_and_read_message_data_record(
