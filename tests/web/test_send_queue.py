@@ -145,6 +145,16 @@ def test_cleared_queue_holds_nothing() -> None:
     assert queue.dropped == 0
 
 
+def test_messages_are_dropped_without_the_answers() -> None:
+    queue = SendQueue()
+    for key in ("a", "b", "a"):
+        queue.put(key, (key.encode(),))
+    queue.put_answer((b"answer",))
+    queue.drop_messages()
+    assert (queue.size, queue.dropped, queue.dropped_of) == (0, 3, {"a": 2, "b": 1})
+    assert drained(queue) == [b"answer"]
+
+
 def test_files_are_answers_of_small_size() -> None:
     queue = SendQueue()
     opened: list[str] = []
