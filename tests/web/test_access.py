@@ -88,6 +88,9 @@ def test_refusals_name_the_reason_in_one_line() -> None:
     assert Access().check(request(origin="https://" + "x" * 200)) == Refusal(
         403, f"pages of 'https://{'x' * 92}' may not connect: start the bridge with --origin PATTERN"
     )
+    assert Access().check(request(origin="")) == Refusal(
+        403, "pages of '' may not connect: start the bridge with --origin PATTERN"
+    )
     assert Access().check(request("y" * 200)) == Refusal(
         403,
         f"Host '{'y' * 100}' is not a name of this server: use its address, or start the bridge with --host-name NAME",

@@ -145,6 +145,16 @@ def test_cleared_queue_holds_nothing() -> None:
     assert queue.dropped == 0
 
 
+def test_messages_are_dropped_without_the_answers() -> None:
+    queue = SendQueue()
+    for key in ("a", "b", "a"):
+        queue.put(key, (key.encode(),))
+    queue.put_answer((b"answer",))
+    queue.drop_messages()
+    assert (queue.size, queue.dropped, queue.dropped_of) == (0, 3, {"a": 2, "b": 1})
+    assert drained(queue) == [b"answer"]
+
+
 def test_files_are_answers_of_small_size() -> None:
     queue = SendQueue()
     opened: list[str] = []
@@ -157,11 +167,12 @@ def test_files_are_answers_of_small_size() -> None:
         return FileAnswer(open_, lambda _: b"", lambda _: b"")
 
     answers = [file("a"), file("b")]
-    for answer in answers:
-        queue.put_file(answer)
-    assert (len(queue), queue.size, queue.large) == (2, 0, 0)
+    queue.put_file(answers[0])
+    queue.put_answer((b"answer",))
+    queue.put_file(answers[1])
+    assert (len(queue), queue.size, queue.large) == (3, 0, 0)
     assert 0 < queue.answers < 10_000
-    assert [queue.pop(), queue.pop(), queue.pop()] == [*answers, None]
+    assert [queue.pop() for _ in range(4)] == [answers[0], (b"answer",), answers[1], None]
     assert (queue.answers, queue.sent, opened) == (0, 0, [])
 
 

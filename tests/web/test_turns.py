@@ -417,8 +417,8 @@ def test_meter_is_the_threads_time_if_that_is_fine_enough(monkeypatch: pytest.Mo
         (SLICE_SECONDS / 10, time.monotonic),
         (0.016, time.monotonic),
     ):
-        info = SimpleNamespace(resolution=resolution)
-        monkeypatch.setattr(time, "get_clock_info", lambda _, info=info: info)
+        infos = {"thread_time": SimpleNamespace(resolution=resolution)}
+        monkeypatch.setattr(time, "get_clock_info", infos.__getitem__)
         assert cpu_meter() is meter
 
 
