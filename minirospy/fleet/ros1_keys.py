@@ -87,7 +87,7 @@ def shared_topics(
 ) -> tuple[dict[str, SharedTopic], dict[str, str]]:
     """Return the local and remote topics by name, and the reasons why remote topics are ignored, by name.
 
-    A remote topic is ignored if its type differs. The local type takes precedence. If there are only remote types, the first one does.
+    A remote topic is ignored if its type differs. The local type takes precedence; without one, the first remote type does.
     """
     found = {name: SharedTopic(token) for name, token in local.items() if token.md5sum != UNKNOWN_MD5}
     conflicts = {}
