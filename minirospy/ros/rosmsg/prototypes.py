@@ -106,7 +106,7 @@ def dump(
 
 
 def _filled(message: Any, name: str) -> list[object]:
-    """Return the value of an empty array with one element, if its class is known."""
+    """Return the value of an empty array with one default element added, or [] if the element's class is unknown."""
     type_ = message._slot_types[message.__slots__.index(name)]
     element = get_array_type_instance(type_, default_package=message._type.partition("/")[0])
     return [] if element is None else [element]

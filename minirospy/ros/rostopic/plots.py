@@ -143,7 +143,7 @@ def array_index_or_slice(index_string: str) -> int | slice:
 
 
 def ascii_table(header: Sequence[str], cols: Mapping[str, list[Any]]) -> str:
-    """Return a table with a line below the names; the columns in ``cols`` are padded in place, as in ROS."""
+    """Return a table with a rule below the header row. As in ROS, the columns in ``cols`` are padded in place."""
     widths = {name: max(len(name), *(len(each) for each in cols[name])) for name in header}
     for name in header:
         cols[name][:] = [str(each).ljust(widths[name]) for each in cols[name]]

@@ -104,7 +104,7 @@ class ParameterGenerator:
             gen._groups[id] = self
 
         def get_group(self, id: int) -> ParameterGenerator.Group:
-            """Return the group with this ID. Raise KeyError if there is none."""
+            """Return the group with this ID. Raise KeyError if no group has this ID."""
             return self.gen._groups[id]
 
         def add_group(self, name: str, type: str = "", state: bool = True) -> ParameterGenerator.Group:
@@ -166,7 +166,7 @@ class ParameterGenerator:
             return "::".join([*map(str.upper, above), name.lower()])
 
         def get_class(self, parent: bool = False) -> str:
-            """Return the name of this group's C++ class, or with ``parent``, of the enclosing class."""
+            """Return the name of this group's C++ class or, if ``parent``, of the enclosing class."""
             names = [name.upper() for name in self.get_parents()]
             return "::".join(names[:-1] if parent else names)
 
@@ -221,7 +221,10 @@ class ParameterGenerator:
         param["cconsttype"] = _CPP_CONSTANTS[param["type"]]
 
     def check_type_fill_default(self, param: Entry, field: _ValueKey, default: Value) -> None:
-        """Convert a parameter's value, or set it to ``default`` if it is None. Raise TypeError if it cannot be converted."""
+        """Convert a parameter's value, or set it to ``default`` if it is None.
+
+        Raise TypeError if the value cannot be converted.
+        """
         if param[field] is None:
             param[field] = default
         else:

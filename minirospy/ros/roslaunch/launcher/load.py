@@ -223,7 +223,7 @@ class _File:
             self.report(error)
             return scope
 
-    # --- args, and what structures a file
+    # --- args, groups, includes and the settings of a scope
 
     def _arg(self, tag: Tag, scope: _Scope) -> _Scope:
         name, value, default = _arg_texts(tag)

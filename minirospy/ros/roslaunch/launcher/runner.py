@@ -294,7 +294,7 @@ class Launcher:
     def _on_end(self, process: Process) -> None:
         """Handle a node's exit; a hook for subclasses."""
 
-    # --- ending
+    # --- shutdown
 
     def close(self) -> None:
         """Terminate all processes: the nodes in reverse order, then the master. Idempotent."""

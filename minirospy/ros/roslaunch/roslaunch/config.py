@@ -193,7 +193,7 @@ def get_roscore_filename() -> str | None:
 
 
 def _parameter_command(exe: Executable) -> ParameterCommand | None:
-    """Return a rosparam command as the launcher runs it, or None if it is another one."""
+    """Return a rosparam command in the launcher's form, or None if the launcher does not support the command."""
     match (exe.command, *exe.args):
         case ("rosparam", "delete", name):
             return ParameterCommand(name)

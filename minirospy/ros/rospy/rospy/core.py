@@ -131,7 +131,7 @@ def _base_logger(
     level: str = "info",
     once: bool = False,
 ) -> None:
-    """Log with the source position of the caller's caller, as rospy's log functions do; programs wrap this function similarly.
+    """Log with the source position of the caller's caller. rospy's log functions wrap this function, and programs may do so, too.
 
     ``level`` is a logging.Logger method name (``warning``), ``kwargs`` may contain ``logger_name``.
     """

@@ -132,7 +132,7 @@ class SerialClient:
         rospy.loginfo("shutdown hook activated")
         self._ended.set()
 
-    # --- the line
+    # --- serial connection
 
     def run(self) -> None:
         """Forward messages until the node is shut down. Raise PortError if the connection is lost."""
@@ -255,7 +255,7 @@ class SerialClient:
         except (rospy.ROSException, MinirospyError, ValueError, KeyError, TypeError) as error:
             rospy.logerr("A message of topic id %d is dropped: %s", packet.topic_id, error)
 
-    # --- what a device sends
+    # --- messages from the device
 
     def setPublishSize(self, size: int) -> None:
         """Set the size of the device's output buffer; only the first call has an effect."""

@@ -248,7 +248,7 @@ def _print_or_exit(text: str | None, error: str) -> None:
 
 
 def _rosservice_list(namespace: str | None = None, print_nodes: bool = False) -> None:
-    """Print the services below a namespace; ``print_nodes``: with the nodes that provide them."""
+    """Print the services below a namespace; if ``print_nodes``, also print the nodes that provide each service."""
     for name, nodes in sorted(get_service_list(namespace=namespace, include_nodes=True)):
         print(f"{name} {','.join(nodes)}" if print_nodes else name)
 

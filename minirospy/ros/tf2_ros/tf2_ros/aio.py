@@ -150,7 +150,7 @@ class Buffer:
         """Return each frame's parent, broadcaster, rate and times, in the format that view_frames reads."""
         return frames_as_yaml(self.tree)
 
-    # --- within
+    # --- internal
 
     async def _wait_for(self, look: Callable[[], _T], timeout: float | None) -> _T:
         try:

@@ -43,7 +43,7 @@ class BufferCore:
         )
         self._changed: tuple[Callable[[], object], ...] = ()
 
-    # --- transforms in
+    # --- inserting transforms
 
     def set_transform(self, transform: TransformStamped, authority: str) -> None:
         """Insert a transform that was received from the node ``authority``."""
@@ -67,7 +67,7 @@ class BufferCore:
         with self._lock:
             self._tree.clear()
 
-    # --- lookups out
+    # --- lookups
 
     def lookup_transform_core(self, target_frame: str, source_frame: str, time: Moment) -> TransformStamped:
         """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0 means the latest common time.
@@ -124,7 +124,7 @@ class BufferCore:
         with self._lock:
             return Time(*divmod(self._tree.latest_common_time(target_frame, source_frame), _BILLION))
 
-    # --- what there is
+    # --- known frames
 
     def all_frames_as_yaml(self, time: Moment | float = 0.0) -> str:
         """Return each frame's parent, broadcaster, rate and times; ``time`` has no effect, as in real ROS."""
@@ -157,7 +157,7 @@ class BufferCore:
         with self._lock:
             return self._tree.frame_names()
 
-    # --- within
+    # --- internal
 
     def on_change(self, function: Callable[[], object]) -> Callable[[], None]:
         """Call ``function`` after each insertion, in the inserting thread; return a function that stops these calls."""

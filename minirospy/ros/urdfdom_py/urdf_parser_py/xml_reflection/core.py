@@ -202,7 +202,7 @@ class Object:
     TAG: ClassVar[str] = ""
     FIELDS: ClassVar[tuple[Attribute | Element | Many, ...]] = ()
 
-    # --- XML in
+    # --- parsing XML
 
     @classmethod
     def from_xml_string(cls: type[_T], xml_string: str | bytes) -> _T:
@@ -302,7 +302,7 @@ class Object:
     def pre_write_xml(self) -> None:
         """Do nothing; subclasses in programs override it to prepare for writing."""
 
-    # --- XML out
+    # --- writing XML
 
     def to_xml(self) -> ET.Element:
         """Return the object as an element."""
@@ -372,7 +372,7 @@ class Object:
     def _aggregates(self) -> list[tuple[str, object]]:
         return [(self.aggregate_type[each], each) for each in self.aggregate_order]
 
-    # --- for people
+    # --- human-readable output
 
     def to_yaml(self) -> object:
         """Return the object as data that YAML can represent."""
