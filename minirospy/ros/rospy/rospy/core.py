@@ -205,7 +205,7 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 
 
 def is_topic(param_name: str) -> Validator:
-    """Return a check that the argument ``param_name`` is a topic name. The check raises ParameterInvalid if it is not."""
+    """Return a check that the argument ``param_name`` is a topic name. The check raises ParameterInvalid for other values."""
     resolved = valid_name(param_name)
 
     def check(param_value: object, caller_id: str) -> str:

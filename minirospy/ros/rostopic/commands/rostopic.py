@@ -277,7 +277,7 @@ def _echo(
         field = wait_for_topic(graph, name, lambda: warn_unpublished(graph, name))
 
     def report(error: Exception) -> None:
-        """Print ROS's message and minirospy's for an index that exceeds an array."""
+        """Print ROS's message and minirospy's message for an index that exceeds an array."""
         print(f"{error.__cause__}: /{field.path}\nrostopic: {error}", file=sys.stderr)
 
     printed = 0

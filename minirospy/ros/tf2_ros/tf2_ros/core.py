@@ -54,7 +54,7 @@ class BufferCore:
         self._insert(transform, authority, True)
 
     def insert_message(self, data: bytes, authority: str, is_static: bool = False) -> None:
-        """Insert a serialized TFMessage. If it has the same layout as earlier messages, decode it only when needed.
+        """Insert a serialized TFMessage. If its layout equals that of earlier messages, decode the message only when needed.
 
         The real tf2_py has no such method. Raise DeserializationError if the bytes are invalid.
         """
@@ -99,7 +99,7 @@ class BufferCore:
         return transform_stamped(target_frame, source_frame, found)
 
     def can_transform_core(self, target_frame: str, source_frame: str, time: Moment) -> tuple[int, str]:
-        """Return whether a lookup would succeed (1 or 0), and the reason if not."""
+        """Return (1, "") if a lookup would succeed, otherwise (0, the reason)."""
         stamp = nanoseconds(time)
         _check_names(target_frame, source_frame)
         return self._possible(lambda: self._tree.why_not(target_frame, source_frame, stamp))
@@ -107,7 +107,7 @@ class BufferCore:
     def can_transform_full_core(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> tuple[int, str]:
-        """Return whether a lookup with a fixed frame would succeed (1 or 0), and the reason if not."""
+        """Return (1, "") if a lookup with a fixed frame would succeed, otherwise (0, the reason)."""
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         _check_names(target_frame, source_frame, fixed_frame)
         return self._possible(
