@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 __all__ = ["ClockOffset", "Delay", "Ping", "offset_of"]
 
-_SHARE = 0.1  # weight of a new message in the mean delay
+_SHARE = 0.1  # weight of the newest message's delay in the mean delay
 
 
 class Ping(NamedTuple):
@@ -22,7 +22,7 @@ class Ping(NamedTuple):
 class ClockOffset(NamedTuple):
     """The difference between a peer's clock and the local one. Subtract ``offset`` from the peer's times to get local times.
 
-    The offset is accurate to half the round trip.
+    The error of the offset is at most half the round trip.
     """
 
     offset: int

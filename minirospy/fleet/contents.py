@@ -20,7 +20,7 @@ _Token = TypeVar("_Token", TopicToken, ServiceToken)
 __all__ = ["MAX_GATEWAYS", "MAX_NAMES", "MAX_TOKENS", "FleetContents", "Refused", "Robot"]
 
 MAX_GATEWAYS = 5_000
-MAX_NAMES = 2_000  # maximum number of topics that a gateway may announce, and also of services
+MAX_NAMES = 2_000  # maximum number of topics, and also of services, that a gateway may announce
 # maximum number of topics and services of all gateways together, which take some 100 MiB
 MAX_TOKENS = 200_000
 
@@ -36,7 +36,10 @@ class Robot:
 
 
 class Refused(NamedTuple):
-    """A gateway that is not shown. ``holder`` is the claim that holds the name, or held it until recently."""
+    """A gateway that is not shown, because its name is taken.
+
+    ``holder`` is the claim that has the name, or had it until recently.
+    """
 
     claim: Claim
     holder: Claim | None
@@ -55,7 +58,7 @@ class _Gateway:
 
 
 class FleetContents:
-    """The tokens that currently exist."""
+    """The record of all tokens that currently exist."""
 
     def __init__(self, allows: Callable[[str], bool], clock: Callable[[], float] = time.monotonic) -> None:
         """Create an empty record.
@@ -64,7 +67,7 @@ class FleetContents:
         """
         self.holders = Holders(clock)
         self.waiting: tuple[Refused, ...] = ()
-        """The gateways that :meth:`robots` left out because another one holds their name."""
+        """The gateways that :meth:`robots` left out because another gateway holds their name."""
         self.refused = 0  # number of ignored tokens
         self.refusal = ""  # reason why the last ignored token was ignored
         self._count = 0
@@ -73,7 +76,7 @@ class FleetContents:
         self._gateways: dict[tuple[str, str], _Gateway] = {}
 
     def add(self, key: str) -> bool:
-        """Add a token; return whether that changes the contents."""
+        """Add a token; return whether the contents have changed."""
         token = parse_claim(key) or parse_topic(key) or parse_service(key)
         if token is None:
             return self._refuse("a key is not that of a robot, a topic or a service")
@@ -102,7 +105,7 @@ class FleetContents:
         return changed
 
     def remove(self, key: str) -> bool:
-        """Remove a token; return whether that changes the contents."""
+        """Remove a token; return whether the contents have changed."""
         token = parse_claim(key) or parse_topic(key) or parse_service(key)
         if token is None:
             return False
@@ -111,7 +114,8 @@ class FleetContents:
         if gateway is None:
             return False
 
-        # If a topic's flags change, the new token arrives before the old one is removed.
+        # If a topic's flags change, the new token arrives before the old one is removed, so remove only an equal
+        # token.
         if isinstance(token, Claim):
             if gateway.claim != token:
                 return False

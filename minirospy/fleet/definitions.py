@@ -25,13 +25,15 @@ __all__ = ["Definitions", "checked_specs"]
 
 _MOST = 5_000
 ANSWER_SECONDS = 10.0
-MAX_CHARACTERS = 64 << 20  # in all cached definitions; ROS's own packages define 3 million characters
-MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4  # concurrent; an unanswered query times out after ANSWER_SECONDS
+# maximum for all cached definitions together; ROS's own packages define 3 million characters
+MAX_CHARACTERS = 64 << 20
+# maximum number of concurrent queries, in total and to one gateway; an unanswered query times out after ANSWER_SECONDS
+MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4
 _NO_FIELDS = "d41d8cd98f00b204e9800998ecf8427e"
 
 
 def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
-    """Return the specs in a full definition. Raise DefinitionError if it is invalid or does not have this md5sum."""
+    """Return the specs in a full definition. Raise DefinitionError if the definition is invalid or has another md5sum."""
     specs, found = checked_text(name, text)
     if found != md5sum:
         raise DefinitionError(name, 1, f"its md5sum is {found}, not {md5sum}")
@@ -47,7 +49,7 @@ class Definitions:
         self._known: dict[tuple[str, str], str] = {}
         self._known_characters = 0
         self._finding: dict[tuple[str, str, str], asyncio.Task[str]] = {}
-        """The running queries, by type, md5sum and gateway."""
+        """The running queries, by (type, md5sum, gateway)."""
         self._shares: WeakValueDictionary[str, asyncio.Semaphore] = WeakValueDictionary()
         self._querying = asyncio.Semaphore(MAX_QUERIES)
         self._rewriters: dict[tuple[str, str], FrameRewriter | None] = {}
@@ -74,7 +76,7 @@ class Definitions:
         return found.md5sum if found else ""
 
     async def text(self, name: str, md5sum: str) -> str:
-        """Return the locally known definition of a type, or "" if there is none."""
+        """Return the locally known definition of a type, or "" if the definition is not known."""
         if (name, md5sum) not in self._known:
             installed = await self.texts.installed(name)
             if installed is None or installed.md5sum != md5sum:
@@ -85,11 +87,11 @@ class Definitions:
     async def interface(self, name: str, md5sum: str, gateway: str) -> InterfaceType:
         """Return a type, with its definition if this gateway or ``gateway`` ("" for none) knows it.
 
-        Messages are passed even without a definition.
+        Messages are forwarded even if the definition is not known.
         """
         text = await self.text(name, md5sum)
         if not text and gateway and md5sum != _NO_FIELDS:
-            # Query each gateway separately, so that one that does not respond delays only its own topics.
+            # Query each gateway separately, so that a gateway that does not respond delays only its own topics.
             key = name, md5sum, gateway
             task = self._finding.get(key)
             if task is None:
@@ -99,7 +101,7 @@ class Definitions:
         return InterfaceType(name, md5sum, text)
 
     async def rewriter(self, name: str, md5sum: str) -> FrameRewriter | None:
-        """Return the rewriter for a type's frame ids, or None if the type has none or its definition is not known."""
+        """Return the rewriter for a type's frame ids, or None if the type has no frame ids or its definition is not known."""
         key = name, md5sum
         if key not in self._rewriters:
             text = await self.text(name, md5sum)

@@ -42,7 +42,7 @@ __all__ = ["Exporter"]
 _log = logging.getLogger(__name__)
 _MAX_IN_FLOWS = 1_000
 MAX_WANTED, MAX_READERS = 10_000, 1_000
-"""Maximum number of topics that readers may request, and of readers per topic, because peers choose both."""
+"""Maximum number of topics that readers may request, and of readers per topic. Both are limited because peers choose them."""
 
 
 class Exporter:
@@ -83,7 +83,7 @@ class Exporter:
         self._declared: list[Deferred] = []
 
     async def start(self) -> None:
-        """Announce the robot until :meth:`close`.
+        """Start announcing the robot, which continues until :meth:`close`.
 
         Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
@@ -128,7 +128,7 @@ class Exporter:
         await self._adjust()
         return changed
 
-    # --- what is announced
+    # --- announcements
 
     def _announce(self) -> None:
         keys = {topic_key(each) for each in self.graph.topics.values()}
@@ -139,7 +139,7 @@ class Exporter:
         for key in self._tokens.keys() - keys:
             self._tokens.pop(key).undeclare()
 
-    # --- what others want, and offer
+    # --- requests and offers from other gateways
 
     def want_changed(self, key: str, is_there: bool) -> None:
         want = parse_want(key)
@@ -191,7 +191,8 @@ class Exporter:
 
     async def _adjust(self) -> None:
         """Open and close outbound and inbound topics to match the graph and the readers' requests."""
-        # Closing awaits the master, and other calls of this method may change both tables in the meantime.
+        # Use a copy: closing awaits the master, and other calls of this method may change both tables in the
+        # meantime.
         for topic, outbound in list(self.outbound.items()):
             token = self.graph.topics.get(topic)
             if self.outbound.get(topic) is outbound and (
@@ -221,10 +222,10 @@ class Exporter:
                 del self.inbound[topic]
                 await inbound.close()
 
-    # --- messages, calls and questions of others
+    # --- messages, service calls and queries from other gateways
 
     def _inbound_of(self, topic: str) -> InboundTopic | None:
-        """Return the publisher for messages that arrive on a topic, which must have subscribers here."""
+        """Return the publisher for messages that arrive on a topic, or None if the topic has no local subscribers."""
         inbound = self.inbound.get(topic)
         token = self.graph.topics.get(topic)
         if inbound is None and token is not None and token.is_subscribed:

@@ -1,7 +1,7 @@
 """Fair queues for messages to be sent or delivered. A full flow drops its oldest messages. Pure.
 
-At the sender, a flow contains the messages on a topic; at the receiver, those on one topic of one robot. Each flow keeps
-its newest messages, and flows are served round-robin, so that a flooding flow loses only its own messages.
+At the sender, a flow contains the messages on a topic; at the receiver, the messages on one topic of one robot. Each flow
+keeps its newest messages, and flows are served round-robin, so that a flooding flow loses only its own messages.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ _MAX_ELEMENTS = 1_000_000
 
 
 class _Skip(NamedTuple):
-    """A number of fixed bytes to skip."""
+    """A number of bytes to skip, because they contain no frame id and have a fixed length."""
 
     size: int
 
@@ -133,7 +133,7 @@ def _has_frame(step: _Step) -> bool:
 
 
 def _trimmed(steps: tuple[_Step, ...]) -> tuple[_Step, ...]:
-    """Return the steps up to the last frame id."""
+    """Return the steps up to the last frame id, because the rest of a message is copied unchanged."""
     last = max((number for number, step in enumerate(steps) if _has_frame(step)), default=-1)
     return steps[: last + 1]
 

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["REGISTRATION_FAULT_LINES", "Gateway", "GatewayOptions"]
 
 REGISTRATION_FAULT_LINES = 1
-"""Maximum number of log lines in ten seconds from a gateway's node, so that a master that rejects the topics of 1,000 robots
-causes one line.
+"""Maximum number of log lines in ten seconds from a gateway's node. If a master rejects the topics of 1,000 robots, a single
+line is logged.
 """
 _log = logging.getLogger(__name__)
 
@@ -42,8 +42,8 @@ _log = logging.getLogger(__name__)
 class GatewayOptions:
     """A gateway's settings.
 
-    ``name`` is the robot's name, or "" for a gateway that is only a control room. With ``imports``, the fleet's robots
-    are shown here. ``ros1_namespace`` is the namespace of zenoh-bridge-ros1's keys to pass as well, or "" for none.
+    ``name`` is the robot's name, or "" for a gateway that is only a control room. If ``imports``, the fleet's robots are
+    shown here. ``ros1_namespace`` is the namespace of zenoh-bridge-ros1's keys if those are to be used as well, otherwise "".
     ``clock`` returns the time in ns, ``host`` identifies the machine ("" for the default); tests replace both.
     """
 
@@ -57,10 +57,10 @@ class GatewayOptions:
 
 
 class Gateway:
-    """Passes topics and services between a master and the fleet. Runs on the node's loop."""
+    """Forwards topics and services between a master and the fleet. Runs on the node's loop."""
 
     def __init__(self, node: Node, options: GatewayOptions) -> None:
-        """Create the gateway. Raise BridgeError if the name is not legal for a robot."""
+        """Create the gateway. Raise BridgeError if the name in the options is not a legal robot name."""
         if options.name and not is_robot_name(options.name):
             raise BridgeError(
                 f"[{options.name}] cannot be a robot's name: letters, digits and underscores, a letter first"
@@ -92,7 +92,7 @@ class Gateway:
             self.network = await FleetNetwork.open(self.options.network)
 
     async def start(self) -> None:
-        """Connect to the fleet, unless :meth:`connect` already has, and pass topics and services until :meth:`close`.
+        """Connect to the fleet, unless :meth:`connect` has done so, and start forwarding, which continues until :meth:`close`.
 
         Raise BridgeError if the fleet cannot be joined, MasterUnreachableError or RpcError if a call to the master fails,
         or ROSInterruptException if the node is shut down first.

@@ -14,8 +14,9 @@ from minirospy.fleet.keys import Claim, is_machine
 
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
-HOLD_SECONDS = 10.0  # Zenoh's default lease, after which a silent link is closed
-# maximum number of names to remember for HOLD_SECONDS after the robots have left, because peers choose names
+HOLD_SECONDS = 10.0  # Zenoh's default lease time, after which it closes a silent link
+# maximum number of names to remember for HOLD_SECONDS after their robots have left; limited because peers choose the
+# names
 MAX_HOLDS = 5_000
 
 
@@ -27,7 +28,7 @@ class _Hold:
 
 
 class Holders:
-    """Selects among the claims to each name, and remembers the selection."""
+    """Selects one of the claims to each name, and remembers the selection."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         """Create an empty record. ``clock`` returns monotonic seconds."""
@@ -50,7 +51,10 @@ class Holders:
         return hold.claim if hold else None
 
     def choose(self, name: str, claims: Sequence[Claim]) -> Claim | None:
-        """Return the claim to use from those present, given in the order in which they were seen; None if no claim is allowed."""
+        """Return the claim to use, or None if no claim is allowed.
+
+        ``claims`` are those present, in the order they were first seen.
+        """
         present = [claim for claim in claims if claim not in self._given_up] or list(claims)
         machine = self.machines.get(name)
         if machine:

@@ -69,13 +69,13 @@ class Shared:
     spawn: Callable[[Coroutine[object, object, None]], object]
     clock: Callable[[], int]
     left_out: RateLimitedLogger
-    """Logs topics that cannot be shown."""
+    """Logs topics that cannot be imported."""
     registering: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(MAX_REGISTERING))
     statics: dict[str, StaticTransforms] = field(default_factory=dict)
 
 
 class ImportedTopic:
-    """One topic of one robot. Runs on the loop, except for message handling."""
+    """One topic of one robot. Runs on the loop, except for the handling of messages."""
 
     def __init__(self, shared: Shared, token: TopicToken, offset: Callable[[], ClockOffset | None]) -> None:
         """Create the topic. ``offset()`` returns the offset of the robot's clock, or None before it has been measured."""
@@ -102,7 +102,7 @@ class ImportedTopic:
 
     @property
     def is_open(self) -> bool:
-        """Return whether messages from the robot are being passed."""
+        """Return whether messages from the robot are being forwarded."""
         return bool(self._wanted)
 
     @property
@@ -263,7 +263,8 @@ class ImportedTopic:
         if stamp:
             before = self._numbers.get("out")
             self._numbers["out"] = stamp.number
-            # The numbers restart after the robot has reopened the topic, so do not count that as lost messages.
+            # The numbers restart after the robot has reopened the topic, so do not count a jump back or a huge jump
+            # as lost messages.
             if before is not None and before < stamp.number <= before + 1_000_000:
                 self.lost += stamp.number - before - 1
             offset = self._offset()

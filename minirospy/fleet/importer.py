@@ -38,16 +38,16 @@ MACHINES = "/fleet/machines"
 _log = logging.getLogger(__name__)
 _SETTLE_SECONDS = 0.1
 LOOK_SECONDS = 1.0
-AGAIN_SECONDS = 5.0  # before adding a robot again after a failure
+AGAIN_SECONDS = 5.0  # seconds to wait before adding a robot again after a failure
 _CLOCK_SECONDS = 30.0
 _PINGS = 5
 PING_SECONDS = 5.0
-_MAX_PING = 64  # maximum size in bytes of a reply to a ping, which normally has 8
+_MAX_PING = 64  # maximum size in bytes of a reply to a ping; a valid reply has 8 bytes
 _CALL_SECONDS = 3600.0
 # seconds for a name's holder to reply after another gateway on the same machine has claimed the name
 CHALLENGE_SECONDS = 2.0
-# number of removed names (some 4 MB) after which memory is returned, and the seconds to wait before that, as links
-# linger
+# number of removed names (some 4 MB) after which memory is returned to the system, and the seconds to wait before
+# that, because links are closed late
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
 MAX_ROBOT_NAMES = 2_000  # maximum number of names, of _MAX_IMPORTED, that one robot may use
 # maximum number of a robot's names to close concurrently, because each needs a task and a call to the master
@@ -74,7 +74,7 @@ class ImportedRobot:
 
 
 class Importer:
-    """Shows the fleet's robots in the local graph. Runs on the node's loop, except for message handling."""
+    """Shows the fleet's robots in the local graph. Runs on the node's loop, except for the handling of messages."""
 
     def __init__(
         self,
@@ -142,7 +142,7 @@ class Importer:
         return list(self.robots)
 
     async def start(self) -> None:
-        """Show robots until :meth:`close`.
+        """Start showing robots, which continues until :meth:`close`.
 
         Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
@@ -211,7 +211,7 @@ class Importer:
     async def _read_machines(self) -> None:
         self.contents.holders.machines = parse_machines(await self._node.get_param(MACHINES, {}))
 
-    # --- what is shown
+    # --- imported robots
 
     async def _reconcile(self) -> None:
         """Add, update and remove robots to match the fleet's contents."""
@@ -228,7 +228,7 @@ class Importer:
             self._is_reconciling = False
         seconds = time.monotonic() - started
         if seconds > _SETTLE_SECONDS:
-            # While a thousand robots join, leave time on the loop for other tasks.
+            # While a thousand robots join, this pause leaves time on the loop for other tasks.
             self._not_before = asyncio.get_running_loop().time() + 2 * seconds
             if self._reconciling is not None:
                 self._reconciling.cancel()
@@ -461,7 +461,7 @@ class Importer:
                     self._spawn(self._measure(shown))
 
     async def _snapshot(self) -> Snapshot | None:
-        """Return the local graph if a robot both publishes and subscribes to a topic, so that the graph is needed; else None."""
+        """Return the local graph, or None if it is not needed because no robot publishes and subscribes to the same topic."""
         if any(topic.needs_snapshot for shown in self.robots.values() for topic in shown.topics.values()):
             return await fetch(self._node.call_master)
         return None
@@ -472,7 +472,7 @@ class Importer:
                 topic.look(snapshot)
 
     async def _answering(self) -> list[str] | None:
-        """Query all gateways in the fleet; return those that respond, or None if the query cannot be sent."""
+        """Query all gateways in the fleet; return the gateways that respond, or None if the query cannot be sent."""
         start = f"{ROOT}/ping/"
         try:
             answers = await self._network.queries(f"{start}*", seconds=PING_SECONDS, size=_MAX_PING)

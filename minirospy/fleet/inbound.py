@@ -1,4 +1,4 @@
-"""A topic that a robot subscribes to and other gateways offer. It is published here while at least one of them offers it."""
+"""A topic that a robot subscribes to and other gateways offer. The topic is published here while a gateway offers it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes
 def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
     """Run a coroutine on a node's loop and wait until it is done.
 
-    If the loop is slow, messages are therefore queued in the receiver.
+    Waiting keeps further messages in the receiver's queue while the loop is slow.
     """
     done = node.run_threadsafe(work)
     with contextlib.suppress(Exception):

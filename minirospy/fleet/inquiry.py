@@ -23,7 +23,7 @@ _MAX_CONCURRENT = 16
 
 
 def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitable[_T]]) -> _T:
-    """Open a session, run ``question``, and return its result. Raise BridgeError if no gateway or router is reached."""
+    """Open a session, run ``question``, and return its result. Raise BridgeError if neither a gateway nor a router is reached."""
 
     async def asking() -> _T:
         network = await FleetNetwork.open(options, waits=False)
@@ -41,7 +41,7 @@ def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitabl
 
 
 async def fleet_status(network: FleetNetwork, seconds: float) -> tuple[list[Answer], list[Answer]]:
-    """Return the robots and control rooms that are present; each gateway has ``seconds`` to reply."""
+    """Return the robots and control rooms that are present, with their status; each gateway has ``seconds`` to reply."""
     robots = await _claims(network, "robot", seconds)
     controls = await _claims(network, "control", seconds)
     limit = asyncio.Semaphore(_MAX_CONCURRENT)
@@ -59,7 +59,7 @@ async def fleet_status(network: FleetNetwork, seconds: float) -> tuple[list[Answ
 
 
 async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds: float) -> object:
-    """Return a robot's parameter, or the dict for a namespace. Raise BridgeError if the robot does not provide it."""
+    """Return a robot's parameter, or a dict if the name is a namespace. Raise BridgeError if the robot does not provide it."""
     claim = await _shown_claim(network, robot, seconds)
     if claim is None:
         raise BridgeError(
@@ -80,7 +80,7 @@ async def robot_parameter(network: FleetNetwork, robot: str, name: str, seconds:
 async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Claim | None:
     """Return the claim to a name.
 
-    If there are several, return the one that the control rooms show; raise BridgeError if they disagree.
+    If there are several claims, return the one that the control rooms show; raise BridgeError if the control rooms disagree.
     """
     claims = [each for each in await _claims(network, "robot", seconds) if each.name == robot]
     if len(claims) > 1:

@@ -84,7 +84,7 @@ _STAMP = struct.Struct("<Iq")
 class Claim(NamedTuple):
     """A gateway's claim to represent a robot since ``start`` (in ns of the gateway's clock), on the machine ``host``.
 
-    Neither field is verified; no decision depends on ``start``.
+    Neither ``start`` nor ``host`` is verified; no decision depends on ``start``.
     """
 
     name: str
@@ -94,7 +94,7 @@ class Claim(NamedTuple):
 
 
 class TopicToken(NamedTuple):
-    """A robot's topic. With ``has_frames``, its frame ids get the robot's prefix."""
+    """A robot's topic. If ``has_frames``, the robot's prefix is added to the frame ids in its messages."""
 
     robot: str
     gateway: str
@@ -147,7 +147,7 @@ class Stamp(NamedTuple):
 
 
 def is_robot_name(name: str) -> bool:
-    """Return whether a name is legal for a robot, because it becomes a ROS namespace."""
+    """Return whether a name is a legal robot name. Robot names become ROS namespaces."""
     return bool(_ROBOT.fullmatch(name))
 
 
@@ -162,7 +162,7 @@ def is_md5(text: str) -> bool:
 
 
 def mangled(name: str) -> str:
-    """Convert a name or type to one chunk of a key: ``/arm/state`` becomes ``%arm%state``."""
+    """Convert a name or type to a single chunk of a key: ``/arm/state`` becomes ``%arm%state``."""
     return name.replace("/", "%")
 
 
@@ -187,7 +187,7 @@ def is_global_name(name: str) -> bool:
 
 
 def claim_key(claim: Claim, kind: str = "robot") -> str:
-    """Return the key of a robot's token, or with ``kind`` "control" of a control room's, whose name may be ``-``."""
+    """Return the key of a robot's token or, if ``kind`` is "control", of a control room's token, whose name may be ``-``."""
     return f"{ROOT}/{kind}/{claim.name}/{claim.gateway}/{claim.start:x}/{claim.host}"
 
 

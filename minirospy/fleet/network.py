@@ -1,7 +1,7 @@
 """A gateway's Zenoh session, with its tokens, messages and queries. No other module calls Zenoh.
 
-Zenoh calls back in its own threads. This module calls its handlers on the event loop, except for messages, which are
-queued first. Calls to Zenoh may block, so all of them run in order in one thread, or in the thread for a priority
+Zenoh's callbacks run in Zenoh's own threads. This module calls its handlers on the event loop, except for messages, which
+are queued first. Calls to Zenoh may block, so all of them run in order in one thread, or in the thread for a priority
 (:mod:`sender`).
 """
 
@@ -62,16 +62,17 @@ _T = TypeVar("_T")
 
 # maximum number of bytes in a query or a reply, such as a service's response or a definition
 MAX_TEXT = 16 << 20
-# maximum number of replies to a query, because peers choose the number; a fleet has at most 5,000 gateways
+# maximum number of replies to a query; limited because peers choose the number, and a fleet has at most 5,000
+# gateways
 MAX_REPLIES = 10_000
 EARLY_SHARE = 0.9  # share of the timeout; a query that ends earlier without replies has lost its link
 RETRY_SECONDS = 1.0
 LINGER_SECONDS = 2.0
 MAX_QUERIES = 200
-"""Maximum number of service calls and parameter queries handled concurrently; further ones are rejected."""
+"""Maximum number of service calls and parameter queries handled concurrently; additional ones are rejected."""
 MAX_CONTROL_QUERIES = 50
-"""Maximum number of pings, status and definition queries handled concurrently; with a separate limit, blocked calls do not
-delay them.
+"""Maximum number of pings, status queries and definition queries handled concurrently. Their limit is separate, so that blocked
+service calls do not delay them.
 """
 
 
@@ -87,7 +88,7 @@ async def _remove_linger() -> None:
 
 
 class QueryFailed(MinirospyError):
-    """A query received no reply, or an error as its reply."""
+    """Raised if a query receives no reply, or an error as its reply."""
 
 
 class FleetNetwork:
@@ -99,7 +100,8 @@ class FleetNetwork:
         self._session = session
         self._loop = loop
         self._zenoh = importlib.import_module("zenoh")
-        # A single thread preserves the order, so that peers see declarations in the order in which they were made.
+        # A single thread preserves the order of calls, so that peers see declarations in the order in which they were
+        # made.
         self._caller = concurrent.futures.ThreadPoolExecutor(1, "fleet-calls")
         self._answering: set[asyncio.Task[None]] = set()
         self._calls = _Share(MAX_QUERIES)
@@ -113,7 +115,7 @@ class FleetNetwork:
 
     @classmethod
     async def open(cls, options: NetworkOptions, *, waits: bool = True) -> FleetNetwork:
-        """Open a session; with ``waits``, wait until a peer is connected. Raise BridgeError if the configuration is invalid."""
+        """Open a session; if ``waits``, wait until a peer is connected. Raise BridgeError if the configuration is invalid."""
         has_many_links = bool(options.listen or options.config)
         require_zenoh(has_many_links=has_many_links)
         zenoh = importlib.import_module("zenoh")
@@ -204,7 +206,7 @@ class FleetNetwork:
     ) -> Deferred:
         """Call ``deliver(key, message, attachment)`` for each message, in one of Zenoh's threads; ``deliver`` must not block.
 
-        With ``from_others``, ignore messages from this session.
+        If ``from_others``, ignore messages from this session.
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
 
@@ -222,7 +224,7 @@ class FleetNetwork:
         return self._declare(lambda: self._session.declare_subscriber(key, self._direct(arrived), **options))
 
     def watch_matching(self, key: str, changed: Callable[[bool], object]) -> Deferred:
-        """Call ``changed(is_there)`` when the first other session subscribes to a key, and when the last one unsubscribes."""
+        """Call ``changed(is_there)`` when a key's first subscriber in another session appears, and when the last disappears."""
 
         def declare() -> Declared:
             publisher = self._session.declare_publisher(key, **self._to_others)
@@ -290,8 +292,8 @@ class FleetNetwork:
         """Answer queries.
 
         ``handler(key, request)`` returns the reply, or raises MinirospyError with the reason for a refusal.
-        Set ``is_control`` for the fleet's own queries, whose handlers never wait for user nodes. With ``from_others``,
-        ignore queries from this session.
+        Set ``is_control`` for the fleet's own queries, whose handlers never wait for user nodes. If ``from_others``, ignore
+        queries from this session.
         """
         options = {"allowed_origin": self._zenoh.Locality.REMOTE} if from_others else {}
         share = self._control if is_control else self._calls
@@ -308,9 +310,9 @@ class FleetNetwork:
     async def query(
         self, key: str, request: bytes = b"", *, seconds: float, of_others: bool = False
     ) -> bytes:
-        """Return the first reply. Raise QueryFailed if there is none, or the reply is an error.
+        """Return the first reply. Raise QueryFailed if there is no reply, or the reply is an error.
 
-        With ``of_others``, query only other sessions; if several match, query the best match.
+        If ``of_others``, query only other sessions; if several sessions match, query the best match.
         """
         options = {"target": self._zenoh.QueryTarget.BEST_MATCHING, **self._to_others} if of_others else {}
         started = self._loop.time()
@@ -335,9 +337,9 @@ class FleetNetwork:
         size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return at most ``most`` replies by key, each of at most ``size`` bytes; Zenoh's ``options`` override the defaults.
+        """Return the replies by key: at most ``most`` replies, each of at most ``size`` bytes.
 
-        Return as soon as ``most`` replies have arrived, without waiting for more.
+        Zenoh's ``options`` override the defaults. Return as soon as ``most`` replies have arrived, without waiting for more.
         """
         found: dict[str, bytes | QueryFailed] = {}
 
@@ -366,7 +368,8 @@ class FleetNetwork:
                 timeout=seconds,
                 **{
                     "target": zenoh.QueryTarget.ALL,
-                    # By default Zenoh withholds all replies until the last one has arrived or the timeout has passed.
+                    # By default, Zenoh withholds all replies until the last one has arrived or the timeout has
+                    # expired.
                     "consolidation": zenoh.ConsolidationMode.NONE,
                     "priority": zenoh.Priority.DATA_HIGH,
                     "congestion_control": zenoh.CongestionControl.BLOCK,
@@ -377,7 +380,7 @@ class FleetNetwork:
         )
         return dict(found)
 
-    # --- within
+    # --- internal
 
     async def _collected(self, start: Callable[[object], object], arrived: Callable[[Reply], bool]) -> None:
         """Start a query. Return after its last reply, or as soon as ``arrived`` returns True."""

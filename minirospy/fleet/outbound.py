@@ -26,7 +26,7 @@ _MAX_LATCHED = 100
 
 
 class OutboundTopic:
-    """Sends a topic's messages to the fleet, and sends the latched ones again to each reader that arrives later."""
+    """Sends a topic's messages to the fleet, and resends the latched messages to each reader that arrives later."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class OutboundTopic:
     ) -> None:
         """Create the topic.
 
-        ``key`` is the key for the messages, or "" for the fleet's own key; with a key, the topic may have no publisher yet.
+        ``key`` is the key for the messages, or "" for the fleet's own key; if it is set, the topic may have no publisher yet.
 
         ``is_left_out(header)`` returns whether to ignore a publisher's messages.
         """
@@ -69,7 +69,7 @@ class OutboundTopic:
         self.outflow.close()
 
     def replay(self, key: str) -> None:
-        """Send the latched messages again, under the key of a reader that arrived later."""
+        """Resend the latched messages, under the key of a reader that arrived later."""
         self._forget_disconnected()
         for body in self._latched.values():
             self.outflow.send(key, body, always=True)

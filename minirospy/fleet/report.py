@@ -45,7 +45,7 @@ def is_shallow(value: object, levels: int = MAX_LEVELS) -> bool:
 
 
 def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
-    """Return the human-readable lines: the robots, then the control rooms with the robots that each of them receives."""
+    """Return human-readable lines: first the robots, then the control rooms, each with the robots that it receives."""
     robots, controls = list(robots), list(controls)
     found = [
         f"{_count(len({each.claim.name for each in robots}), 'robot')}, {_count(len(controls), 'control room')}"
@@ -58,7 +58,7 @@ def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
 
 
 def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
-    """Return the same data as JSON text."""
+    """Return the data of :func:`lines` as a JSON string."""
 
     def described(answer: Answer, shown: bool) -> dict[str, object]:
         clock = answer.clock
@@ -82,7 +82,7 @@ def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
 
 
 def is_shown(claim: Claim, controls: Iterable[Answer]) -> bool:
-    """Return whether a control room shows the gateway's robot; True if no control room shows a robot with this name."""
+    """Return whether a control room shows the gateway's robot, or True if no control room shows a robot with this name."""
     shown = {
         _text(robot, "gateway")
         for control in controls

@@ -43,7 +43,9 @@ class RobotGraph:
     ) -> None:
         """Create the graph.
 
-        ``hidden`` contains the names of robots whose topics are imported here, ``gateways`` the nodes to treat like this one.
+        ``hidden`` contains the names of robots whose topics are imported here. ``gateways(snapshot)`` returns the other
+        gateways'
+        nodes, whose endpoints are ignored like this node's.
         """
         self.is_master_reached = True
         self.topics: dict[str, TopicToken] = {}
@@ -68,7 +70,7 @@ class RobotGraph:
     async def look(self) -> bool:
         """Read the current graph; return whether it has changed.
 
-        Raise MasterUnreachableError or RpcError if the master's call fails.
+        Raise MasterUnreachableError or RpcError if the call to the master fails.
         """
         snapshot = await fetch(self._node.call_master)
         hidden, own = self._hidden(), {self._node.name}

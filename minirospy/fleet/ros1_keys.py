@@ -85,9 +85,9 @@ class SharedTopic(NamedTuple):
 def shared_topics(
     local: Mapping[str, TopicToken], remote: Iterable[Resource]
 ) -> tuple[dict[str, SharedTopic], dict[str, str]]:
-    """Return the local and remote topics by name, and the reasons why remote topics with another type are ignored, by name.
+    """Return the local and remote topics by name, and the reasons why remote topics are ignored, by name.
 
-    The local type takes precedence. If there are only remote types, the first one does.
+    A remote topic is ignored if its type differs. The local type takes precedence; without one, the first remote type does.
     """
     found = {name: SharedTopic(token) for name, token in local.items() if token.md5sum != UNKNOWN_MD5}
     conflicts = {}
@@ -133,7 +133,7 @@ def beacon_pattern(namespace: str) -> str:
 def parse_beacon(key: str) -> Resource | None:
     """Return a beacon's resource, or None if the beacon has no type, as for a subscriber to any type.
 
-    Raise BridgeError if it is invalid.
+    Raise BridgeError if the beacon is invalid.
     """
     if len(key) > _MAX_KEY:
         raise BridgeError(f"its key has {len(key)} characters")
@@ -166,7 +166,7 @@ class _Beacon:
 
 
 class Beacons:
-    """Schedules the beacons of local resources: one per period, but none while other bridges send the same beacon."""
+    """Schedules the beacons of local resources: one per period, which may be skipped while other bridges send it."""
 
     def __init__(self, random: Callable[[], float]) -> None:
         """Create an empty schedule. ``random()`` returns a number in [0, 1)."""
@@ -177,7 +177,7 @@ class Beacons:
         return len(self._beacons)
 
     def update(self, keys: Iterable[str], now: float) -> None:
-        """Set the keys of the local resources. Beacons for new ones are due immediately."""
+        """Set the keys of the local resources. The beacons of new resources are due immediately."""
         before = self._beacons
         self._beacons = {key: before.get(key) or _Beacon(now) for key in keys}
 
@@ -188,7 +188,7 @@ class Beacons:
             beacon.is_received = True
 
     def due(self, now: float) -> list[str]:
-        """Return the keys to put at ``now``, in seconds."""
+        """Return the keys whose beacons are to be sent at ``now``, in seconds."""
         found = []
         for key, beacon in self._beacons.items():
             if beacon.due > now:
@@ -228,11 +228,11 @@ class Sightings:
         return is_new
 
     def extend(self, seconds: float, now: float) -> None:
-        """Extend the life of all resources by ``seconds``, up to a full lifetime from ``now``."""
+        """Extend the lifetime of all resources by ``seconds``, but not beyond a full lifetime from ``now``."""
         self._seen = {resource: min(at + seconds, now) for resource, at in self._seen.items()}
 
     def forget_lost(self, now: float) -> bool:
-        """Forget the resources whose last beacon is too old; return whether there were any."""
+        """Forget the resources whose last beacon is too old; return whether any were forgotten."""
         lost = [resource for resource, at in self._seen.items() if now - at > LOST_SECONDS]
         for resource in lost:
             del self._seen[resource]

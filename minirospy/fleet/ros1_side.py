@@ -1,6 +1,6 @@
 """The zenoh-bridge-ros1 half of a gateway: shares topics and services with robots that use that bridge.
 
-Names are not changed.
+Topics and services have the same names on both sides.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ __all__ = ["Ros1Side"]
 
 _log = logging.getLogger(__name__)
 _MARKER = "/minirospy/ros1_keys"
-"""A topic to which each gateway that uses these keys subscribes first, so that gateways on one master detect each other."""
+"""A topic to which each gateway that uses zenoh-bridge-ros1's keys subscribes first, so that gateways on the same master detect
+each other.
+"""
 _MARKER_TYPE = InterfaceType("std_msgs/Empty", "d41d8cd98f00b204e9800998ecf8427e")
 _BRIDGE = "/ros1_to_zenoh_bridge"  # prefix of the default names of zenoh-bridge-ros1's own nodes
 _AGGREGATE = "/rosout_agg"
@@ -61,9 +63,9 @@ _MAX_ERROR = 2_000
 
 
 class Ros1Side:
-    """Passes topics and services between a master and these keys.
+    """Forwards topics and services between a master and zenoh-bridge-ros1's keys.
 
-    Runs on the node's loop, except for message and beacon handling.
+    Runs on the node's loop, except for the handling of messages and beacons.
     """
 
     def __init__(
@@ -83,8 +85,8 @@ class Ros1Side:
 
         ``hidden`` contains the names of robots whose topics are imported here; ``namespace`` is the keys' namespace.
         """
-        # Exclude /rosout_agg, which repeats /rosout: if both were passed, each line would return to the master that
-        # logged it.
+        # Exclude /rosout_agg, which repeats /rosout: if both were forwarded, each log message would return to the
+        # master on which it was logged.
         if rules.topics == NameFilter():
             rules = replace(rules, topics=NameFilter.of(deny=[_AGGREGATE]))
         self.namespace = namespace
@@ -116,10 +118,10 @@ class Ros1Side:
         self._tasks: list[asyncio.Task[None]] = []
 
     async def start(self) -> None:
-        """Pass topics and services until :meth:`close`.
+        """Start forwarding topics and services, which continues until :meth:`close`.
 
-        Raise BridgeError if another node on this master passes these keys already, or MasterUnreachableError or RpcError
-        if a call to the master fails.
+        Raise BridgeError if another node on this master already uses these keys, or MasterUnreachableError or RpcError if a
+        call to the master fails.
         """
         self._marker = await self._node.subscribe_raw(_MARKER, lambda *_: None, type_=_MARKER_TYPE)
         await self.graph.look()
@@ -160,7 +162,7 @@ class Ros1Side:
     async def look(self) -> bool:
         """Announce the current graph; return whether it has changed.
 
-        Raise MasterUnreachableError or RpcError if the master's call fails.
+        Raise MasterUnreachableError or RpcError if the call to the master fails.
         """
         changed = await self.graph.look()
         # Open topics and services before announcing them, because a bridge calls and sends as soon as it receives a
@@ -195,10 +197,13 @@ class Ros1Side:
             "services": list(self.services),
         }
 
-    # --- what is here
+    # --- the local graph
 
     def _gateways(self, snapshot: Snapshot) -> set[str]:
-        """Return this master's other gateways for these keys. Their publications and subscriptions are not announced again."""
+        """Return the other gateways on this master that use these keys.
+
+        Their publications and subscriptions are not announced again.
+        """
         ends = (snapshot.publishers, snapshot.subscribers, snapshot.services)
         bridges = {
             node for table in ends for nodes in table.values() for node in nodes if node.startswith(_BRIDGE)
@@ -250,7 +255,7 @@ class Ros1Side:
                 await self._adjust()
             await asyncio.sleep(_BEAT_SECONDS)
 
-    # --- what others have
+    # --- resources of other bridges
 
     def _beacon_arrived(self, key: str, _: bytes, __: bytes) -> None:
         """Record a beacon. Runs in one of Zenoh's threads."""
@@ -328,9 +333,10 @@ class Ros1Side:
 
 
 def error_in(resource: Resource, answer: bytes) -> str:
-    """Return the error message in a reply to a call, or "" if it is a response. The bridge sends both without a distinction.
+    """Return the error message in a reply to a call, or "" if the reply is a response.
 
-    If the type is installed here, a reply is an error if it is text and is not exactly one serialized response.
+    The bridge sends errors and responses in the same way. If the type is installed here, a reply is an error if it is text
+    and is not exactly one serialized response.
     """
     from minirospy.core.idl.load import get_service_class
 

@@ -1,4 +1,4 @@
-"""A topic that is passed, in both directions, between the local graph and bridges that use zenoh-bridge-ros1's keys."""
+"""A topic that is forwarded in both directions between the local graph and bridges that use zenoh-bridge-ros1's keys."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 __all__ = ["MARK", "Ros1Topic", "Shared"]
 
 MARK = "ros1_keys"
-"""A connection header field in publishers that a gateway creates for these keys.
+"""Connection header field that marks publishers created by a gateway for zenoh-bridge-ros1's keys.
 
-No gateway passes these publishers' messages back to the keys.
+No gateway sends these publishers' messages back to the keys.
 """
 
 _REPLAY_SECONDS = 0.5
@@ -50,7 +50,7 @@ class Shared:
 
 
 class Ros1Topic:
-    """One topic with one type. Runs on the loop, except for message handling."""
+    """One topic with one type. Runs on the loop, except for the handling of messages."""
 
     def __init__(self, shared: Shared, topic: SharedTopic) -> None:
         self.token = topic.token
@@ -87,7 +87,7 @@ class Ros1Topic:
             await outbound.close()
 
     async def close(self) -> None:
-        """Stop passing messages. Idempotent."""
+        """Stop forwarding messages. Idempotent."""
         self._is_closed = True
         if self._replaying:
             self._replaying.cancel()
@@ -111,7 +111,7 @@ class Ros1Topic:
         if self._is_closed:
             return
         shared, token = self._shared, self.token
-        # Let Zenoh report readers, because silent bridges and other programs send no beacons.
+        # Let Zenoh report readers, because silent bridges and third-party programs send no beacons.
         if token.is_published and self._matching is None:
             self._matching = shared.network.watch_matching(self._key, self._matching_changed)
         elif not token.is_published and self._matching:
@@ -147,7 +147,7 @@ class Ros1Topic:
 
         self._replaying = asyncio.get_running_loop().call_later(_REPLAY_SECONDS, replay)
 
-    # --- messages of others
+    # --- messages from other bridges
 
     def _inbound(self) -> InboundTopic:
         shared = self._shared

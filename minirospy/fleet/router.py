@@ -17,9 +17,9 @@ _TICK_SECONDS = 0.5
 
 
 def run_router(options: NetworkOptions, report: Callable[[str], object]) -> int:
-    """Run a router and return its exit status; call ``report`` with the line that names its endpoints.
+    """Run a router and return its exit status; call ``report`` with the line that lists its endpoints.
 
-    Raise BridgeError if it cannot listen.
+    Raise BridgeError if the router cannot listen.
     """
     loop = new_event_loop()
     try:

@@ -1,4 +1,4 @@
-"""Rules for the topics and services that a gateway passes, and for their rates and priorities. Pure."""
+"""Rules that select the topics and services that a gateway forwards, and set their rates and priorities. Pure."""
 
 from __future__ import annotations
 
@@ -109,11 +109,11 @@ class Throttle:
         self._next = 0.0
 
     def allows(self, now: float) -> bool:
-        """Return whether a message may pass at ``now``, in monotonic seconds."""
+        """Return whether a message may be sent at ``now``, in monotonic seconds."""
         if now < self._next:
             return False
-        # Add the period to the due time instead of the current time, so that 30 Hz becomes 10 Hz and not 7.5. After a
-        # pause, restart from the current time.
+        # Add the period to the due time instead of the current time: otherwise a limit of 10 Hz would let through
+        # only 7.5 of 30 messages per second. After a pause, restart from the current time.
         self._next = max(self._next + self._period, now)
         if self._next <= now:
             self._next = now + self._period
@@ -179,7 +179,7 @@ def exported_services(
 ) -> dict[str, tuple[str, ...]]:
     """Return the services that a robot announces, with their nodes.
 
-    Each node's two logger services are left out, unless a pattern was given.
+    Each node's two logger services are left out, unless the filter was given patterns.
     """
     starts = tuple(f"/{name}/" for name in hidden)
     every = allows == NameFilter()

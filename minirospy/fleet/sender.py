@@ -1,4 +1,4 @@
-"""Threads with queues that pass messages to and from Zenoh, so that neither direction waits for the event loop."""
+"""Threads with queues that transfer messages to and from Zenoh, so that neither direction waits for the event loop."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
 _MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
 MAX_OUTLETS = 64
-"""Maximum number of Zenoh publishers that a flow caches: its own, and those for replaying latched messages.
+"""Maximum number of Zenoh publishers that a flow caches: one for its own key, and others for replaying latched messages.
 
-The least recently used one is dropped.
+The least recently used publisher is dropped.
 """
 
 
@@ -88,7 +88,7 @@ class Outflow:
         return self._flow.dropped
 
     def send(self, key: str, message: bytes, *, always: bool = False) -> None:
-        """Queue a message; with ``always``, ignore the rate limit."""
+        """Queue a message; if ``always``, ignore the rate limit."""
         if not always and not self._throttle.allows(time.monotonic()):
             self.throttled += 1
             return
@@ -169,7 +169,7 @@ class Sender:
     def flow(self, priority: Priority, hertz: float = 0.0, *, is_bare: bool = False) -> Outflow:
         """Return a flow for a topic, limited to ``hertz`` (0: unlimited).
 
-        With ``is_bare``, send messages without stamps, for other programs.
+        If ``is_bare``, send messages without stamps, for third-party programs.
         """
         return Outflow(self.priorities[priority], priority, hertz, is_bare)
 
@@ -180,7 +180,7 @@ class Sender:
 
 
 _Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]
-"""The function that delivers a message, the message and its attachment."""
+"""(function that delivers a message, message, attachment)"""
 
 
 class Flows:

@@ -1,6 +1,6 @@
 """Stops a robot, by publishing a zero velocity, when velocity commands no longer arrive over the fleet, as the dashboard does.
 
-Only streams of commands are guarded; a single velocity stays in effect, as it does within one graph. The guard's thread
+Only streams of commands are guarded; a single velocity stays in effect, as it does without a gateway. The guard's thread
 publishes the zero velocity, so that this works even if the event loop is blocked.
 """
 
@@ -28,7 +28,7 @@ _HEADER = 16
 
 
 def at_rest(type_: str, body: bytes) -> bytes | None:
-    """Return the zero message for a command, or None if the body is zero already, or is not a valid command."""
+    """Return the zero message for a command, or None if the command is zero already, or is not valid."""
     find = _FIELDS.get(type_)
     if find is None:
         return None
@@ -120,7 +120,7 @@ class CommandStream:
             self._last, self._rest = now, rest
             self._deadline = now + self._seconds if rest is not None and is_stream else math.inf
             if self._deadline < math.inf:
-                # Arm the guard before publishing, so that no command is sent that could not be stopped.
+                # Arm the guard before publishing, so that every published command can be stopped.
                 self.guard.arm(self._silent, self._deadline)
             else:
                 self.guard.disarm(self._silent)

@@ -1,12 +1,12 @@
 """Writes `overlay/`, the modules that programs import (`rospy`, `rosbag`, `RPi`, ...).
 
-They re-export names from the modules of the same names here.
+Each module re-exports names from the module of the same name in this package.
 
 The names that `import rosgraph.masterapi` provides are in `ros/rosgraph/rosgraph/masterapi.py`; the module in `overlay/`
-re-exports the names in `__all__`, and those that the module imports in the form `from x import y as y`. It finds the names that
-a star brings in real ROS from elsewhere (`os`, `rospy`: passed_on.py) when a program first uses them. The build writes
-`overlay/` (hatch_build.py), and `python -m minirospy.ros.overlay_modules` writes it again. This module reads the sources
-without importing them.
+re-exports the names in `__all__`, and those that the module imports in the form `from x import y as y`. In real ROS, a star
+import also brings names from other modules (`os`, `rospy`: passed_on.py); the module in `overlay/` finds these names when a
+program first uses them. The build writes `overlay/` (hatch_build.py), and `python -m minirospy.ros.overlay_modules` writes it
+again. This module reads the sources without importing them.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _NAMED_OTHERWISE = {
     "python_orocos_kdl": ("PyKDL",),
     "urdfdom_py": ("urdf_parser_py",),
 }
-"""ROS packages whose Python modules have another name than the package."""
+"""ROS packages whose Python modules have a different name than the package."""
 _INTERNAL = {
     "PyKDL": "frames functions vectors",
     "actionlib": "aio client goal_id handle machine server simple_client simple_server spec states statuses waiting",
@@ -61,7 +61,7 @@ _METADATA_TEXT = "Metadata-Version: 1.1\nName: rospy\nVersion: 1.17.0\nSummary: 
 _WIDTH = 118  # maximum line length in characters
 
 _DEFINED = {"msg": ("msg", "action"), "srv": ("srv",)}
-"""Module of generated classes -> the folders of the definitions."""
+"""Maps each module of generated classes to the folders that contain the definitions."""
 
 _HOOKS = {"__getattr__", "__dir__"}
 """Module functions that provide names that are not defined in the module (PEP 562)."""
@@ -212,7 +212,7 @@ def listed(source: Path) -> list[str]:
 
 
 def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
-    """Return the names that a module's star brings from elsewhere, without its own: name -> `MODULE` or `MODULE:NAME`."""
+    """Return a dict from each name that a star import from the module brings from other modules to `MODULE` or `MODULE:NAME`."""
     found = {}
     for place, names in PASSED_ON.get(module, {}).items():
         for each in names.split():
@@ -222,7 +222,7 @@ def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
 
 
 def _submodules(package: str) -> dict[str, str]:
-    """Return a package's submodules: name -> module."""
+    """Return a dict from the names of a package's submodules to the submodules' full names."""
     depth = package.count(".") + 1
     names = [
         each.rpartition(".")[2]
@@ -235,7 +235,7 @@ def _submodules(package: str) -> dict[str, str]:
 
 
 def _text_of_later(module: str, names: dict[str, str], starred: list[str], *, has_hook: bool) -> list[str]:
-    """Return the lines that find these names at first use; type checkers and editors do not see them."""
+    """Return source lines that look up these names at first use; type checkers and editors do not see the names."""
     missing = f"raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")"
     return [
         "",
@@ -257,7 +257,7 @@ def _text_of_later(module: str, names: dict[str, str], starred: list[str], *, ha
 
 
 def _wrapped(words: Iterable[str]) -> list[str]:
-    """Return indented lines of the words, each with a comma."""
+    """Return the words as wrapped, indented lines, with a comma after each word."""
     lines: list[str] = []
     for word in words:
         if lines and len(lines[-1]) + len(word) + 2 <= _WIDTH:
@@ -282,7 +282,7 @@ def _dotted(source: Path) -> str:
 
 @functools.cache
 def _by_source() -> dict[str, tuple[str, Path]]:
-    """Return a dict from the dotted name here of each module in the overlay to its name in the overlay and its file."""
+    """Return a dict from each module's dotted name in this package to its name in the overlay and its file."""
     return {_dotted(source): (name, source) for name, source in modules().items()}
 
 

@@ -1,4 +1,4 @@
-"""Submodules and other names that ROS's modules import for themselves: here each is imported when a program first uses it."""
+"""Imports submodules and other names that ROS's modules import for themselves, each when a program first uses it."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _STANDARD_LIBRARY = {
     "xml.parsers": ("expat",),
     "xmlrpc": ("client", "server"),
 }
-"""Packages of the standard library -> their submodules that real ROS imports, so that programs use them without an import."""
+"""The submodules of standard library packages that real ROS imports, so that programs use them without importing them."""
 
 _LARGE = {"http", "logging"}
-"""Packages that take longer to import than all the others: they get their submodules only if something has imported them."""
+"""Packages that are slow to import: their submodules are offered only if the packages have already been imported."""
 
 
 def on_first_use(package: str, *names: str) -> Callable[[str], ModuleType]:
-    """Return the ``__getattr__`` of ``package`` (PEP 562), which imports these submodules."""
+    """Return a ``__getattr__`` (PEP 562) for ``package`` that imports these submodules on first use."""
 
     def find(name: str) -> ModuleType:
         if name in names:
@@ -49,7 +49,7 @@ def on_first_use(package: str, *names: str) -> Callable[[str], ModuleType]:
 
 
 def import_passed_on(namespace: dict[str, object], name: str, place: str) -> object:
-    """Return what ``place``, `MODULE` or `MODULE:NAME`, means, and keep it in a module's ``namespace`` as ``name``."""
+    """Import ``place`` (`MODULE` or `MODULE:NAME`), store it in a module's ``namespace`` as ``name``, and return it."""
     module, _, inner = place.partition(":")
     found: object = import_module(module)
     if inner:
@@ -58,7 +58,7 @@ def import_passed_on(namespace: dict[str, object], name: str, place: str) -> obj
 
 
 def offer_standard_library() -> None:
-    """Let ``import rospy, xml`` suffice for ``xml.etree.ElementTree``, as with real ROS.
+    """Make ``import rospy, xml`` sufficient for using ``xml.etree.ElementTree``, as in real ROS.
 
     The submodules are imported when they are first used: importing them in advance would take longer than ``import rospy``.
     """

@@ -1,4 +1,4 @@
-"""Convert the messages of actions between their types in ROS 1 and ROS 2."""
+"""Convert action messages between their ROS 1 and ROS 2 types."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _WIDTHS = {"time": 8, "duration": 8, "string": 4}
 
 @dataclass(frozen=True)
 class ActionCodec:
-    """Converts an action's messages. ``classes`` contains its ROS 1 topics' types, by the last part of each topic's name."""
+    """Converts an action's messages. ``classes`` maps the last part of each ROS 1 topic's name to the topic's message class."""
 
     goal: Transcoder
     result: Transcoder
@@ -38,7 +38,7 @@ class ActionCodec:
 
 
 class ActionCodecs:
-    """The codecs for actions, by the types on both sides."""
+    """Creates and caches action codecs by the action's ROS 1 and ROS 2 types."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -47,7 +47,7 @@ class ActionCodecs:
         self._codecs: dict[tuple[str, str], ActionCodec] = {}
 
     def partner(self, type_: str, direction: Direction) -> str:
-        """Return the type on the side that sends goals, given the type on the offering side."""
+        """Return the type on the side that sends goals, given the type on the side that offers the action."""
         names: tuple[str, ...]
         if direction is Direction.TO_ROS1:
             names = self._rules.ros2_actions(type_)

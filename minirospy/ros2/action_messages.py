@@ -1,4 +1,4 @@
-"""Serializes and parses an action's ROS 1 messages. The goals, feedback and results in them stay serialized. Pure.
+"""Serializes and parses an action's ROS 1 messages. The embedded goals, feedback and results stay serialized. Pure.
 
 Source: http://wiki.ros.org/actionlib/DetailedDescription, and the definitions of actionlib_msgs.
 """
@@ -38,7 +38,7 @@ class GoalId(NamedTuple):
 
     @property
     def nanoseconds(self) -> int:
-        """Return the time in nanoseconds, or 0 if there is none."""
+        """Return the time in nanoseconds, or 0 if it is not set."""
         return self.secs * 1_000_000_000 + self.nsecs
 
 

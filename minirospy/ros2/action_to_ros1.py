@@ -37,7 +37,7 @@ __all__ = ["MAX_GOALS", "GoalsToRos1"]
 SERVER_SECONDS = 5.0
 """Timeout in seconds for a ROS 1 server to connect, and to include a new goal in its statuses."""
 MAX_GOALS = 1_000
-"""Maximum number of goals passed on concurrently; further goals are rejected."""
+"""Maximum number of goals forwarded concurrently; further goals are rejected."""
 _PENDING_SECONDS = 0.5
 """Seconds after which a pending goal counts as accepted, because ROS 2 has no pending state."""
 _ENDS = {
@@ -110,7 +110,7 @@ class GoalsToRos1:
         self._server = self._side.action_server(self._link.action, self._link.ros2_type, self._accept)
 
     async def close(self) -> None:
-        """Close the action. Running goals are aborted; goals whose result has already arrived receive that result."""
+        """Close the action. Running goals are aborted; a goal whose result has already arrived finishes with that result."""
         # A result that has already arrived is processed in the next loop iteration.
         await asyncio.sleep(0)
         self._is_closed = True
@@ -191,7 +191,7 @@ class GoalsToRos1:
 
         self._loop.call_soon_threadsafe(cancel)
 
-    # --- what comes from the server
+    # --- messages from the server
 
     def _guarded(self, take: Callable[[Frame], None]) -> Callable[[Frame, Header], None]:
         def guarded(frame: Frame, _: Header) -> None:

@@ -78,7 +78,7 @@ class Ros2Options:
 
 
 class _Types:
-    """The specs, interface types and transcoders, by the types on both sides."""
+    """Caches the specs, interface types and transcoders by the types on both sides."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -100,7 +100,7 @@ class _Types:
             ) from error
 
     def of_text(self, name: str, text: str) -> tuple[MessageSpec, Lookup]:
-        """Return the type for a publisher's full definition. Raise TypesDiffer if the definition is invalid."""
+        """Return the type parsed from a publisher's full definition. Raise TypesDiffer if the definition is invalid."""
         try:
             specs = specs_of_text(name, text)
         except DefinitionError as error:
@@ -150,7 +150,10 @@ class Ros2Bridge:
         self._is_closed = False
 
     async def start(self) -> None:
-        """Bridge until :meth:`close`. Raise MasterUnreachableError or RpcError if a call to the master fails."""
+        """Start bridging, which continues until :meth:`close`.
+
+        Raise MasterUnreachableError or RpcError if a call to the master fails.
+        """
         await self._parameters.start()
         await self.look()
         reporter = ErrorReporter(self.node.log, "the watch of both graphs")
@@ -181,7 +184,7 @@ class Ros2Bridge:
         return [*topics, *await self.services.pairs(snapshot.services), *self.actions.pairs(snapshot)]
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
-        """Return when ``condition()`` is true after a refresh."""
+        """Wait until ``condition()`` is truthy after a refresh."""
         while not condition():
             await self._changed.wait()
 
@@ -274,7 +277,7 @@ class Ros2Bridge:
 
 
 class TopicPassing:
-    """An open link; ``passed`` counts the messages that were passed on."""
+    """An open topic link; ``passed`` counts the forwarded messages."""
 
     def __init__(self, bridge: Ros2Bridge, link: Link, made: Transcoder) -> None:
         self.link = link

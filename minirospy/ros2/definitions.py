@@ -112,14 +112,14 @@ _ADDED: dict[tuple[str, str], Fields] = {
     },
     ("visualization_msgs/Marker", "mesh_resource"): {"mesh_file": "visualization_msgs/MeshFile"},
 }
-"""ROS 2's additional fields, by the type and the ROS 1 field that they follow."""
+"""The fields that ROS 2 adds, by message type and the name of the ROS 1 field that they follow."""
 _ADDED_AFTER_HUMBLE = {("sensor_msgs/Range", "range")}
 _BOUNDED = {("shape_msgs/SolidPrimitive", "dimensions"): "sequence<double, 3>"}
 _BASES = {"char": "uint8", "time": _STAMP, "duration": "builtin_interfaces/Duration"}
 
 
 class Definitions:
-    """ROS 2's types, ``pkg/Name``, with fields from ROS 1's definitions and the rules.
+    """ROS 2 types (``pkg/Name``) with fields derived from ROS 1 definitions and the rules.
 
     All methods raise TypesDiffer if a type cannot be derived.
     """
@@ -131,7 +131,7 @@ class Definitions:
         self._hashes: dict[str, str] = {}
 
     def message(self, name: str, *, is_humble: bool = False) -> Fields:
-        """Return the fields of a message, with ``is_humble`` as defined in ROS 2 Humble."""
+        """Return the fields of a message; if ``is_humble``, as ROS 2 Humble defines them."""
         key = (name, is_humble)
         if key not in self._found:
             self._found[key] = _ONLY_IN_ROS2.get(name) or self._of_ros1(name, is_humble)

@@ -34,7 +34,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Array:
-    """An array of elements; ``length`` is None if it is variable."""
+    """An array of elements; ``length`` is None if the array's length is variable."""
 
     element: Node
     length: int | None = None
@@ -62,7 +62,7 @@ def inverse(node: Node) -> Node:
 
 
 def reorder(node: Node, data: bytes | memoryview) -> bytes:
-    """Return a message with its fields in the other order. Raise DeserializationError if the message is too short."""
+    """Return a message with its fields reordered. Raise DeserializationError if the message is too short."""
     view = memoryview(data)
     parts: list[bytes | memoryview] = []
     try:

@@ -1,6 +1,6 @@
 """The bridge's interface to ROS 2, implemented with rclpy in ``side.py``, with Zenoh in ``zenoh_side.py``, and in tests.
 
-ROS 2 calls back in its own threads. Types are ``pkg/Name``; messages are CDR.
+Callbacks run in ROS 2's own threads. Types are written as ``pkg/Name``; messages are serialized as CDR.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Ros2Publisher(Protocol):
 
 
 class Ros2Handle(Protocol):
-    """A subscription or a service that calls back until it is closed."""
+    """A subscription or a service whose callback is called until the handle is closed."""
 
     def close(self) -> None: ...
 
@@ -127,13 +127,13 @@ goal is rejected.
 class Ros2Parameters(Protocol):
     """Parameters of other ROS 2 nodes. All methods block, so call them in a worker thread.
 
-    All raise BridgeError if the call fails.
+    All methods raise BridgeError if the call fails.
     """
 
     def names(self, node: str) -> list[str]: ...
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter, with type 0 if it is not set."""
+        """Return a parameter's value, which has type 0 if the parameter is not set."""
 
     def set(self, node: str, name: str, value: Value) -> None: ...
 
@@ -150,7 +150,7 @@ class Ros2Side(Protocol):
     def ends(self, topic: str) -> Ros2Topic: ...
 
     def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer if it is not installed."""
+        """Return the fields of a message type. Raise TypesDiffer if the type is not installed."""
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher: ...
 
@@ -172,7 +172,7 @@ class Ros2Side(Protocol):
         """Return the services of nodes other than this bridge, and their types."""
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the fields of a service's request and response. Raise TypesDiffer if it is not installed."""
+        """Return the fields of a service's request and response. Raise TypesDiffer if the service type is not installed."""
 
     def client(self, service: str, type_: str) -> Ros2Client: ...
 
@@ -183,7 +183,7 @@ class Ros2Side(Protocol):
         """
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
-        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if it is not installed."""
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if the action type is not installed."""
 
     def action_client(self, action: str, type_: str) -> Ros2ActionClient: ...
 

@@ -108,7 +108,7 @@ def layout_of(
 
 
 class _Pairing:
-    """Traverses two specs in parallel."""
+    """Traverses two specs in parallel and pairs their fields."""
 
     def __init__(self, ros1_lookup: Lookup, ros2_lookup: Lookup, rules: Rules) -> None:
         self._ros1 = ros1_lookup
@@ -243,7 +243,7 @@ def _in_order(made: Transcoder, order: Reordered) -> Transcoder:
 
 
 def _inlined(spec: MessageSpec, rule: TypeRule, lookup: Lookup) -> tuple[Field, ...]:
-    """Return ROS 1's fields, in which the fields of the inlined field replace that field."""
+    """Return ROS 1's fields, with the inlined field replaced by its own fields."""
     found: list[Field] = []
     for each in spec.fields:
         if each.name != rule.inlined:

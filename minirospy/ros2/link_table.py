@@ -1,4 +1,4 @@
-"""The links of one kind (topics, services or actions). They are opened if both sides want them, and otherwise closed."""
+"""The links of one kind (topics, services or actions), which are opened and closed to match the wanted links."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Pair:
 
 
 def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
-    """Return the links, with the reasons why some cannot be opened, which ``check(link)`` raises as TypesDiffer."""
+    """Return the links. For a link that cannot be opened, include the reason, which ``check(link)`` raises as TypesDiffer."""
     found = []
     for link in wanted:
         try:
@@ -51,7 +51,7 @@ def pairs(wanted: Iterable[_L], check: Callable[[_L], object]) -> list[Pair]:
 
 
 class LinkTable(Generic[_L, _O]):
-    """The open links, and the reasons why others are not open. ``make(link)`` may raise TypesDiffer.
+    """The open links, and the reasons why other links are not open. ``make(link)`` may raise TypesDiffer.
 
     Runs on the node's loop.
     """

@@ -55,7 +55,7 @@ class Ros2Topic:
 class Link:
     """A topic that is bridged in one direction.
 
-    With ``is_latched``, later subscribers receive the last message. ``is_reliable`` is the reliability of the ROS 2
+    If ``is_latched``, later subscribers receive the last message. ``is_reliable`` is the reliability of the ROS 2
     subscription.
     """
 

@@ -37,7 +37,7 @@ FIELDS = (
     "double_array_value",
     "string_array_value",
 )
-"""The ParameterValue field that contains the value, by ROS 2's parameter type."""
+"""The names of the ParameterValue fields; the index is the ROS 2 parameter type."""
 
 _BYTES, _STRINGS = 5, 9
 _SINGLE: dict[type, int] = {bool: 1, int: 2, float: 3, str: 4}
@@ -73,12 +73,12 @@ def ros2_name(name: str) -> str:
 
 
 def ros1_name(name: str) -> str:
-    """Return a parameter's name in ROS 1."""
+    """Return a parameter's name in ROS 1: ``/robot/speed`` for ``robot.speed``."""
     return "/" + name.strip("./").replace(".", "/")
 
 
 def leaves(value: object, name: str = "") -> Iterator[str]:
-    """Return the names of all parameters in a namespace's value."""
+    """Yield the names of all parameters in a namespace's value."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from leaves(inner, f"{name}/{key}")

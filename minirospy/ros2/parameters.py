@@ -1,4 +1,7 @@
-"""Bridges parameters: offers ROS 1's as parameters of the bridge's ROS 2 node, and ROS 2 nodes' through ROS 1 services."""
+"""Bridges parameters in both directions.
+
+Offers ROS 1 parameters as parameters of the bridge's ROS 2 node, and ROS 2 nodes' parameters through ROS 1 services.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,7 @@ class Ros1Parameters:
         return [ros2_name(name) for name in leaves(await self._node.get_param("/", {}))]
 
     async def get(self, names: Sequence[str]) -> list[Value]:
-        """Return the values. The type is 0 if a parameter is not set, or the name is a namespace."""
+        """Return the parameters' values. A value has type 0 if the parameter is not set, or its name is a namespace."""
         found = []
         for name in names:
             value = await self._node.get_param(ros1_name(name), None)
@@ -52,7 +55,7 @@ class Ros1Parameters:
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
         """Set or delete parameters; return an error message for each, which is "" for success.
 
-        With ``atomically``, change none if any of them is rejected.
+        If ``atomically``, change no parameter if any of them is rejected.
         """
         reasons = [_refusal(name, value) for name, value in values]
         if atomically and any(reasons):
@@ -178,14 +181,14 @@ def _text(text: str) -> bytes:
 
 
 def _two(texts: list[str]) -> list[str]:
-    """Return a request's two strings. Raise ValueError if it has fewer."""
+    """Return a request's two strings. Raise ValueError if the request has fewer."""
     if len(texts) < 2:
         raise ValueError("the request ends too early")
     return texts
 
 
 def _texts(data: bytes) -> list[str]:
-    """Parse a request that consists of strings. Raise ValueError if it is invalid."""
+    """Parse a request that consists of strings. Raise ValueError if the request is invalid."""
     found, end = [], 0
     while end < len(data):
         if end + 4 > len(data):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 
 CANCELED = 5
-"""Goal statuses after the end of a goal, from action_msgs/GoalStatus."""
+"""Statuses of goals that have ended, from action_msgs/GoalStatus."""
 SUCCEEDED = 4
 ABORTED = 6
 
@@ -36,7 +36,7 @@ _HEADER = 4
 _ID = 16
 
 
-# --- what is used of rclpy
+# --- the parts of rclpy used here
 
 
 class _Impl(Protocol):
@@ -86,7 +86,7 @@ class _Closable(Protocol):
     def destroy(self) -> None: ...
 
 
-# --- goals of ROS 1 in ROS 2
+# --- goals from ROS 1 to ROS 2
 
 
 class GoalOfRos2:
@@ -162,7 +162,11 @@ class ActionClient:
         return self._calls.servers(send_goal_service(self._name))
 
     def probe(self) -> Ros2Probe:
-        """Return a probe that cancels a nonexistent goal, because the cancel client is the action client's last endpoint."""
+        """Return a probe that cancels a nonexistent goal.
+
+        The cancel client is the action client's last endpoint, so its response proves that the earlier ones have been
+        discovered, too.
+        """
         return _CancelProbe(self)
 
     def reach(self) -> Future[None]:
@@ -213,7 +217,7 @@ class ActionClient:
             try:
                 accepted.set_result(GoalOfRos2(self._calls, handle, ended) if handle.accepted else None)
             except InvalidStateError:
-                # The caller no longer waits, and the goal counts as rejected in ROS 1, so it must not run.
+                # The caller no longer waits, and the goal counts as rejected in ROS 1, so cancel it.
                 self._callbacks.pop(id, None)
                 if handle.accepted:
                     handle.cancel_goal_async()
@@ -240,7 +244,7 @@ class ActionClient:
 
 
 class _CancelProbe:
-    """A probe of an action's servers. It uses the action's client, which stays open."""
+    """A probe of an action's servers through an existing action client. Closing the probe does not close the client."""
 
     def __init__(self, client: ActionClient) -> None:
         self._client = client
@@ -271,11 +275,14 @@ def _client_class() -> Callable[..., _RclpyActionClient]:
     )
 
 
-# --- goals of ROS 2 in ROS 1
+# --- goals from ROS 2 to ROS 1
 
 
 class Feedback:
-    """A goal's feedback, which is buffered until the goal's handle exists, then published. May be called from any thread."""
+    """A goal's feedback, which is buffered until the goal's handle exists, then published.
+
+    Methods may be called from any thread.
+    """
 
     def __init__(self, calls: Calls, class_: MessageClass) -> None:
         self._calls = calls

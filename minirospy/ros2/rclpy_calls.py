@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 _REASONS = ("message", "status_message", "error_message", "error_string", "error", "reason")
-"""Names of fields in a response that may contain the reason why a call failed."""
+"""Names of response fields that may contain the reason why a call failed."""
 
 _DEPTH = 1000  # maximum number of requests or responses queued for the bridge
 
@@ -41,7 +41,7 @@ _GUID_PREFIX = 12
 _T = TypeVar("_T")
 
 
-# --- what is used of rclpy
+# --- the parts of rclpy used here
 
 
 class Message(Protocol):
@@ -80,7 +80,7 @@ class RclpyFuture(Protocol):
 
 
 class RclpyHandle(Protocol):
-    """A subscription's handle, which is a context manager for its use."""
+    """The interface of an rclpy subscription's handle. The handle must be entered as a context manager before use."""
 
     def __enter__(self) -> object: ...
 
@@ -92,13 +92,13 @@ class RclpyHandle(Protocol):
 
 
 class RclpySubscription(Protocol):
-    """An rclpy subscription."""
+    """The interface of an rclpy subscription."""
 
     handle: RclpyHandle
 
 
 class Executor(Protocol):
-    """An rclpy executor."""
+    """The interface of an rclpy executor."""
 
     def create_task(self, callback: Callable[..., object], *args: object) -> object: ...
 
@@ -124,7 +124,7 @@ class _Logger(Protocol):
 
 
 class ServiceNode(Protocol):
-    """An rclpy node."""
+    """The interface of an rclpy node."""
 
     def create_client(
         self, class_: ServiceClass, name: str, *, qos_profile: object, callback_group: object
@@ -159,7 +159,7 @@ class ServiceNode(Protocol):
 
 
 class NotAnsweredError(Exception):
-    """A request receives no response; ROS 2 services have no error responses."""
+    """Raised to send no response to a request, because ROS 2 services have no error responses."""
 
 
 class Calls:
@@ -172,13 +172,13 @@ class Calls:
         self.serialize: Callable[[object], bytes] = serialization.serialize_message
         self.deserialize: Callable[[bytes, MessageClass], Message] = serialization.deserialize_message
         self._future: Callable[..., RclpyFuture] = importlib.import_module("rclpy.task").Future
-        # In rmw_zenoh, a response uses the path of its request, so no response is lost.
+        # In rmw_zenoh, a response takes the same route as its request, so no response is lost.
         rmw = str(importlib.import_module("rclpy.utilities").get_rmw_implementation_identifier())
         self._loses_responses = not rmw.startswith("rmw_zenoh")
         # Reentrant, so that a request that is waiting for its response does not block other requests.
         self.options: dict[str, object] = {
             "callback_group": importlib.import_module("rclpy.callback_groups").ReentrantCallbackGroup(),
-            # This is the default QoS for services with a longer queue.
+            # This is the default QoS for services, but with a longer queue.
             "qos_profile": importlib.import_module("rclpy.qos").QoSProfile(depth=_DEPTH),
         }
 
@@ -228,7 +228,7 @@ class Calls:
     async def result(self, future: Future[_T], *, after_tasks: bool = False) -> _T:
         """Return the result of another thread's future, in a coroutine of the executor.
 
-        With ``after_tasks``, return it only after the tasks that the other thread has already submitted to the executor.
+        If ``after_tasks``, return it only after the tasks that the other thread has already submitted to the executor.
         """
         waiting = self._future(executor=self.executor)
 
@@ -313,7 +313,7 @@ class Client:
 
 
 class ParameterProbe:
-    """A probe of nodes through their parameter services, because a request for no parameters has no effect."""
+    """Probes nodes through their parameter services, by requesting no parameters, which has no effect."""
 
     def __init__(self, clients: Sequence[Client]) -> None:
         self._clients = clients

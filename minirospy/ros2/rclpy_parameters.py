@@ -1,4 +1,4 @@
-"""Parameters in ROS 2, with rclpy: the bridge node's services for ROS 1's parameters, and access to other nodes'."""
+"""ROS 2 parameters with rclpy: offers ROS 1 parameters as services of the bridge's node, and accesses other nodes' parameters."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ParameterStore(Protocol):
     async def names(self) -> list[str]: ...
 
     async def get(self, names: Sequence[str]) -> list[Value]:
-        """Return the values, with type 0 if a parameter is not set."""
+        """Return the parameters' values. A value has type 0 if the parameter is not set."""
 
     async def set(self, values: Sequence[tuple[str, Value]], *, atomically: bool) -> list[str]:
         """Set or delete parameters; return an error message for each, which is "" for success."""
@@ -128,7 +128,7 @@ class ParameterServer:
 class NodeParameters:
     """Parameters of other ROS 2 nodes. All methods block, so call them in a worker thread.
 
-    All raise BridgeError if the call fails.
+    All methods raise BridgeError if the call fails.
     """
 
     def __init__(self, calls: Calls) -> None:
@@ -140,7 +140,7 @@ class NodeParameters:
         return _texts(_field(response, "result"), "names")
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter, with type 0 if it is not set."""
+        """Return a parameter's value, which has type 0 if the parameter is not set."""
         response = self._call(node, ParameterService.GET, {"names": [name]})
         found = cast("list[object]", _field(response, "values"))
         return _read(found[0]) if found else Value(0)
@@ -202,7 +202,7 @@ def _result(future: Future[bytes], end: float) -> bytes:
         future.cancel()
 
 
-# --- objects of ROS 2, whose classes are not known here
+# --- access to ROS 2 objects (untyped, because rclpy may not be installed)
 
 
 def _field(message: object, name: str) -> object:

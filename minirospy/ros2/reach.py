@@ -100,7 +100,7 @@ class Reach:
             probe = self._client.probe()
             if probe:
                 return probe
-            # A server's node may become known later than the server.
+            # A server's node may become known later than the server, so try again.
             await asyncio.sleep(_LOOK_SECONDS)
         return None
 

@@ -24,8 +24,8 @@ class TypeRule:
     """The exceptions for a ROS 1 type.
 
     ``names`` are its possible names in ROS 2, as ``pkg/Name``. ``fields`` maps all fields that are passed on to ROS 2's
-    fields. If it is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side
-    lacks. ``inlined`` is a field that ROS 2 replaces by that field's own fields.
+    fields. If ``fields`` is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other
+    side lacks. ``inlined`` is a field that ROS 2 replaces by that field's own fields.
     """
 
     names: tuple[str, ...] = ()
@@ -42,7 +42,8 @@ _NO_RULE = TypeRule()
 class Rules:
     """Rules for messages, services and actions, by ``pkg/Name``.
 
-    Parts of services and actions count as messages, with ROS 1's names.
+    The requests and responses of services, and the goals, results and feedback of actions, count as messages, with ROS 1's
+    names.
     """
 
     messages: Mapping[str, TypeRule] = field(default_factory=dict)
@@ -58,7 +59,7 @@ class Rules:
         return self.message(ros1_type).names or (ros1_type,)
 
     def ros1_message(self, ros2_type: str) -> str:
-        """Return the ROS 1 type for a ROS 2 message type. It has the same name, unless that name is another type in ROS 2."""
+        """Return the ROS 1 type that a rule maps to a ROS 2 message type, otherwise the type with the same name."""
         if not self.message(ros2_type).names:
             kept = [name for name, rule in self.messages.items() if ros2_type in rule.names]
             other = [name for name in kept if name.partition("/")[0] != "tf"]

@@ -62,7 +62,7 @@ class ServiceCodec:
 
 
 class _Types:
-    """The codecs for services, by the types on both sides."""
+    """Creates and caches service codecs by the service's ROS 1 and ROS 2 types."""
 
     def __init__(self, side: Ros2Side, rules: Rules, catalogue: Catalogue) -> None:
         self._side = side
@@ -319,7 +319,7 @@ class _InRos2:
         task.add_done_callback(lambda _: answered.cancel())
 
     async def _pass_on(self, request: bytes, answered: Future[bytes]) -> None:
-        """Set the response or the error in another thread's future."""
+        """Forward a request, and set the response or the error in ``answered``, a future that belongs to another thread."""
         try:
             result = await self._answer(request)
         except (MinirospyError, ROSException, ServiceException) as error:

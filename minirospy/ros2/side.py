@@ -42,7 +42,7 @@ _DRAINED = 200
 """Maximum number of messages read per executor callback, because a callback costs more than reading a message."""
 
 
-# --- what is used of rclpy, which has no types where it is not installed
+# --- the parts of rclpy used here (untyped, because rclpy may not be installed)
 
 
 class _Profile(Protocol):
@@ -80,7 +80,7 @@ class _Node(Protocol):
     def destroy_subscription(self, subscription: RclpySubscription) -> bool: ...
 
 
-# --- the side
+# --- the backend
 
 
 def require_rclpy() -> None:
@@ -97,7 +97,7 @@ def require_rclpy() -> None:
 _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
 """Environment variables for Fast DDS's settings file.
 
-The second one is for Fast DDS version 2 and older, which _OLD_DISTRIBUTIONS have.
+The second one is for Fast DDS version 2 and older, which the _OLD_DISTRIBUTIONS use.
 """
 _OLD_DISTRIBUTIONS = ("humble", "iron", "jazzy")
 _PACKAGE = re.compile(r"[a-z](_?[a-z0-9]+)*")
@@ -170,7 +170,7 @@ class RclpySide:
         )
 
     def fields(self, type_: str) -> dict[str, str]:
-        """Return the fields of a message type. Raise TypesDiffer if it is not installed."""
+        """Return the fields of a message type. Raise TypesDiffer if the type is not installed."""
         return dict(self.message_class(type_).get_fields_and_field_types())
 
     def publisher(self, topic: str, type_: str, *, depth: int, is_latched: bool) -> Ros2Publisher:
@@ -225,7 +225,7 @@ class RclpySide:
         return offered
 
     def service_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str]]:
-        """Return the fields of a service's request and response. Raise TypesDiffer if it is not installed."""
+        """Return the fields of a service's request and response. Raise TypesDiffer if the service type is not installed."""
         class_ = self.service_class(type_)
         return (
             dict(class_.Request.get_fields_and_field_types()),
@@ -243,7 +243,7 @@ class RclpySide:
         return _Served(self._calls, server, lambda: self._served.remove(service))
 
     def action_fields(self, type_: str) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
-        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if it is not installed."""
+        """Return the fields of an action's goal, result and feedback. Raise TypesDiffer if the action type is not installed."""
         class_ = self.action_class(type_)
         goal, result, feedback = (
             dict(each.get_fields_and_field_types()) for each in (class_.Goal, class_.Result, class_.Feedback)
@@ -312,7 +312,7 @@ class RclpySide:
     @staticmethod
     def message_class(type_: str) -> MessageClass:
         found = _imported(type_, "msg")
-        # minirospy's own ROS 1 packages also have classes with that name.
+        # The class may be a ROS 1 class from one of minirospy's own packages, which lacks this method.
         if not hasattr(found, "get_fields_and_field_types"):
             raise TypesDiffer(f"[{type_}] is not installed in ROS 2")
         return cast("MessageClass", found)

@@ -86,7 +86,7 @@ class ActionType:
     def result(self, response: bytes) -> tuple[int, bytes]:
         """Return the status and the result from a response to a request for a result.
 
-        Raise DeserializationError if it is invalid.
+        Raise DeserializationError if the response is invalid.
         """
         found = self.read("GetResult_Response", response)
         return cast("int", found["status"]), self.write(
@@ -125,7 +125,7 @@ def _joined(id: bytes, data: bytes) -> bytes:
     return data[:_HEADER] + id + data[_HEADER:]
 
 
-# --- goals of ROS 1 in ROS 2
+# --- goals from ROS 1 to ROS 2
 
 
 class _SentGoal:
@@ -166,7 +166,7 @@ class ZenohActionClient:
 
     @property
     def servers(self) -> None:
-        """Return None, because no response can be lost: it uses the path of its request, whose existence the tokens prove."""
+        """Return None: a response takes the same route as its request, whose existence the tokens prove, so it cannot be lost."""
 
     def probe(self) -> None:
         """Return None, because no probe is needed."""
@@ -189,7 +189,7 @@ class ZenohActionClient:
                     self._callbacks.pop(id, None)
                 accepted.set_result(sent)
             except InvalidStateError:
-                # The caller no longer waits, and the goal counts as rejected in ROS 1, so it must not run.
+                # The caller no longer waits, and the goal counts as rejected in ROS 1, so cancel it.
                 self._callbacks.pop(id, None)
                 if sent:
                     sent.cancel()
@@ -241,7 +241,7 @@ def _fail(future: Future[Ros2Goal | None] | Future[tuple[int, bytes]], error: Ex
         future.set_exception(BridgeError(" ".join(str(error).split())))
 
 
-# --- goals of ROS 2 in ROS 1
+# --- goals from ROS 2 to ROS 1
 
 
 @dataclass
@@ -301,7 +301,7 @@ class ZenohActionServer:
             except Exception:  # noqa: BLE001 - the others go on
                 _log.exception("action [%s] of ROS 1", self._name)
 
-        # After close(), no messages are sent.
+        # RuntimeError: after close(), the thread accepts no more work.
         with contextlib.suppress(RuntimeError):
             self._thread.submit(guarded)
 

@@ -38,7 +38,7 @@ _MAX_OF_ACTION = 2_000
 It exceeds the number of goals, because a request for a result waits for the goal.
 """
 _MAX_SECONDS = 10_000_000
-"""Timeout in seconds, practically unlimited: the bridge has its own timeouts, and Zenoh's would end a long goal."""
+"""Timeout in seconds, practically unlimited: the bridge has its own timeouts, and a shorter one in Zenoh would end long goals."""
 
 
 class ZenohClient:
@@ -60,7 +60,7 @@ class ZenohClient:
 
     @property
     def servers(self) -> None:
-        """Return None, because no response can be lost: it uses the path of its request, whose existence the tokens prove."""
+        """Return None: a response takes the same route as its request, whose existence the tokens prove, so it cannot be lost."""
 
     def probe(self) -> None:
         """Return None, because no probe is needed."""
@@ -203,7 +203,8 @@ class ZenohServer:
                 # Send an error, because a response of zeros would look like a valid response.
                 self._refuse(query, reason)
                 return
-            # This is a response such as those for SetBool and Trigger: success is false, followed by the reason.
+            # The response consists of a bool and a string, as for SetBool and Trigger: send success as false, then
+            # the reason.
             text = reason.encode() + b"\0"
             data = CDR_HEADER + bytes(4) + struct.pack("<I", len(text)) + text
         except concurrent.futures.CancelledError:

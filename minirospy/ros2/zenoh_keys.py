@@ -46,7 +46,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Qos:
-    """An endpoint's quality of service, as far as the bridge uses it."""
+    """The parts of an endpoint's quality of service that the bridge uses."""
 
     is_reliable: bool = True
     is_transient_local: bool = False
@@ -98,7 +98,7 @@ def data_key(domain: str, name: str, type_: str, hash_: str) -> str:
 
 
 def dds_name(type_: str) -> str:
-    """Convert ``pkg/Name`` to ``pkg::msg::dds_::Name_``, and ``pkg/srv/Name`` accordingly."""
+    """Convert ``pkg/Name`` to ``pkg::msg::dds_::Name_``, and ``pkg/srv/Name`` to ``pkg::srv::dds_::Name_``."""
     package, _, rest = type_.partition("/")
     kind, _, name = rest.rpartition("/")
     return f"{package}::{kind or 'msg'}::dds_::{name}_"

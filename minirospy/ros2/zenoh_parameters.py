@@ -1,4 +1,4 @@
-"""Parameters in ROS 2, over Zenoh: the bridge node's services for ROS 1's parameters, and access to other nodes'."""
+"""ROS 2 parameters over Zenoh: offers ROS 1 parameters as services of the bridge's node, and accesses other nodes' parameters."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class ZenohParameterServer:
 class ZenohNodeParameters:
     """Parameters of other ROS 2 nodes. All methods block, so call them in a worker thread.
 
-    All raise BridgeError if the call fails.
+    All methods raise BridgeError if the call fails.
     """
 
     def __init__(self, side: Ros2Side, fields: Callable[[str], Fields]) -> None:
@@ -121,7 +121,7 @@ class ZenohNodeParameters:
         return _texts(cast("_Values", result)["names"])
 
     def get(self, node: str, name: str) -> Value:
-        """Return a parameter, with type 0 if it is not set."""
+        """Return a parameter's value, which has type 0 if the parameter is not set."""
         found = self._call(node, ParameterService.GET, {"names": [name]})["values"]
         values = cast("list[_Values]", found)
         return _read(values[0]) if values else Value(0)

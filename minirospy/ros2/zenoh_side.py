@@ -76,7 +76,7 @@ class ZenohSide:
     def fields(self, type_: str) -> dict[str, str]:
         """Return the fields of a message type.
 
-        Raise TypesDiffer if it is unknown, or the other side has a different definition.
+        Raise TypesDiffer if the type is unknown, or the other side has a different definition of it.
         """
         hash_ = self._agreed(type_, self._definitions.hash(type_), _TOPIC)
         return dict(self._definitions.message(type_, is_humble=hash_ == NO_HASH))

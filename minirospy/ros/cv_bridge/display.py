@@ -1,4 +1,4 @@
-"""cvtColorForDisplay: an image of any encoding as one that a window shows. Source: cv_bridge's API documentation of C++."""
+"""cvtColorForDisplay: converts images of any encoding for display in a window. Source: API documentation of cv_bridge in C++."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _LABEL_COLORS = bytes.fromhex(
     "9f522cc0c0c086ceeb6a5acd6f80906f8090fff9f900ff7e4682b4d2b48b008080d7bed7ff624640dfd0ed82edf5deb3fffffff5f5f5"
     "ffff009acd31"
 )
-"""Red, green and blue of label 0, 1, ...: the named colors of CSS in the order of their names, rounded as in ROS."""
+"""Red, green and blue for labels 0, 1, ...: CSS's named colors in alphabetical order, rounded as in ROS."""
 
-_BACKGROUND = -1  # the label that is black
+_BACKGROUND = -1  # the label that is displayed as black
 _SHOWN = ("rgb8", "bgr8", "rgba8", "bgra8", "mono8")
-_GRAY = 128  # of an image without contrast
+_GRAY = 128  # gray level for an image without contrast
 _LEGACY = {
     "CV_8UC1": "mono8",
     "16UC1": "mono16",
@@ -36,7 +36,7 @@ _LEGACY = {
     "CV_16UC3": "bgr16",
     "CV_16UC4": "bgra16",
 }
-"""Encodings without colors that are taken for ones with."""
+"""Encodings without color information, and the encodings as which they are interpreted."""
 
 
 def cvtColorForDisplay(
@@ -47,10 +47,11 @@ def cvtColorForDisplay(
     min_image_value: float = 0.0,
     max_image_value: float = 0.0,
 ) -> Pixels:
-    """Return an image of 8 bits for a window; ``encoding_out``: color or mono, or "" for bgr8.
+    """Return an 8-bit image for display in a window; ``encoding_out`` is a color or mono encoding, or "" for bgr8.
 
-    An image of one channel is scaled if ``min_image_value`` and ``max_image_value`` differ, or from its own minimum and
-    maximum with ``do_dynamic_scaling``. Labels (32SC1) become colors. Raise RuntimeError if there is no such conversion.
+    An image with one channel is scaled from ``min_image_value`` and ``max_image_value`` if they differ, or from its own
+    minimum
+    and maximum if ``do_dynamic_scaling``. Labels (32SC1) become colors. Raise RuntimeError if there is no such conversion.
     """
     import numpy as np
 
@@ -87,7 +88,7 @@ def cvtColorForDisplay(
 
 
 def _guessed(encoding: str) -> str:
-    """Return bgr8. Raise RuntimeError if an image of that encoding cannot be shown."""
+    """Return bgr8. Raise RuntimeError if an image with that encoding cannot be displayed."""
     bits = 0
     try:
         number = type_of_encoding(encoding)
@@ -100,7 +101,7 @@ def _guessed(encoding: str) -> str:
 
 
 def _labels(image: Pixels) -> Pixels:
-    """Return the colors of labels."""
+    """Return an image of labels as a color image."""
     import numpy as np
 
     colors = np.frombuffer(_LABEL_COLORS, np.uint8).reshape(-1, 3)[:, ::-1]
@@ -110,7 +111,7 @@ def _labels(image: Pixels) -> Pixels:
 
 
 def _scaled(image: Pixels, low: float, high: float) -> Pixels:
-    """Return an image of 8 bits, in which ``low`` is 0 and ``high`` is 255; NaN is 0."""
+    """Return an 8-bit image, in which ``low`` becomes 0 and ``high`` 255; NaN becomes 0."""
     import numpy as np
 
     values = image.astype(np.float64) - low
@@ -118,7 +119,7 @@ def _scaled(image: Pixels, low: float, high: float) -> Pixels:
         # OpenCV subtracts in the image's own type.
         limits = np.iinfo(image.dtype)
         values = np.clip(np.rint(values), limits.min, limits.max)
-    # OpenCV multiplies in float32 all types except these.
+    # OpenCV multiplies in float32, except for these types.
     exact = np.dtype(np.float64 if image.dtype.name in ("int32", "float64") else np.float32)
     shown = np.rint(values.astype(exact) * exact.type(255.0 / (high - low)))
     scaled: Pixels = np.clip(np.nan_to_num(shown, nan=0.0), 0, 255).astype(np.uint8)

@@ -56,7 +56,7 @@ class Item:
         return cls(status.name, now, level, status.message, status.hardware_id, list(status.values))
 
     def status(self, path: str, is_stale: bool) -> DiagnosticStatus:
-        """Return the status for the tree; its name is the path."""
+        """Return the status for the tree, with ``path`` as its name."""
         return DiagnosticStatus(
             level=STALE if is_stale else self.level,
             name=f"{path.rstrip('/')}/{_shown(self.name)}",
@@ -249,7 +249,7 @@ class AnalyzerGroup:
     """A group of analyzers with a header. Parameters: path, and analyzers, which has one namespace per analyzer."""
 
     def __init__(self, base_path: str, params: Params, namespace: str, now: float, log: Log) -> None:
-        """Create the analyzers and report errors; ``is_complete`` is False if one of them cannot be created."""
+        """Create the analyzers and report errors; ``is_complete`` is False if an analyzer cannot be created."""
         path = params.get("path")
         self.name = path if isinstance(path, str) else ""
         full = f"{base_path}/{self.name}" if self.name and base_path not in ("", "/") else base_path

@@ -53,7 +53,7 @@ class Settings:
 def compressed(image: Image, settings: Settings) -> CompressedImage:
     """Encode an image as JPEG or PNG.
 
-    Raise CodecError if the settings have another format, or the image's encoding does not have 8 or 16 bits per channel.
+    Raise CodecError if the settings select another format, or the image's encoding does not have 8 or 16 bits per channel.
     """
     kind = settings.format
     if kind not in ("jpeg", "png"):

@@ -62,7 +62,7 @@ class Device(Protocol):
 def open_device(path: str, feedback_path: str = "") -> Device:
     """Open a joystick by its path. On systems other than Linux, only the number in the path is used.
 
-    ``feedback_path``: on Linux, the event device that controls the motors, if it is not the joystick's own. Raise
+    ``feedback_path``: on Linux, the event device that controls the motors, if it differs from the joystick's own. Raise
     DeviceError if the joystick cannot be opened.
     """
     if sys.platform == "linux" or os.path.exists(path):

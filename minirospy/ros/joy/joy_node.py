@@ -24,11 +24,11 @@ from minirospy.ros.joy.rumble import RumbleError
 
 __all__ = ["JoyNode", "Motors", "main"]
 
-_LOOK_SECONDS = 0.2  # seconds; maximum delay before the node notices a shutdown
+_LOOK_SECONDS = 0.2  # maximum delay in seconds before the node notices a shutdown
 
 _RETRY_SECONDS = 1.0
 _DIAGNOSTIC_SECONDS = 1.0
-# seconds after which motors are restarted: half the time for which a device runs them
+# seconds after which motors are restarted: half the time for which the device runs them after each command
 _RUMBLE_SECONDS = 0.5
 
 

@@ -72,7 +72,8 @@ def main() -> int:
         if not str(error):
             print(_USAGE)
             return 1
-        # Print to stderr, because no node is running yet; this error does not need a master.
+        # Print to stderr instead of logging: no node is running yet, and reporting this error must not require a
+        # master.
         print(f"map_saver: ERROR: {error}", file=sys.stderr)
         return 1
     if options is None:

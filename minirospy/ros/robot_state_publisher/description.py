@@ -26,7 +26,7 @@ class DescriptionError(MinirospyError):
 def robot_of_parameter(name: str = NAME) -> Robot:
     """Build the robot from the description in a parameter, searching from the node's namespace upwards.
 
-    Raise DescriptionError if there is none, or if it is invalid.
+    Raise DescriptionError if the parameter is not set, or the description is invalid.
     """
     key = rospy.resolve_name(name)
     if not rospy.has_param(key):

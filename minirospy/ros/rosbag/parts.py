@@ -1,6 +1,7 @@
 """Finds rosbag's migration of messages; its modules are imported only if they are used.
 
-No other module names them. If their folder and `rosbag/migration.py` are deleted, the verbs and programs are missing.
+No other module refers to these modules. If their folder and `rosbag/migration.py` are deleted, the verbs and programs are
+missing.
 """
 
 from __future__ import annotations

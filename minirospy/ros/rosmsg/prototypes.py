@@ -1,6 +1,6 @@
 """Messages as YAML, as `rosmsg-proto` prints them: styles, filters, and arrays with one element each.
 
-Source: the output of ROS's `rosmsg.get_yaml_for_msg`. It has no braces, except around flat values after the first dictionary
+Source: the output of ROS's `rosmsg.get_yaml_for_msg`. By default, flat values are in braces only after the first dictionary
 or list with more than four entries.
 """
 
@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 MAX_DEFAULT_NON_FLOW_ITEMS = (
-    4  # entries of a dictionary or list; after a longer one, flat values are in braces
+    4  # maximum number of entries of a dictionary or list; after a longer one, flat values are in braces
 )
 _USAGE_ERROR = getattr(os, "EX_USAGE", 1)
 _NUMBERS = {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)} | {"byte", "char"}
@@ -48,15 +48,15 @@ _in_order = [False]
 
 
 class RosMsgProtoException(Exception):
-    """The prototype's type or mode does not exist."""
+    """Raised if the prototype's type or mode does not exist."""
 
 
 class RosMsgProtoArgsException(Exception):
-    """The command line lacks words."""
+    """Raised if arguments are missing on the command line."""
 
 
 class _Dumper(yaml.SafeDumper):
-    """Write objects with `__slots__`, such as messages, as dictionaries."""
+    """Writes objects with `__slots__`, such as messages, as dictionaries."""
 
     def represent_mapping(self, tag: str, mapping: Any, flow_style: bool | None = None) -> yaml.MappingNode:
         if _in_order[0]:
@@ -88,14 +88,14 @@ def dump(
                 field = _filled(value, name)
             if not inspect.ismethod(field) and not inspect.isfunction(field):
                 entries[name] = field
-        # PyYAML reads this attribute for each node that follows.
+        # PyYAML reads this attribute for each of the following nodes.
         if len(entries) > MAX_DEFAULT_NON_FLOW_ITEMS:
             dumper.default_flow_style = flow_style
         node: yaml.Node = dumper.represent_dict(entries)
         return node
 
     class Dumper(_Dumper):
-        """Write messages with the arguments of this call."""
+        """Writes messages with the arguments of this call."""
 
     Dumper.add_representer(OrderedDict, yaml.SafeDumper.represent_dict)
     Dumper.add_representer(None, represent)  # type: ignore[arg-type]
@@ -106,14 +106,14 @@ def dump(
 
 
 def _filled(message: Any, name: str) -> list[object]:
-    """Return the value of an empty array with one element, if its class is known."""
+    """Return the value of an empty array with one default element added, or [] if the element's class is unknown."""
     type_ = message._slot_types[message.__slots__.index(name)]
     element = get_array_type_instance(type_, default_package=message._type.partition("/")[0])
     return [] if element is None else [element]
 
 
 def get_array_type_instance(field_type: str, default_package: str | None = None) -> object:
-    """Return a default value of a type or of an array's elements; None if its class does not exist."""
+    """Return the default value of a type or of an array's elements, or None if the type's class does not exist."""
     from minirospy.ros.roslib.roslib.message import get_message_class
 
     base = field_type.strip().rstrip("[]")
@@ -129,20 +129,20 @@ def get_array_type_instance(field_type: str, default_package: str | None = None)
 
 
 def create_names_filter(names: Sequence[str]) -> Callable[[Any], list[str]]:
-    """Return a function that returns a message's fields except ``names``."""
+    """Return a function that returns the names of a message's fields except ``names``."""
     return lambda message: [each for each in message.__slots__ if each not in names]
 
 
 def init_rosmsg_proto() -> None:
     """Make `get_yaml_for_msg` keep the order of fields from now on, as `rosmsg-proto` does.
 
-    ROS's function also changes PyYAML for the whole process. With Python 3.10 or later, loading YAML then fails there.
+    ROS's function also changes PyYAML for the whole process; with Python 3.10 or later, loading YAML then fails.
     """
     _in_order[0] = True
 
 
 def construct_ordered_mapping(self: Any, node: Any, deep: bool = False) -> OrderedDict[Any, Any]:
-    """Return a node of YAML as an OrderedDict, for a method `construct_mapping` of a PyYAML loader."""
+    """Return a YAML node as an OrderedDict; can be used as the method `construct_mapping` of a PyYAML loader."""
     if not isinstance(node, yaml.MappingNode):
         error = f"expected a mapping node, but found {node.id}"
         raise yaml.constructor.ConstructorError(None, None, error, node.start_mark)
@@ -160,7 +160,7 @@ def construct_ordered_mapping(self: Any, node: Any, deep: bool = False) -> Order
 
 
 def construct_yaml_map_with_ordered_dict(self: Any, node: yaml.Node) -> Iterator[OrderedDict[Any, Any]]:
-    """Yield an OrderedDict, then fill it: a constructor for PyYAML."""
+    """Yield an OrderedDict, then fill it; can be used as a PyYAML constructor."""
     data: OrderedDict[Any, Any] = OrderedDict()
     yield data
     data.update(self.construct_mapping(node))
@@ -169,7 +169,7 @@ def construct_yaml_map_with_ordered_dict(self: Any, node: yaml.Node) -> Iterator
 def represent_ordered_mapping(
     self: Any, tag: str, mapping: Any, flow_style: bool | None = None
 ) -> yaml.MappingNode:
-    """Return the node of a dictionary in its own order, for a method `represent_mapping` of a PyYAML dumper."""
+    """Return the YAML node for a dictionary in its own order, for use as `represent_mapping` of a PyYAML dumper."""
     pairs: list[tuple[yaml.Node, yaml.Node]] = []
     node = yaml.MappingNode(tag, pairs, flow_style=flow_style)
     if self.alias_key is not None:
@@ -184,9 +184,9 @@ def represent_ordered_mapping(
 
 
 def prototype(args: list[str] | None) -> str | None:
-    """Return what `rosmsg-proto` prints for these arguments.
+    """Return the output of `rosmsg-proto` for these arguments, by default those of this process.
 
-    None means those of this process. On an error, print it to stderr and exit; with ``-s``, return None.
+    On an error, print it to stderr and exit; with ``-s``, return None.
     """
     init_rosmsg_proto()
     parser = _option_parser()
@@ -221,7 +221,7 @@ def prototype(args: list[str] | None) -> str | None:
 
 
 def _instance(mode: str, name: str) -> object:
-    """Return a message or a service's request with default values."""
+    """Return a message, or a service's request, with default values."""
     from minirospy.ros.roslib.roslib.message import get_message_class, get_service_class
 
     if "/" not in name:
@@ -240,7 +240,7 @@ def _instance(mode: str, name: str) -> object:
 
 
 def _only_type(mode: str, name: str) -> str:
-    """Return the full name of the only type that is called ``name``."""
+    """Return the full name of the only type with the name ``name``."""
     from minirospy.base.errors import NotFoundError
     from minirospy.introspect.interfaces import Interfaces, Kind
     from minirospy.workspace.packages import Packages

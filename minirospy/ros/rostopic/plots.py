@@ -1,6 +1,6 @@
-"""rostopic's functions that format one message as comma-separated values, and those that read paths of fields.
+"""rostopic's functions that format a message as comma-separated values, and its functions that parse field paths.
 
-Source: the output of ROS's `rostopic._str_plot`. Strings are cells; byte arrays and empty arrays are left out.
+Source: the output of ROS's `rostopic._str_plot`. Each string is a cell; byte arrays and empty arrays are omitted.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ _PLAIN = (bool, int, float)
 
 
 def plot_fields(val: object, f: str, field_filter: FieldFilter | None) -> str:
-    """Return the line with the names of a value's cells: `time,` and each path below ``f``."""
+    """Return the line with the names of a value's cells: `time,`, then each path below ``f``."""
     return f"time,{plot_field_cells(val, f, field_filter) or ''}"
 
 
 def plot_field_cells(val: object, f: str, field_filter: FieldFilter | None) -> str | None:
-    """Return the names of a value's cells; None if it has none."""
+    """Return the names of a value's cells, or None if the value has no cells."""
     return _joined(name for name, _ in _cells(val, f, None, field_filter))
 
 
@@ -64,7 +64,7 @@ def plot(
 
 
 def plot_cells(val: object, time_offset: Time | None, field_filter: FieldFilter | None) -> str | None:
-    """Return a value's cells; None if it has none."""
+    """Return a value's cells, or None if the value has no cells."""
     return _joined(text for _, text in _cells(val, "", time_offset, field_filter))
 
 
@@ -76,7 +76,7 @@ def _joined(texts: Iterator[str]) -> str | None:
 def _cells(
     value: Any, path: str, time_offset: Time | None, field_filter: FieldFilter | None
 ) -> Iterator[tuple[str, str]]:
-    """Yield (path, text) of each cell."""
+    """Yield (path, text) for each cell."""
     if type(value) in (*_PLAIN, str) or isinstance(value, TVal):
         yield path, _text(value, time_offset)
     elif hasattr(value, "_slot_types"):
@@ -86,7 +86,7 @@ def _cells(
                 field = convert_getattr(value, name, type_)
                 yield from _cells(field, f"{path}.{name}", time_offset, field_filter)
     elif type(value) in (list, tuple) and len(value):
-        # The first element decides, as in ROS: a list of lists has no cells.
+        # As in ROS, the first element's type is decisive: a list of lists has no cells.
         first = value[0]
         if type(first) in (*_PLAIN, str) or isinstance(first, TVal):
             for index, each in enumerate(value):
@@ -103,18 +103,18 @@ def _text(value: Any, time_offset: Time | None) -> str:
 
 
 def convert_getattr(val: object, f: str, t: str) -> Any:
-    """Return a field; a string in a field of type uint8[] is returned as a list of numbers."""
+    """Return a field; return a string in a field of type uint8[] as a list of numbers."""
     value = getattr(val, f)
     return [ord(each) for each in value] if isinstance(value, str) and "uint8[" in t else value
 
 
 def is_string_type(t: object) -> bool:
-    """Return whether ``t`` is the type of strings."""
+    """Return whether ``t`` is the string type."""
     return t is str
 
 
 def nested_attribute(msg: object, nested_attributes: str) -> Any:
-    """Return the attribute at a path such as `header/stamp`. Raise AttributeError if there is none."""
+    """Return the attribute at a path such as `header/stamp`. Raise AttributeError if there is no such attribute."""
     value: Any = msg
     for name in nested_attributes.split("/"):
         value = getattr(value, name)
@@ -122,7 +122,7 @@ def nested_attribute(msg: object, nested_attributes: str) -> Any:
 
 
 def array_index_or_slice(index_string: str) -> int | slice:
-    """Return the index or slice in a path's brackets, such as `1:3`. Raise AssertionError if it is invalid."""
+    """Return the index or slice in a path's brackets, such as `1:3`. Raise AssertionError if the brackets are invalid."""
     if not index_string:
         raise AssertionError("empty array index")
     words = index_string.split(":")
@@ -143,7 +143,7 @@ def array_index_or_slice(index_string: str) -> int | slice:
 
 
 def ascii_table(header: Sequence[str], cols: Mapping[str, list[Any]]) -> str:
-    """Return a table with a line below the names; the columns in ``cols`` are padded in place, as in ROS."""
+    """Return a table with a rule below the header row. As in ROS, the columns in ``cols`` are padded in place."""
     widths = {name: max(len(name), *(len(each) for each in cols[name])) for name in header}
     for name in header:
         cols[name][:] = [str(each).ljust(widths[name]) for each in cols[name]]

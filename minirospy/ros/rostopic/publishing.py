@@ -1,4 +1,4 @@
-"""rostopic's functions that publish: values from a program, from standard input or a file, and from a parameter.
+"""rostopic's functions for publishing values from a program, from stdin or a file, and from a parameter.
 
 Source: the behaviour of ROS's rostopic.
 """
@@ -35,9 +35,9 @@ __all__ = [
     "wait_for_subscriber",
 ]
 
-SUBSCRIBER_TIMEOUT = 5.0  # seconds before stdin_publish publishes without a subscriber
-_LATCH_SECONDS = 3.0  # a process that publishes one message stays for so long, as in ROS
-_POLL_SECONDS = 0.05  # between checks of a parameter's copy in this process
+SUBSCRIBER_TIMEOUT = 5.0  # seconds after which stdin_publish publishes even without a subscriber
+_LATCH_SECONDS = 3.0  # seconds for which a process that publishes one message continues to run, as in ROS
+_POLL_SECONDS = 0.05  # seconds between checks of a parameter's cached value
 
 
 def publish_message(
@@ -49,7 +49,7 @@ def publish_message(
     verbose: bool = False,
     substitute_keywords: bool = False,
 ) -> None:
-    """Publish a message built from YAML values: ``rate`` times a second until shutdown, else once.
+    """Publish a message built from YAML values: ``rate`` times a second until shutdown, or once if there is no rate.
 
     Without a rate, return immediately if ``once``, else wait for shutdown. ``substitute_keywords``: replace `now` and
     `auto` in each message. Raise ROSTopicException if the values do not match the message's fields.
@@ -87,7 +87,7 @@ def publish_at_rate(
     substitute_keywords: bool = False,
     pub_args: Sequence[object] | None = None,
 ) -> None:
-    """Publish a message ``rate`` times a second until shutdown. Raise ROSTopicException if the rate is no number."""
+    """Publish a message ``rate`` times a second until shutdown. Raise ROSTopicException if the rate is not a number."""
     import rospy
 
     try:
@@ -104,7 +104,7 @@ def publish_at_rate(
 
 
 def publish_latched(pub: Publisher[Message], msg: Message, once: bool = False, verbose: bool = False) -> None:
-    """Publish a message; unless ``once``, wait for shutdown. Raise ROSTopicException if it is no message."""
+    """Publish a message; unless ``once``, wait for shutdown. Raise ROSTopicException if ``msg`` is not a message."""
     import rospy
 
     try:
@@ -116,7 +116,7 @@ def publish_latched(pub: Publisher[Message], msg: Message, once: bool = False, v
 
 
 def fill_message(msg: Message, pub_args: Sequence[object] | None) -> None:
-    """Set a message's fields from YAML values. Raise ROSTopicException if they do not match."""
+    """Set a message's fields from YAML values. Raise ROSTopicException if the values do not match the fields."""
     import rospy
     from std_msgs.msg import Header
 
@@ -140,7 +140,7 @@ def argv_publish(
     verbose: bool,
     substitute_keywords: bool = False,
 ) -> None:
-    """Publish values as `rostopic pub` does those of its command line: with ``once``, stay for 3 seconds."""
+    """Publish values as `rostopic pub` publishes the values on its command line; if ``once``, wait 3 seconds afterwards."""
     import rospy
 
     publish_message(pub, msg_class, pub_args, rate, once, verbose, substitute_keywords)
@@ -150,7 +150,7 @@ def argv_publish(
 
 
 def wait_for_subscriber(pub: Publisher[Message], timeout: float) -> None:
-    """Wait until a publisher has a subscriber, at most ``timeout`` seconds."""
+    """Wait until a publisher has a subscriber, or for at most ``timeout`` seconds."""
     import rospy
 
     end = time.monotonic() + timeout
@@ -166,10 +166,10 @@ def stdin_publish(
     filename: str | None,
     verbose: bool,
 ) -> None:
-    """Publish the YAML documents of a file, or of standard input if ``filename`` is empty.
+    """Publish the YAML documents in a file, or on stdin if ``filename`` is empty.
 
-    With a ``rate``, the only document of a file is published again and again. Raise ROSTopicException if the file does not
-    exist or is not YAML.
+    If there is a ``rate`` and the file has only one document, publish that document repeatedly. Raise ROSTopicException if the
+    file does not exist or is not valid YAML.
     """
     import rospy
 
@@ -198,9 +198,9 @@ def stdin_publish(
 
 
 def file_yaml_arg(filename: str) -> Callable[[], Iterator[list[Any]]]:
-    """Return a function that yields [document] for each YAML document of a file.
+    """Return a function that yields [document] for each YAML document in a file.
 
-    Raise ROSTopicException if the file does not exist; the function raises it if the file is not YAML.
+    Raise ROSTopicException if the file does not exist; the function raises it if the file is not valid YAML.
     """
     if not os.path.isfile(filename):
         raise ROSTopicException(f"file does not exist: {filename}")
@@ -217,18 +217,18 @@ def file_yaml_arg(filename: str) -> Callable[[], Iterator[list[Any]]]:
 
 
 def stdin_yaml_arg() -> Iterator[Any]:
-    """Yield each YAML document of standard input that a line with three hyphens ends; stop at its end or at shutdown."""
+    """Yield each YAML document on stdin; a line with three hyphens ends a document. Stop at the end of stdin or at shutdown."""
     import rospy
 
     lines: list[str] = []
     while not rospy.is_shutdown():
         if (
             os.name != "nt" and not select.select([sys.stdin], [], [], 1.0)[0]
-        ):  # Windows waits for sockets only
+        ):  # select() supports only sockets on Windows
             continue
         line = sys.stdin.readline()
         if not line:
-            return  # a document without its end may be incomplete
+            return  # ignore a document without an end, because it may be incomplete
         if line.strip() != "---":
             lines.append(line)
             continue
@@ -245,7 +245,10 @@ def stdin_yaml_arg() -> Iterator[Any]:
 def param_publish_once(
     pub: Publisher[Message], msg_class: type[Message], param_name: str, verbose: bool
 ) -> None:
-    """Publish a parameter's value once. Raise ROSTopicException if it is not set or does not match the message."""
+    """Publish a parameter's value once.
+
+    Raise ROSTopicException if the parameter is not set, or its value does not match the message.
+    """
     import rospy
 
     _require_param(param_name)
@@ -259,9 +262,9 @@ def param_publish(
     rate: float | None,
     verbose: bool,
 ) -> None:
-    """Publish a parameter's value until shutdown: ``rate`` times a second, or if None, whenever the value changes.
+    """Publish a parameter's value until shutdown: ``rate`` times a second or, if ``rate`` is None, whenever the value changes.
 
-    Raise ROSTopicException if the parameter is not set, or is no dictionary and no list.
+    Raise ROSTopicException if the parameter is not set, or is neither a dictionary nor a list.
     """
     import rospy
 
@@ -269,7 +272,7 @@ def param_publish(
     pauses = rospy.Rate(rate) if rate is not None else None
     published: object = None
     while not rospy.is_shutdown():
-        # The master sends changes of a parameter that a node has read this way.
+        # After this call, the master notifies the node of changes to the parameter, so the cached value is current.
         value = rospy.get_param_cached(param_name)
         if not isinstance(value, dict | list):
             raise ROSTopicException(f"Parameter [{param_name}] in not a valid type")

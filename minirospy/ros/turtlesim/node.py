@@ -42,7 +42,7 @@ from minirospy.ros.turtlesim.world import BACKGROUND, STEP_SECONDS, Reading, Vel
 
 __all__ = ["Simulator", "main"]
 
-_LATE_SECONDS = 0.2  # seconds; if the node was suspended for longer, it skips the missed steps
+_LATE_SECONDS = 0.2  # seconds of suspension after which the node skips the missed steps
 
 _T = TypeVar("_T")
 
@@ -93,7 +93,7 @@ class Simulator:
             if not rospy.has_param(f"~background_{part}"):
                 rospy.set_param(f"~background_{part}", usual)
         self.world = World(_background())
-        # Serialises changes to the set of turtles; the world continues to step in the meantime.
+        # Serialises changes to the set of turtles; meanwhile, the world continues to step.
         self._changing = threading.Lock()
         self._ends: dict[str, _Ends] = {}
         self._services: list[rospy.Service[object]] = []
@@ -225,7 +225,7 @@ class _Ends:
         self._colors.publish(ColorMessage(*reading.color))
 
     def close(self) -> None:
-        """Unregister everything."""
+        """Unregister all of the turtle's topics and services."""
         self._commands.unregister()
         for service in self._services:
             service.shutdown()

@@ -1,6 +1,6 @@
 """turtle_teleop_key: publishes `turtle1/cmd_vel` from a terminal's arrow keys.
 
-Parameters: scale_linear (2 m/s), scale_angular (2 rad/s); they are in the node's namespace, not private. Source:
+Parameters: scale_linear (2 m/s), scale_angular (2 rad/s); both are in the node's namespace, not private. Source:
 http://wiki.ros.org/turtlesim.
 """
 

@@ -1,4 +1,4 @@
-"""The turtles' world. Its inputs are commands, teleports and pens, its outputs poses, colours and wall hits. Pure.
+"""The turtles' world. Its inputs are commands, teleports and pens; its outputs are poses, colours and wall hits. Pure.
 
 Lengths are in metres, angles in radians; the origin is the lower left corner. Source: http://wiki.ros.org/turtlesim, and the
 behaviour of turtlesim 0.10.2.
@@ -26,7 +26,7 @@ _PIXELS_PER_METRE = 45.0
 
 
 def _float32(value: float) -> float:
-    """Return the number rounded to float32 precision."""
+    """Return a number rounded to float32 precision."""
     return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
@@ -54,7 +54,7 @@ class Pen(NamedTuple):
 
 
 class Pose(NamedTuple):
-    """Metres from the left and lower walls, and the direction in radians: 0 is right, pi / 2 is up."""
+    """The distances in metres from the left and lower walls, and the direction in radians: 0 is right, pi / 2 is up."""
 
     x: float
     y: float
@@ -103,17 +103,17 @@ class _Turtle:
             self.x, self.y, self.theta = target.x, max(0.0, SIZE - target.y), target.theta
 
     def move(self, seconds: float) -> None:
-        """Turn, then move."""
+        """Turn the turtle, then move it."""
         forward, left, turn = self.velocity
         self.theta += turn * seconds
-        # Normalise to [-pi, pi).
+        # Normalise the angle to [-pi, pi).
         self.theta -= 2 * math.pi * math.floor((self.theta + math.pi) / (2 * math.pi))
         ahead, aside = math.cos(self.theta), math.sin(self.theta)
         self.x += (ahead * forward - aside * left) * seconds
         self.y -= (ahead * left + aside * forward) * seconds
 
     def stop_at_walls(self) -> str:
-        """Clamp the position to the world; return the warning, or ""."""
+        """Clamp the position to the world; return the warning about a wall, or ""."""
         x, y = self.x, self.y
         self.x, self.y = (min(max(value, 0.0), SIZE) for value in (x, y))
         if (x, y) == (self.x, self.y):

@@ -35,8 +35,8 @@ _M = TypeVar("_M", bound=Message)
 class ActionClient:
     """A client for the action server in the namespace ``ns``; ``ActionSpec`` is the action's class.
 
-    The parameters ``actionlib_client_pub_queue_size`` and ``actionlib_client_sub_queue_size`` set its queue sizes. Raise
-    ActionException if ``ActionSpec`` is not an action class.
+    The parameters ``actionlib_client_pub_queue_size`` and ``actionlib_client_sub_queue_size`` set the client's queue sizes.
+    Raise ActionException if ``ActionSpec`` is not an action class.
     """
 
     def __init__(self, ns: str, ActionSpec: type[Action]) -> None:
@@ -94,8 +94,9 @@ class ActionClient:
     ) -> ClientGoalHandle:
         """Send a goal and return its handle. Keep a reference to the handle: without one, the callbacks are no longer called.
 
-        ``transition_cb(handle)`` is called on each state change, ``feedback_cb(handle, feedback)`` with feedback. Both
-        are called in the library's threads, never concurrently.
+        ``transition_cb(handle)`` is called on each state change, and ``feedback_cb(handle, feedback)`` for each feedback
+        message.
+        Both are called in the library's threads, never concurrently.
         """
         subscription = self.status_sub.impl and self.status_sub.impl.subscription
         if subscription and self._status_link_ended not in subscription.on_ended:
@@ -111,7 +112,7 @@ class ActionClient:
         self.pub_cancel.publish(GoalID(stamp=time))
 
     def wait_for_action_server_to_start(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
-        """Wait for the server: the old name of :meth:`wait_for_server`."""
+        """Wait for the server. This is the old name of :meth:`wait_for_server`."""
         return self.wait_for_server(timeout)
 
     def wait_for_server(self, timeout: times.Duration = rospy.Duration()) -> bool:  # noqa: B008
@@ -138,12 +139,12 @@ class ActionClient:
         )
 
     def _status_link_ended(self) -> None:
-        """Check after a while whether the server is gone. Called on the loop."""
+        """Check after SERVER_SECONDS whether the server is gone. Called on the loop."""
         if goals := self.manager.unfinished():
             self._check_later(goals)
 
     def _check_later(self, goals: list[CommStateMachine]) -> None:
-        # Not a rospy.Timer: a simulated clock may stand still without the server.
+        # Use a wall-clock timer instead of rospy.Timer, because a simulated clock may stop together with the server.
         timer = threading.Timer(SERVER_SECONDS, self._check_server, (goals, self.last_status_msg))
         timer.daemon = True
         timer.start()

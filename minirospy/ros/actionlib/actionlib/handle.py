@@ -57,7 +57,7 @@ class StatusTracker:
 
     @property
     def handle_destruction_time(self) -> times.Time:
-        """Return the time at which the goal ended; zero before that."""
+        """Return the time at which the goal ended, or zero if it has not ended."""
         return rospy.Time(nsecs=self.ended_at)
 
     @handle_destruction_time.setter
@@ -82,7 +82,7 @@ class StatusTracker:
 
 
 class _Server(Protocol):
-    """The action server, as the handles of its goals use it."""
+    """The methods of the action server that the handles of its goals call."""
 
     ActionResultType: type[Message]
 
@@ -190,7 +190,7 @@ class ServerGoalHandle:
             self.action_server.publish_feedback(self.status_tracker.status, feedback)
 
     def get_goal(self) -> Any:
-        """Return the goal, or None if the handle has none."""
+        """Return the goal, or None if the handle has no goal."""
         return self.goal.goal if self.goal else None
 
     def get_goal_id(self) -> GoalID:

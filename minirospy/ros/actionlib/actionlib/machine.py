@@ -77,7 +77,7 @@ class ClientGoalHandle:
         return machine.latest_goal_status.text
 
     def get_result(self) -> Any:
-        """Return the goal's result, or None if there is none yet."""
+        """Return the goal's result, or None if it has not arrived yet."""
         machine = self._machine("get_result")
         return machine.latest_result.result if machine and machine.latest_result else None
 
@@ -196,7 +196,7 @@ class CommStateMachine:
                 self.feedback_cb(ClientGoalHandle(self), action_feedback.feedback)
 
     def lose(self) -> bool:
-        """End the goal as LOST, because its server is gone; return False if it had ended before."""
+        """End the goal as LOST, because its server is gone; return False if the goal had already ended."""
         with self.mutex:
             if self.state == _DONE:
                 return False
@@ -231,7 +231,7 @@ class CommStateMachine:
 class GoalManager:
     """The goals of one action client: creates the goals, and passes the server's messages to each.
 
-    The manager has only weak references to them: a goal without handles receives no further messages.
+    The manager has only weak references to the goals, so a goal without handles receives no further messages.
     """
 
     _numbers = itertools.count(1)

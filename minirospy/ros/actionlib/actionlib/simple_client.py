@@ -114,7 +114,7 @@ class SimpleActionClient:
         return self._news.wait_for(is_over, timeout) and self.gh is not None
 
     def get_result(self) -> Any:
-        """Return the goal's result, or None if there is none yet."""
+        """Return the goal's result, or None if it has not arrived yet."""
         if self.gh is None:
             rospy.logerr("Called get_result when no goal is running")
             return None

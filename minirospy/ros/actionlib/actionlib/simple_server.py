@@ -32,8 +32,8 @@ class SimpleActionServer:
     """A server that executes one goal at a time.
 
     ``execute_cb(goal)`` is called for each goal in a separate thread, and must set a terminal state (``set_succeeded``,
-    ``set_aborted``, ``set_preempted``). Without it, use ``register_goal_callback`` to be notified of goals, and
-    ``accept_new_goal`` to accept them. With an ``execute_cb``, the program runs until the node shuts down. Raise
+    ``set_aborted``, ``set_preempted``). Without ``execute_cb``, use ``register_goal_callback`` to be notified of goals, and
+    ``accept_new_goal`` to accept them. With ``execute_cb``, the program runs until the node shuts down. Raise
     ActionException if ``ActionSpec`` is not an action class.
     """
 

@@ -1,4 +1,4 @@
-"""Finds the message classes of an action, from a class such as `TestAction`: goal, result and feedback."""
+"""Finds an action's goal, result and feedback classes, given an action class such as `TestAction`."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ __all__ = [
 # Connection header field by which minirospy clients announce, on goal topics, that they accept fast responses.
 TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
 
-# Seconds by which the server delays goals from other clients: Python actionlib drops results that arrive before
-# send_goal returns.
+# Seconds by which the server delays goals from non-minirospy clients: Python actionlib drops results that arrive
+# before send_goal returns.
 SEND_SECONDS = 1e-3
 
-# Seconds by which cancel requests are delayed: a goal sent earlier uses another connection, and is itself delayed.
+# Seconds by which cancel requests are delayed, because a goal that was sent earlier uses another connection and is
+# itself delayed.
 CANCEL_SECONDS = 3 * SEND_SECONDS
 
-# Time for a server to connect again after its connection has ended. Afterwards its goals are LOST.
+# Seconds for a server to reconnect after its connection has ended. After that, its goals are LOST.
 SERVER_SECONDS = 5.0
 
 

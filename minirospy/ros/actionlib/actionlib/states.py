@@ -17,7 +17,7 @@ __all__ = [
 ]
 
 NO_TRANSITION, INVALID_TRANSITION = -1, -2
-"""Entries in the transition table of ROS's client, for a status that changes nothing and for an invalid one.
+"""Entries in the transition table of ROS's client: for a status that changes nothing, and for an invalid status.
 
 minirospy's table is in :mod:`minirospy.core.graph.goals`. Programs may use these names after `from actionlib import *`.
 """
@@ -25,7 +25,7 @@ g_goal_id = 1  # unused; ROS's `from actionlib import *` exports it
 
 
 def get_name_of_constant(C: type, n: int) -> str:
-    """Return the name of the class constant with this value, or a name such as ``NO_SUCH_STATE_77`` if there is none."""
+    """Return the name of the class constant with this value; if there is none, return a name such as ``NO_SUCH_STATE_77``."""
     for name, value in vars(C).items():
         # ``type(value) is int`` excludes bool constants, which message classes may also define.
         if type(value) is int and value == n and not name.startswith("_"):

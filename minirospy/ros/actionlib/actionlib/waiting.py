@@ -12,7 +12,8 @@ from minirospy.base.clock import SignalSafeEvent, wait_for_event
 __all__ = ["Waiting"]
 
 _FOREVER = times.Duration()
-_SIMULATED_SLICE = 0.02  # seconds; polling interval in simulated time, which may run faster than real time
+# polling interval in seconds in simulated time, which may run faster than real time
+_SIMULATED_SLICE = 0.02
 
 
 class Waiting:
@@ -27,7 +28,7 @@ class Waiting:
             event.set()
 
     def wait_for(self, condition: Callable[[], bool], timeout: times.Duration) -> bool:
-        """Wait until ``condition()`` is true; return False after ``timeout`` (zero: no timeout) or at a shutdown."""
+        """Wait until ``condition()`` is truthy; return False after ``timeout`` (zero: no timeout) or at a shutdown."""
         deadline = rospy.get_rostime() + timeout if timeout != _FOREVER else None
         if condition():
             return True

@@ -143,7 +143,7 @@ def _found_type(action: str, timeout: float | None) -> str:
 
 
 class _Progress:
-    """Follows a running goal: prints its state and feedback, and cancels the goal on Ctrl-C."""
+    """Tracks a running goal: prints its state and feedback, and cancels the goal on Ctrl-C."""
 
     def __init__(self, client: SimpleActionClient, goal: Message) -> None:
         self._client = client
@@ -215,7 +215,8 @@ class _Progress:
 def progress(goal: Message, feedback: Message) -> float | None:
     """Return the progress from 0 to 1, or None if it is unknown.
 
-    It is known if goal and feedback have one number each, and the feedback's is between 0 and the goal's.
+    The progress is known if the goal and the feedback each have one number, and the feedback's number is between 0 and the
+    goal's.
     """
     wanted, reached = (
         [cast("float", field.value) for field in fields(message) if type(field.value) in (int, float)]

@@ -47,7 +47,7 @@ def readCalibration(file_name: str) -> tuple[str, CameraInfo] | None:
 def writeCalibration(file_name: str, camera_name: str, cinfo: CameraInfo) -> bool:
     """Write a calibration as .yaml, .yml or .ini in ROS's format, creating its folders. ROS has this function only in C++.
 
-    If it cannot be written, or the extension is unknown, log the reason and return False.
+    If the file cannot be written, or the extension is unknown, log the reason and return False.
     """
     write = _WRITERS.get(Path(file_name).suffix)
     if write is None:

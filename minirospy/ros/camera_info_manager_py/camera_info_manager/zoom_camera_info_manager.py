@@ -91,7 +91,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
     ) -> None:
         """Set the fields of view.
 
-        ``min_fov``, ``max_fov``: horizontal, in degrees, at the highest and at the lowest zoom level.
+        ``min_fov`` and ``max_fov`` are the horizontal fields of view in degrees, at the highest and at the lowest zoom level.
         """
         super().__init__(min_zoom, max_zoom, cname, url, namespace)
         self._min_fov = min_fov

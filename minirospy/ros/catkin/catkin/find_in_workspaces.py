@@ -61,7 +61,7 @@ def _by_workspace(
 ) -> Iterator[list[Path]]:
     """Yield the list of folders to search in each workspace.
 
-    If no workspace contains the package, finally yield its own folder.
+    If no workspace contains the package, finally yield the package's own folder.
     """
     for workspace in workspaces:
         folders = []

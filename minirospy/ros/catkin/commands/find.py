@@ -97,7 +97,7 @@ def _find(
 
 
 def _workspaces() -> Iterator[Path | None]:
-    """Yield the prefixes of the sourced workspaces, topmost overlay first; then None, for minirospy's own packages."""
+    """Yield the prefixes of the sourced workspaces, topmost overlay first; then yield None for minirospy's own packages."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
         if prefix and Path(prefix, ".catkin").is_file():
             yield Path(prefix)

@@ -24,11 +24,12 @@ from minirospy.workspace.plan import DIST_PACKAGES, Plan, Test
 
 __all__ = ["run_tests"]
 
-_END_SECONDS = 20.0  # slightly longer than roslaunch waits for its nodes to exit
+# seconds to wait for a test to exit; slightly longer than roslaunch waits for its nodes
+_END_SECONDS = 20.0
 
 
 def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[str]) -> int:
-    """Run the tests of the chosen packages, or of all; return 1 if one failed.
+    """Run the tests of the chosen packages, or of all; return 1 if a test failed.
 
     Raise BuildError or NotFoundError if a test cannot be run, MinirospyError on Ctrl-C.
 
@@ -83,7 +84,7 @@ def _run(command: Sequence[str], environment: dict[str, str], folder: str | Path
         while (status := popen.poll()) is None and not interrupted.is_set():
             interrupted.wait(POLL_SECONDS)
         if status is None:
-            # The terminal has also sent the Ctrl-C to the test.
+            # The terminal has also sent the Ctrl-C to the test, so only wait for it to exit.
             try:
                 popen.wait(_END_SECONDS)
             except subprocess.TimeoutExpired:
@@ -135,7 +136,7 @@ def _pytest(plan: Plan, test: Test, results: Path) -> list[str]:
 
 
 def _rostest(plan: Plan, test: Test, results: Path) -> list[str]:
-    # The same file may be run with different sets of arguments.
+    # The same file may be run with different sets of arguments, so include them in the name.
     stem = "__".join([os.path.splitext(test.path)[0], *test.arguments])
     name = re.sub(r"[^\w.-]", "_", stem)
     options = ["--package", plan.name, "--pkgdir", str(plan.folder), "--results-filename", f"{name}.xml"]

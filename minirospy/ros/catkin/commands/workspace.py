@@ -91,7 +91,7 @@ def build_packages(
 
 
 def _places(workspace: Workspace) -> dict[str, str]:
-    """Return the variables with the workspace's folders."""
+    """Return the CMake variables that contain the workspace's folders."""
     devel, build = workspace.devel.as_posix(), workspace.build.as_posix()
     return {"CATKIN_DEVEL_PREFIX": devel, "CMAKE_BINARY_DIR": build}
 

@@ -1,4 +1,4 @@
-"""catkin_pkg: reads package.xml files. It brings no commands. Source: http://docs.ros.org/en/independent/api/catkin_pkg/html/."""
+"""catkin_pkg: reads package.xml files, without commands. Source: http://docs.ros.org/en/independent/api/catkin_pkg/html/."""
 
 from __future__ import annotations
 

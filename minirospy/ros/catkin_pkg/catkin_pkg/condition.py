@@ -1,4 +1,4 @@
-"""catkin_pkg.condition: conditions of package.xml, format 3. Source: https://ros.org/reps/rep-0149.html."""
+"""catkin_pkg.condition: conditions in package.xml, format 3. Source: https://ros.org/reps/rep-0149.html."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["evaluate_condition"]
 
 
 def evaluate_condition(condition: str | None, context: Mapping[str, str]) -> bool:
-    """Return whether a condition is true; None is. Raise ValueError if it does not parse."""
+    """Return whether a condition is true; None counts as true. Raise ValueError if the condition is invalid."""
     if condition is None:
         return True
     try:

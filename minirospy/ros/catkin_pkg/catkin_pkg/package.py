@@ -68,8 +68,9 @@ _DEPENDENCIES = {
     "conflict": "conflicts",
     "replace": "replaces",
 }
-"""Tag -> the list of the package that has it."""
-_GENERIC = ("build_depends", "build_export_depends", "exec_depends")  # of <depend>
+"""Maps each tag to the package's attribute that lists its dependencies."""
+# attributes to which the tag <depend> adds a dependency
+_GENERIC = ("build_depends", "build_export_depends", "exec_depends")
 _SINGLE = ("name", "version", "description")
 _COMMON = {*_SINGLE, "maintainer", "license", "author", "url", "export", "conflict", "replace"}
 _ONLY_FORMAT_1 = {"build_depend", "buildtool_depend", "run_depend", "test_depend"}
@@ -83,7 +84,7 @@ _VERSION = re.compile(r"[0-9]+\.[0-9]+\.[0-9]+")
 
 
 class InvalidPackage(Exception):
-    """A package.xml is not valid."""
+    """The package.xml is invalid."""
 
     def __init__(self, msg: str, package_path: str | None = None) -> None:
         super().__init__(msg)
@@ -96,19 +97,19 @@ class InvalidPackage(Exception):
 
 
 class _Conditional:
-    """Something with a condition; ``evaluated_condition`` is None until the condition is evaluated."""
+    """An element with a condition; ``evaluated_condition`` is None until the condition is evaluated."""
 
     condition: str | None
     evaluated_condition: bool | None
 
     def evaluate_condition(self, context: Mapping[str, str]) -> bool:
-        """Evaluate the condition. Raise ValueError if it does not parse."""
+        """Evaluate the condition. Raise ValueError if the condition is invalid."""
         self.evaluated_condition = evaluate_condition(self.condition, context)
         return self.evaluated_condition
 
 
 class Dependency(_Conditional):
-    """A dependency, with the versions that it allows."""
+    """A dependency, with the versions that it accepts."""
 
     __slots__ = ["condition", "evaluated_condition", "name", *_VERSIONS]
 
@@ -151,15 +152,15 @@ class _Group(_Conditional):
 
 
 class GroupDependency(_Group):
-    """A dependency on all packages of a group."""
+    """A dependency on all packages in a group."""
 
 
 class GroupMembership(_Group):
-    """A group that the package is in."""
+    """The membership of the package in a group."""
 
 
 class Export(_Conditional):
-    """A tag in ``<export>``; ``content`` is the text in it, with the tags in that."""
+    """A tag in ``<export>``; ``content`` is the XML inside the tag."""
 
     __slots__ = ["attributes", "content", "evaluated_condition", "tagname"]
 
@@ -171,7 +172,7 @@ class Export(_Conditional):
 
     @property
     def condition(self) -> str | None:  # type: ignore[override]
-        """Return the attribute ``condition``."""
+        """Return the value of the XML attribute ``condition``, or None if it is not set."""
         return self.attributes.get("condition")
 
     def __str__(self) -> str:
@@ -181,7 +182,7 @@ class Export(_Conditional):
 
 
 class License(str):
-    """A license; ``file`` is that of its text, or None."""
+    """A license; ``file`` is the name of the file with its text, or None."""
 
     file: str | None = None
 
@@ -199,13 +200,13 @@ class Person:
         return self.name if self.email is None else f"{self.name} <{self.email}>"
 
     def validate(self) -> None:
-        """Raise InvalidPackage if the email is not an address."""
+        """Raise InvalidPackage if the email address is invalid."""
         if self.email is not None and not EMAIL.fullmatch(self.email):
             raise InvalidPackage(f'Invalid email "{self.email}" for person "{self.name}"')
 
 
 class Url:
-    """An address of the package: a website, bugtracker or repository."""
+    """A URL of the package: a website, bugtracker or repository."""
 
     __slots__ = ["type", "url"]
 
@@ -218,7 +219,7 @@ class Url:
 
 
 class Package:
-    """A package.xml. ``evaluate_conditions`` sets ``evaluated_condition`` of its dependencies."""
+    """The contents of a package.xml. ``evaluate_conditions`` sets the dependencies' ``evaluated_condition``."""
 
     __slots__ = [
         "package_format",
@@ -265,7 +266,7 @@ class Package:
 
     @property
     def run_depends(self) -> list[Dependency]:
-        """Return the dependencies of format 1 at run time."""
+        """Return the runtime dependencies, as defined in format 1."""
         others = (each for each in self.build_export_depends if each not in self.exec_depends)
         return [*self.exec_depends, *others]
 
@@ -288,7 +289,7 @@ class Package:
         return "catkin" in (each.name for each in self.buildtool_depends)
 
     def get_build_type(self) -> str:
-        """Return the build tool that ``<export>`` names; catkin by default. Raise InvalidPackage if there are several."""
+        """Return the build tool specified in ``<export>``, by default catkin. Raise InvalidPackage if several are specified."""
         kept = [each for each in self.exports if each.evaluated_condition is not False]
         types = [each.content or "" for each in kept if each.tagname == "build_type"]
         if len(types) > 1:
@@ -296,12 +297,12 @@ class Package:
         return types[0] if types else "catkin"
 
     def get_unconditional_build_types(self) -> list[str]:
-        """Return the build tools that ``<export>`` names without a condition."""
+        """Return the build tools that ``<export>`` specifies without a condition."""
         exports = (each for each in self.exports if each.tagname == "build_type" and each.condition is None)
         return [each.content or "" for each in exports]
 
     def is_metapackage(self) -> bool:
-        """Return whether the package only names others."""
+        """Return whether the package is a metapackage, which only lists other packages."""
         return "metapackage" in (each.tagname for each in self.exports)
 
     def has_invalid_metapackage_dependencies(self) -> bool:
@@ -310,14 +311,17 @@ class Package:
         return bool(self.build_depends or tools or self.test_depends)
 
     def evaluate_conditions(self, context: Mapping[str, str]) -> None:
-        """Evaluate the conditions of all dependencies and exports. Raise ValueError if one does not parse."""
+        """Evaluate the conditions of all dependencies and exports. Raise ValueError if a condition is invalid."""
         groups = (*self.group_depends, *self.member_of_groups, *self.exports)
         names = _DEPENDENCIES.values()
         for each in (*groups, *(one for name in names for one in getattr(self, name))):
             each.evaluate_condition(context)
 
     def validate(self, warnings: list[str] | None = None) -> None:
-        """Check the contents. Add warnings to the list, or print them. Raise InvalidPackage with all errors."""
+        """Check the contents. Append warnings to ``warnings``, or print them if it is None.
+
+        Raise InvalidPackage with all errors.
+        """
         errors = self._errors()
         for warning in self._warnings():
             if warnings is None:
@@ -376,7 +380,7 @@ class Package:
 
 
 def package_exists_at(path: str) -> bool:
-    """Return whether a folder has a package.xml."""
+    """Return whether a folder contains a package.xml."""
     return os.path.isdir(path) and os.path.isfile(os.path.join(path, PACKAGE_MANIFEST_FILENAME))
 
 
@@ -424,7 +428,10 @@ def _file_of(path: str) -> str:
 def parse_package_string(
     data: str | bytes, filename: str | None = None, warnings: list[str] | None = None
 ) -> Package:
-    """Return the package of the text of a package.xml; ``filename`` is for errors. Raise InvalidPackage."""
+    """Return the package described by a package.xml's text; ``filename`` is used in error messages.
+
+    Raise InvalidPackage if the text is invalid.
+    """
     root = _parsed(data, filename)
     if root.tag != "package":
         raise InvalidPackage('The manifest must contain a single "package" root tag', filename)
@@ -474,7 +481,7 @@ def parse_package_string(
 
 
 def _read_dependencies(package: Package, root: Element) -> list[str]:
-    """Add the dependencies to a package; return the errors in them."""
+    """Add the dependencies to a package; return the errors found in them."""
     for tag, name in _DEPENDENCIES.items():
         if tag in _KNOWN[package.package_format or 1]:
             getattr(package, name).extend(map(_dependency, root.findall(tag)))
@@ -503,7 +510,7 @@ def _read_dependencies(package: Package, root: Element) -> list[str]:
 
 
 def _unknown(package: Package, root: Element) -> list[str]:
-    """Return errors about tags and attributes that the format does not have."""
+    """Return an error for each tag or attribute that the format does not define."""
     number = package.package_format or 1
     errors = []
     allowed = {
@@ -557,7 +564,7 @@ def _text(element: Element) -> str:
 
 
 def _inside(element: Element) -> str:
-    """Return what is in a tag, with its tags, as XML."""
+    """Return an element's content, including child elements, as XML."""
     return (
         escape(element.text or "")
         + "".join(tostring(each, encoding="unicode").replace(" />", "/>") for each in element)

@@ -1,4 +1,4 @@
-"""catkin_pkg.packages: find the packages below a folder. Source: http://docs.ros.org/en/independent/api/catkin_pkg/html/."""
+"""catkin_pkg.packages: finds the packages below a folder. Source: http://docs.ros.org/en/independent/api/catkin_pkg/html/."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def find_package_paths(
     exclude_subspaces: bool = False,
     ignore_markers: Collection[str] = DEFAULT_IGNORE_MARKERS,
 ) -> list[str]:
-    """Return the folders of packages, relative to ``basepath``; packages in packages are skipped.
+    """Return the folders of packages, relative to ``basepath``, without packages inside other packages.
 
-    ``exclude_subspaces``: skip folders with a file ``.catkin``, which are those of a build.
+    ``exclude_subspaces``: skip folders that contain a file ``.catkin``, because a build has created them.
     """
     paths = []
     excluded = {os.path.realpath(path) for path in exclude_paths or ()}
@@ -44,7 +44,7 @@ def find_package_paths(
             paths.append(os.path.relpath(folder, basepath))
             folders.clear()
         else:
-            # In the order of the file system, as in ROS.
+            # Keep the file system's order, as in ROS.
             folders[:] = [name for name in folders if not name.startswith(".")]
     return paths
 
@@ -56,7 +56,10 @@ def find_packages(
     warnings: list[str] | None = None,
     ignore_markers: Collection[str] = DEFAULT_IGNORE_MARKERS,
 ) -> dict[str, Package]:
-    """Return the packages: relative folder -> package. Raise RuntimeError if two have one name, InvalidPackage."""
+    """Return a dict from relative folder to package.
+
+    Raise RuntimeError if two packages have the same name, InvalidPackage if a package.xml is invalid.
+    """
     packages = find_packages_allowing_duplicates(
         basepath, exclude_paths, exclude_subspaces, warnings, ignore_markers
     )
@@ -81,14 +84,14 @@ def find_packages_allowing_duplicates(
     warnings: list[str] | None = None,
     ignore_markers: Collection[str] = DEFAULT_IGNORE_MARKERS,
 ) -> dict[str, Package]:
-    """Return the packages: relative folder -> package. Raise InvalidPackage."""
+    """Return a dict from relative folder to package. Raise InvalidPackage if a package.xml is invalid."""
     paths = find_package_paths(basepath, exclude_paths, exclude_subspaces, ignore_markers)
     files = {path: os.path.join(basepath, path, PACKAGE_MANIFEST_FILENAME) for path in paths}
     return {path: parse_package(file, warnings) for path, file in files.items()}
 
 
 def verify_equal_package_versions(packages: Sequence[Package]) -> str | None:
-    """Return the version that all packages have, None without packages. Raise RuntimeError if versions differ."""
+    """Return the packages' common version, or None if there are no packages. Raise RuntimeError if the versions differ."""
     version, first = None, None
     for package in packages:
         if version is None or first is None:

@@ -1,4 +1,4 @@
-"""catkin_pkg.python_setup: the arguments of setup() that package.xml has.
+"""catkin_pkg.python_setup: provides the arguments for setup() that are defined in package.xml.
 
 Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
 """
@@ -30,7 +30,7 @@ __all__ = [
 
 
 def generate_distutils_setup(package_xml_path: str = ".", **kwargs: object) -> dict[str, object]:
-    """Return the arguments of setup(). Raise InvalidPackage if one that is given differs from package.xml."""
+    """Return the arguments for setup(). Raise InvalidPackage if a given argument differs from package.xml."""
     package = parse_package(package_xml_path)
     found: dict[str, object] = {
         "name": package.name,

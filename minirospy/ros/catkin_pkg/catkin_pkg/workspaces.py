@@ -1,4 +1,4 @@
-"""catkin_pkg.workspaces: the workspaces of the environment. Source: http://docs.ros.org/en/independent/api/catkin_pkg/html/."""
+"""catkin_pkg.workspaces: finds the sourced workspaces. Source: http://docs.ros.org/en/independent/api/catkin_pkg/html/."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _DEVEL_MARKER = ".catkin"
 
 
 def get_spaces(paths: Sequence[str] | None = None) -> list[str]:
-    """Return the folders of packages of the workspaces ``paths``, by default those of CMAKE_PREFIX_PATH."""
+    """Return the folders that contain the packages of the workspaces ``paths``, by default those in CMAKE_PREFIX_PATH."""
     if paths is None:
         text = os.environ.get("CMAKE_PREFIX_PATH", "")
         paths = [path for path in text.split(os.pathsep) if path]
@@ -28,7 +28,7 @@ def get_spaces(paths: Sequence[str] | None = None) -> list[str]:
 
 
 def order_paths(paths_to_order: Sequence[str], prefix_paths: Sequence[str]) -> list[str]:
-    """Return paths in the order of the prefixes that they are in; others come last."""
+    """Return the paths in the order of the prefixes that contain them; paths outside all prefixes come last."""
     groups: dict[str, list[str]] = {prefix: [] for prefix in prefix_paths}
     others = []
     for path in paths_to_order:
@@ -42,7 +42,7 @@ def order_paths(paths_to_order: Sequence[str], prefix_paths: Sequence[str]) -> l
 
 
 def ensure_workspace_marker(base_path: str) -> None:
-    """Write the file that marks a folder as a workspace, if it does not exist."""
+    """Write the file that marks a folder as a workspace, if the file does not exist."""
     marker = os.path.join(base_path, CATKIN_WORKSPACE_MARKER_FILE)
     if not os.path.exists(marker):
         with open(marker, "a", encoding="utf-8") as file:

@@ -83,7 +83,7 @@ class CvBridge:
     ) -> Image:
         """Return an array as an image message.
 
-        Raise CvBridgeError if its type does not match the encoding, TypeError if it is not an array.
+        Raise CvBridgeError if the array's type does not match the encoding, TypeError if ``cvim`` is not an array.
         """
         _check_array(cvim)
         message = Image()
@@ -117,7 +117,7 @@ class CvBridge:
     def cv2_to_compressed_imgmsg(self, cvim: Pixels, dst_format: str = "jpg") -> CompressedImage:
         """Return an array as a compressed message, in format jpg, png, bmp, tiff, webp or another that OpenCV supports.
 
-        Raise CvBridgeError if the format does not support the array, TypeError if it is not an array.
+        Raise CvBridgeError if the format does not support the array, TypeError if ``cvim`` is not an array.
         """
         _check_array(cvim)
         try:

@@ -64,7 +64,7 @@ class FunctionDiagnosticTask(DiagnosticTask):
 
 
 class CompositeDiagnosticTask(DiagnosticTask):
-    """Several tasks with one status, which has all their values, the highest level, and the merged messages."""
+    """Combines several tasks into one status, which has all their values, the highest level, and the merged messages."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)

@@ -110,7 +110,7 @@ class TimeStampStatusParam:
 
 
 class TimeStampStatus(DiagnosticTask):
-    """Reports time stamps since the last run that are zero, too old or too far in the future; counts runs with such stamps."""
+    """Reports time stamps since the last run that are zero, too old or too far in the future; counts such runs."""
 
     def __init__(self, params: TimeStampStatusParam | None = None, name: str = "Timestamp Status") -> None:
         super().__init__(name)

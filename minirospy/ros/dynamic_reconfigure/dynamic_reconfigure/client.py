@@ -166,9 +166,9 @@ class Client:
     description_callback = property(get_description_callback, set_description_callback)
 
     def _wait(self, is_there: Callable[[], bool], timeout: float | None) -> bool:
-        """Wait until ``is_there()`` is true; return the last value that it returned.
+        """Wait until ``is_there()`` is truthy; return the last value that it returned.
 
-        With ``timeout`` None or 0, wait until the node shuts down.
+        If ``timeout`` is None or 0, wait until the node shuts down.
         """
         end = time.monotonic() + timeout if timeout else None
         with self._cv:

@@ -105,7 +105,8 @@ def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
 def encode_config(config: Values, flat: bool = True) -> ConfigMsg:
     """Return a configuration as a message. Values other than bool, int, float, str and groups are omitted.
 
-    ``flat``: the key ``groups`` contains a tree, of which all groups are added; otherwise, it contains a dict of the groups.
+    If ``flat``, the key ``groups`` contains a tree, and all groups in the tree are added; otherwise, it contains a dict of the
+    groups.
     """
     message = ConfigMsg()
     lists: dict[type, tuple[list[Any], type[Any]]] = {
@@ -235,7 +236,7 @@ def _values(msg: ConfigMsg) -> Config:
 
 
 def _groups_in(group: GroupTree) -> list[GroupTree]:
-    """Return a group's subgroups: a type's description has a list of them, a decoded one a dict."""
+    """Return a group's subgroups. In a type's description they are a list, in a decoded one a dict."""
     groups = group["groups"]
     return list(groups.values()) if isinstance(groups, dict) else list(groups)
 

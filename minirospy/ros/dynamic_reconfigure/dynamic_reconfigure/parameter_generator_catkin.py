@@ -166,7 +166,7 @@ class ParameterGenerator:
             return "::".join([*map(str.upper, above), name.lower()])
 
         def get_class(self, parent: bool = False) -> str:
-            """Return the name of this group's C++ class, or with ``parent``, of the enclosing class."""
+            """Return the name of this group's C++ class or, if ``parent``, of the enclosing class."""
             names = [name.upper() for name in self.get_parents()]
             return "::".join(names[:-1] if parent else names)
 
@@ -225,7 +225,10 @@ class ParameterGenerator:
         param["cconsttype"] = _CPP_CONSTANTS[param["type"]]
 
     def check_type_fill_default(self, param: Entry, field: _ValueKey, default: Value) -> None:
-        """Convert a parameter's value, or set it to ``default`` if it is None. Raise TypeError if it cannot be converted."""
+        """Convert a parameter's value, or set it to ``default`` if it is None.
+
+        Raise TypeError if the value cannot be converted.
+        """
         if param[field] is None:
             param[field] = default
         else:

@@ -1,6 +1,7 @@
 """dynamic_reconfigure.server: lets other nodes change a node's parameters.
 
-It offers the latched topics ``~parameter_descriptions`` and ``~parameter_updates``, and the service ``~set_parameters``.
+The server offers the latched topics ``~parameter_descriptions`` and ``~parameter_updates``, and the service
+``~set_parameters``.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 __all__ = ["ConfigDescrMsg", "ConfigMsg", "ReconfigureSrv", "Server"]
 
 # Python types allowed for each parameter type. An int is allowed for a double, because rosparam stores 1.0 as an int
-# if it is written without a point.
+# if it is written without a decimal point.
 _TYPES: dict[str, tuple[type, ...]] = {
     "int": (int,),
     "double": (float, int),

@@ -16,7 +16,7 @@ def compute_md5_text(msg_context: MsgContext, spec: MsgSpec) -> str:
 
 
 def compute_md5(msg_context: MsgContext, spec: MsgSpec | SrvSpec) -> str:
-    """Return a message's or service's md5sum. Raise KeyError if it uses an unknown message."""
+    """Return a message's or service's md5sum. Raise KeyError if the definition uses an unknown message."""
     if isinstance(spec, SrvSpec):
         return digest.service_md5(parsed_service(spec.text, spec.full_name), lookup_in(msg_context))
     return digest.message_md5(parsed_message(spec), lookup_in(msg_context))

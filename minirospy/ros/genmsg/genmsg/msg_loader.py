@@ -147,7 +147,7 @@ class MsgContext:
 def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str = ".msg") -> str:
     """Return the file that contains a definition.
 
-    Raise MsgNotFound if there is none, ValueError if the search path is not a dictionary.
+    Raise MsgNotFound if no file contains it, ValueError if the search path is not a dictionary.
     """
     if not isinstance(search_path, Mapping):
         raise ValueError("search_path must be a dictionary of namespaces to lists of folders")
@@ -173,12 +173,12 @@ def get_msg_file(package: str, base_type: str, search_path: SearchPath, ext: str
 
 
 def get_srv_file(package: str, base_type: str, search_path: SearchPath) -> str:
-    """Return the file that contains a service's definition. Raise MsgNotFound if there is none."""
+    """Return the file that contains a service's definition. Raise MsgNotFound if no file contains it."""
     return get_msg_file(package, base_type, search_path, ".srv")
 
 
 def load_msg_from_string(msg_context: MsgContext, text: str, full_name: str) -> MsgSpec:
-    """Parse a message definition, add it to the context, and return it. Raise InvalidMsgSpec if it is invalid."""
+    """Parse a message definition, add it to the context, and return it. Raise InvalidMsgSpec if the definition is invalid."""
     spec = _msg_spec(_parsed(text, full_name))
     msg_context.register(full_name, spec)
     return spec

@@ -32,12 +32,12 @@ def resource_name_base(name: str) -> str:
 
 
 def resource_name_package(name: str) -> str | None:
-    """Return a name's package, or None if it has none."""
+    """Return a name's package, or None if the name has no package."""
     return name.partition(PRN_SEPARATOR)[0] if PRN_SEPARATOR in name else None
 
 
 def package_resource_name(name: str) -> tuple[str, str]:
-    """Return (package, name); the package is empty if the name has none. Raise ValueError if the name has two slashes."""
+    """Return (package, name); the package is empty if the name has no package. Raise ValueError if the name has two slashes."""
     if PRN_SEPARATOR not in name:
         return "", name
     if name.count(PRN_SEPARATOR) > 1:

@@ -80,14 +80,14 @@ def register_unicode_errors() -> None:
 
 
 def get_message_class(message_type: str, reload_on_error: bool = False) -> type[protocols.Message] | None:
-    """Return the message class ``pkg/Name``, or None if there is none. Raise ValueError if the type name is invalid."""
+    """Return the message class ``pkg/Name``, or None if there is no such class. Raise ValueError if the type name is invalid."""
     from minirospy.core.idl import load
 
     return load.get_message_class(_checked(message_type))
 
 
 def get_service_class(service_type: str, reload_on_error: bool = False) -> ServiceClass | None:
-    """Return the service class ``pkg/Name``, or None if there is none. Raise ValueError if the type name is invalid."""
+    """Return the service class ``pkg/Name``, or None if there is no such class. Raise ValueError if the type name is invalid."""
     from minirospy.core.idl import load
 
     return load.get_service_class(_checked(service_type))

@@ -135,27 +135,27 @@ class PinholeCameraModel:
         return self.resolution
 
     def intrinsicMatrix(self) -> Matrix:
-        """Return K, 3x3. All matrices are None before ``fromCameraInfo``."""
+        """Return the 3x3 camera matrix K. All matrices are None before ``fromCameraInfo``."""
         return self.K
 
     def distortionCoeffs(self) -> Matrix:
-        """Return D as a column; None if there is no distortion."""
+        """Return the distortion coefficients D as a column matrix, or None if there is no distortion."""
         return self.D
 
     def rotationMatrix(self) -> Matrix:
-        """Return R, 3x3."""
+        """Return the 3x3 rotation matrix R."""
         return self.R
 
     def projectionMatrix(self) -> Matrix:
-        """Return P, 3x4."""
+        """Return the 3x4 projection matrix P."""
         return self.P
 
     def fullIntrinsicMatrix(self) -> Matrix:
-        """Return K for the full sensor."""
+        """Return the camera matrix K for the full sensor."""
         return self.full_K
 
     def fullProjectionMatrix(self) -> Matrix:
-        """Return P for the full sensor."""
+        """Return the projection matrix P for the full sensor."""
         return self.full_P
 
     def cx(self) -> float:

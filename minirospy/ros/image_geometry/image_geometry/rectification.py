@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Values: TypeAlias = NDArray[Any]
-    # Coefficients k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], or empty.
+    # Distortion coefficients k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tx ty]]]], or an empty sequence.
     Distortion: TypeAlias = Sequence[float] | Values
     Calibration: TypeAlias = tuple[Values, Distortion, Values, Values]  # K, D, R and P
 else:
@@ -29,7 +29,7 @@ _COUNTS = (0, 4, 5, 8, 12, 14)
 
 
 def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Values) -> Values:
-    """Return the rectified pixel for a raw one. Raise ValueError if the number of coefficients in D is not supported."""
+    """Return the rectified pixel for a raw pixel. Raise ValueError if the number of coefficients in D is not supported."""
     import numpy as np
 
     k = _coefficients(D)
@@ -59,7 +59,7 @@ def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Val
 
 
 def distorted(u: Values, v: Values, K: Values, D: Distortion, R: Values, P: Values) -> tuple[Values, Values]:
-    """Return the raw pixels for rectified ones, as two arrays, u and v. Raise ValueError if the length of D is not supported."""
+    """Return the raw pixels for rectified pixels, as two arrays u and v. Raise ValueError if the length of D is not supported."""
     import numpy as np
 
     k = _coefficients(D)

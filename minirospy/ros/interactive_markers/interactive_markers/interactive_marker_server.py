@@ -185,7 +185,7 @@ class InteractiveMarkerServer:
             context.int_marker = update.int_marker
             message.markers.append(context.int_marker)
         elif context is None:
-            # The marker was added and erased between two applyChanges() calls, so it was never published.
+            # The marker was added and erased between two applyChanges() calls, so it has never been published.
             return
         elif update.update_type == UpdateContext.POSE_UPDATE:
             marker = context.int_marker
@@ -202,7 +202,7 @@ class InteractiveMarkerServer:
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
         """Move a marker as a viewer has requested, and call the program's callback.
 
-        Ignore feedback from other viewers for one second.
+        Ignore feedback from other viewers for one second after that.
         """
         with self.mutex:
             context = self.marker_contexts.get(feedback.marker_name)
@@ -219,7 +219,7 @@ class InteractiveMarkerServer:
             context.last_feedback, context.last_client_id = now, feedback.client_id
 
             if feedback.event_type == feedback.POSE_UPDATE:
-                # A marker without a time stamp keeps its frame.
+                # If the header has no time stamp, keep the marker's frame.
                 header = context.int_marker.header
                 self.doSetPose(
                     self.pending_updates.get(feedback.marker_name),

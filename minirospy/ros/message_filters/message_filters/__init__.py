@@ -114,7 +114,10 @@ class Cache(SimpleFilter):
         self.signalMessage(msg)
 
     def getInterval(self, from_stamp: Time, to_stamp: Time) -> list[object]:
-        """Return the messages from one time stamp to another, inclusive. Raise AssertionError if the interval is reversed."""
+        """Return the messages from one time stamp to another, inclusive.
+
+        Raise AssertionError if ``to_stamp`` precedes ``from_stamp``.
+        """
         assert from_stamp <= to_stamp
         return [msg for time, msg in self._stored() if from_stamp <= time <= to_stamp]
 
@@ -298,7 +301,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
 
 
 def _stamp_of(message: object, allow_headerless: bool) -> Time | None:
-    """Return a message's time stamp. If it has no header, return the current time, or log a warning and return None."""
+    """Return a message's time stamp. If the message has no header, return the current time, or log a warning and return None."""
     try:
         stamp: Time = message.header.stamp  # type: ignore[attr-defined]
     except AttributeError:

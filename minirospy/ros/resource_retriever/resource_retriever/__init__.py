@@ -34,8 +34,8 @@ def get(url: str) -> bytes:
 def get_filename(url: str, use_protocol: bool = True) -> str:
     """Convert a package:// URL to a file:// URL; return other URLs unchanged.
 
-    Without ``use_protocol``, return the file's path. Raise ResourceNotFound if the package is not found, Exception if the URL
-    does not name a file.
+    If not ``use_protocol``, return the file's path. Raise ResourceNotFound if the package is not found, Exception if the URL
+    does not refer to a file.
     """
     if not url.startswith(PACKAGE_PREFIX):
         return url

@@ -37,7 +37,7 @@ _P = TypeVar("_P", Point, Vector3)
 
 @converts_to_numpy(Vector3)
 def vector3_to_numpy(msg: Vector3, hom: bool = False) -> Floats:
-    """Return x, y, z; with ``hom``, followed by 0."""
+    """Return x, y, z; if ``hom``, followed by 0."""
     return np.array([msg.x, msg.y, msg.z, *([0] if hom else [])])
 
 
@@ -52,7 +52,7 @@ def numpy_to_vector3(arr: Array) -> object:
 
 @converts_to_numpy(Point)
 def point_to_numpy(msg: Point, hom: bool = False) -> Floats:
-    """Return x, y, z; with ``hom``, followed by 1."""
+    """Return x, y, z; if ``hom``, followed by 1."""
     return np.array([msg.x, msg.y, msg.z, *([1] if hom else [])])
 
 

@@ -146,7 +146,7 @@ def _without(cloud: Array, left_out: tuple[str, ...], added: list[tuple[str, typ
 
 
 def get_xyz_points(cloud_array: Array, remove_nans: bool = True, dtype: DTypeLike = float) -> Array:
-    """Return x, y and z on an array's last axis; with ``remove_nans``, omit points that are not finite."""
+    """Return x, y and z on an array's last axis; if ``remove_nans``, omit points that are not finite."""
     if remove_nans:
         good = np.isfinite(cloud_array["x"]) & np.isfinite(cloud_array["y"]) & np.isfinite(cloud_array["z"])
         cloud_array = cloud_array[good]

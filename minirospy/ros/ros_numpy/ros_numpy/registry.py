@@ -21,12 +21,12 @@ _to_numpy: dict[tuple[str, bool], _Function] = {}
 _from_numpy: dict[tuple[str, bool], _Function] = {}
 """Conversion functions by (type name, whether they convert lists).
 
-Names are used because messages in a bag have other classes.
+The keys are names, because messages in a bag have other classes.
 """
 
 
 def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a conversion from a message type, or with ``plural`` a list of messages, to an array."""
+    """Return a decorator that registers a conversion from a message type (if ``plural``, from lists of messages) to an array."""
 
     def register(function: _F) -> _F:
         _to_numpy[msgtype._type, plural] = function
@@ -36,7 +36,7 @@ def converts_to_numpy(msgtype: type[Message], plural: bool = False) -> Callable[
 
 
 def converts_from_numpy(msgtype: type[Message], plural: bool = False) -> Callable[[_F], _F]:
-    """Return a decorator that registers a conversion from an array to a message type, or with ``plural`` to a list of them."""
+    """Return a decorator that registers a conversion from an array to a message type, or if ``plural`` to a list of messages."""
 
     def register(function: _F) -> _F:
         _from_numpy[msgtype._type, plural] = function
@@ -62,7 +62,7 @@ def numpify(msg: Any, *args: Any, **kwargs: Any) -> Any:
 
 
 def msgify(msg_type: type[Any], numpy_obj: Any, *args: Any, plural: bool = False, **kwargs: Any) -> Any:
-    """Convert an array to a message, or with ``plural`` to a list of messages. Raise ValueError if there is no conversion."""
+    """Convert an array to a message, or if ``plural`` to a list of messages. Raise ValueError if there is no conversion."""
     function = _from_numpy.get((getattr(msg_type, "_type", ""), plural))
     if function is None:
         raise ValueError(

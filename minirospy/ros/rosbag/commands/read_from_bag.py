@@ -28,7 +28,7 @@ __all__ = ["echo_bag", "list_bag", "show_bag"]
 def _opened(path: str, ros_error: str) -> Iterator[BagReader]:
     """Open a bag and yield its reader.
 
-    Raise MinirospyError if it cannot be read; if the file does not exist, the error prints ROS's message.
+    Raise MinirospyError if the bag cannot be read; for a missing file, the error has ROS's message.
     """
     if not os.path.exists(path):
         text = f"bag file [{path}] does not exist"
@@ -43,7 +43,7 @@ def _opened(path: str, ros_error: str) -> Iterator[BagReader]:
 def list_bag(path: str, topic: str | None) -> None:
     """Print the topics of a bag, ordered by first message.
 
-    With ``topic``, print the message count of that topic and the topics in its namespace.
+    If ``topic`` is given, print that topic's message count, and the topics in its namespace.
     """
     with _opened(path, "ERROR: ") as reader:
         if topic is None:

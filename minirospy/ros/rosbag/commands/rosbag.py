@@ -1,7 +1,7 @@
 """rosbag: record, play, inspect, repair and rewrite bags.
 
 Source: http://wiki.ros.org/rosbag/Commandline. Output and exit statuses are those of ROS, for example 0 for an unknown
-verb. Each verb has its own module, and a line in the table FAMILY.
+verb. Each verb has its own module, and an entry in the table FAMILY.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`rosbag convert`: convert bags to MCAP files and back. ROS has no such command."""
+"""`rosbag convert`: convert bags to MCAP files and back. This command does not exist in ROS."""
 
 from __future__ import annotations
 

@@ -33,7 +33,10 @@ def main(name: str, argv: Sequence[str] | None = None) -> int:
 def copying(
     usage: str, count: int, change: Callable[[list[str]], Callable[[Connection], Connection]]
 ) -> Script:
-    """Return a program that copies a bag. The bags are its first and second word, or of four words, the second and the last."""
+    """Return a program that copies a bag.
+
+    The bags are its first and second argument or, of four arguments, the second and last.
+    """
 
     def script(words: list[str]) -> int:
         from minirospy.introspect.bags import copy_bag

@@ -30,7 +30,7 @@ def check_classes(migrator: MessageMigrator, classes: Iterable[MessageClass]) ->
 def check_bag(migrator: MessageMigrator, path: str, warn: Callable[[str], object]) -> list[Migration]:
     """Return the migrations that a bag's messages require, in order of first use.
 
-    Raise BagError if the bag is invalid, OSError if it cannot be read.
+    Raise BagError if the bag is invalid, OSError if the file cannot be read.
     """
     with open_reader(path) as reader:
         connections = list(reader.connections.values())
@@ -47,7 +47,7 @@ def check_bag(migrator: MessageMigrator, path: str, warn: Callable[[str], object
 def fix_bag(
     migrator: MessageMigrator, source: str, target: str, warn: Callable[[str], object], *, force: bool = False
 ) -> list[Migration]:
-    """Write a bag with its messages migrated; return the migrations without a rule. If there are any, write nothing.
+    """Write a bag with its messages migrated; return the migrations that lack a rule. If a rule is missing, write nothing.
 
     ``force``: write the bag anyway, and copy messages that cannot be migrated. Raise BagError if the bag is invalid,
     OSError if a file cannot be read or written, BagMigrationException if a message cannot be migrated.

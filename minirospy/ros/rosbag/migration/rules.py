@@ -1,7 +1,7 @@
 """Rules that convert a message from an old type to a new one. They are read from .bmr files, or generated from the two types.
 
-Source: http://wiki.ros.org/rosbag/migration. A generated rule copies the fields whose name and type are equal; it is valid
-if no field is lost or needs an invented value. Text from a bag is never executed.
+Source: http://wiki.ros.org/rosbag/migration. A generated rule copies the fields whose name and type are equal; the rule is
+valid if no field is lost or needs an invented value. Text from a bag is never executed.
 """
 
 from __future__ import annotations
@@ -305,13 +305,13 @@ def make_update_rule(
 
 
 def make_old_half_rule(old_class: MessageClass) -> type[MessageUpdateRule]:
-    """Return an invalid rule from an old type, because the new type is unknown."""
+    """Return an invalid rule that converts from an old type, because the new type is unknown."""
     name = f"update__{old_class._type.replace('/', '_')}__{old_class._md5sum}"
     return _rule(name, old_class, None, ["pass"], [], valid=False)
 
 
 def make_new_half_rule(new_class: MessageClass) -> type[MessageUpdateRule]:
-    """Return an invalid rule to a new type, because the old type is unknown."""
+    """Return an invalid rule that converts to a new type, because the old type is unknown."""
     name = f"update_to_{new_class._type.replace('/', '_')}_{new_class._md5sum}"
     return _rule(name, None, new_class, ["pass"], [], valid=False)
 
@@ -423,7 +423,7 @@ def _class_named(name: str, classes: Mapping[str, MessageClass], top_name: str) 
 
 
 def _classes(type_: str, text: str) -> tuple[Mapping[str, MessageClass], MessageClass]:
-    """Return the classes in a full definition, and the first of them.
+    """Return the classes for a full definition, and the class of its main type.
 
     Return ({}, None) if there is no type or the definition is invalid.
     """

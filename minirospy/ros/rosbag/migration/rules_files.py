@@ -1,6 +1,6 @@
 """Migrates stored messages to the installed types, by a path of rules from each old type to its newest version.
 
-Explicit rules are in .bmr files, ordered by type. The rules between them, and those for types that keep their name, are
+.bmr files contain explicit rules, ordered by type. The rules between them, and the rules for types that keep their name, are
 generated from the two types. Source: http://wiki.ros.org/rosbag/migration.
 """
 
@@ -116,7 +116,7 @@ class MessageMigrator:
         }
 
     def lookup_type(self, key: Key) -> MessageClass:
-        """Return the class with this type and md5sum from the rules' definitions, or None if there is none."""
+        """Return the class with this type and md5sum from the rules' definitions, or None if they do not contain it."""
         return self.class_dict.get(key)
 
     def add_update_rule(self, r: MessageUpdateRule) -> None:
@@ -141,7 +141,7 @@ class MessageMigrator:
             chain.chain.sort(key=lambda each: each.order)
 
     def all_rules_valid(self) -> bool:
-        """Return whether every rule is valid, that is, none is missing."""
+        """Return whether every rule is valid, that is, no rule is missing."""
         return not self.get_invalid_rules()
 
     def get_invalid_rules(self) -> list[MessageUpdateRule]:
@@ -180,7 +180,7 @@ class MessageMigrator:
         return found
 
     def find_target(self, old_class: MessageClass) -> MessageClass:
-        """Return the installed class to which messages with this class are migrated, or None if there is none."""
+        """Return the installed class to which messages with this class are migrated, or None if no such class is installed."""
         from minirospy.core.idl.load import get_message_class
 
         key = get_message_key(old_class)
@@ -251,11 +251,11 @@ class MessageMigrator:
         return make_update_rule(self, old_class, new_class)
 
     def make_old_half_rule(self, old_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return an invalid rule from an old type whose new type is unknown."""
+        """Return an invalid rule that converts from an old type, because the new type is unknown."""
         return make_old_half_rule(old_class)
 
     def make_new_half_rule(self, new_class: MessageClass) -> type[MessageUpdateRule]:
-        """Return an invalid rule to a new type whose old type is unknown."""
+        """Return an invalid rule that converts to a new type, because the old type is unknown."""
         return make_new_half_rule(new_class)
 
     # -- loading
@@ -408,7 +408,7 @@ class MessageMigrator:
         return [self._extra(old_class, first, self._made_whole(old_class, first)), *steps]
 
     def _to_end(self, steps: list[ScaffoldNode], new_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps up to the new class, adding a generated step if none leads to this class."""
+        """Return the steps up to the new class, adding a generated step if no step leads to this class."""
         candidates = []
         for number, node in reversed(list(enumerate(steps))):
             if node.new_class is None or node.new_class._type != new_class._type:
@@ -432,7 +432,7 @@ class MessageMigrator:
         return []
 
     def _from_start(self, steps: list[ScaffoldNode], old_class: MessageClass) -> list[ScaffoldNode]:
-        """Return the steps from the old class, adding a generated step if none starts there; [] if there is no valid one."""
+        """Return the steps from the old class, adding a generated step if none starts there; [] if there is no valid step."""
         if exact := self._exact_start(steps, old_class):
             return exact
         for number, node in reversed(list(enumerate(steps))):

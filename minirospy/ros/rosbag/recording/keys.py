@@ -68,7 +68,7 @@ class _Terminal:
         self._before: list[object] | None = None
 
     def set_up(self) -> bool:
-        """Switch the terminal to single keys. Return False in the background, because reading there would stop the process."""
+        """Switch the terminal to single keys. Return False if the process is in the background, because reading would stop it."""
         if os.tcgetpgrp(self._number) != os.getpgrp():
             self._before = None
             return False

@@ -142,7 +142,7 @@ class Playback:
                 self.phase = Phase.PLAYING
 
     def set_paused(self, paused: bool, wall: int) -> bool:
-        """Pause or resume; return whether that changed the state."""
+        """Pause or resume; return whether the state has changed."""
         if self._is_started:
             return self._running.set_paused(paused, wall)
         changed = paused != self._starts_paused
@@ -173,7 +173,7 @@ class Playback:
     # --- messages
 
     def take_seek(self) -> int | None:
-        """Return the requested bag time and clear the request, or return None if there is none."""
+        """Return the requested bag time and clear the request, or return None if no seek is requested."""
         start, self.seek_to = self.seek_to, None
         return start
 
@@ -195,7 +195,8 @@ class Playback:
         assert schedule
         wait = schedule.poll(wall)
         if wait is None:
-            # Set it together with the new time, because a client that sees this time counts its steps from here.
+            # Set is_fresh together with the new time, because a client that sees this time counts its steps from
+            # here.
             self.is_fresh = False
         return wait
 
@@ -207,7 +208,7 @@ class Playback:
         """See :meth:`Schedule.run_on`."""
         return self._running.run_on(wall)
 
-    # --- what it is
+    # --- state
 
     def state(self, wall: int) -> PlayerState:
         """Return the state for a client."""

@@ -21,9 +21,10 @@ from minirospy.ros.rosbag.recording.sources import Bags, ReadAhead, Selection
 __all__ = ["Player"]
 
 _SECOND = 10**9
-_TICK = _SECOND // 10  # ns; interval between status lines and between shutdown checks
+_TICK = _SECOND // 10  # interval in ns between status lines and between shutdown checks
 
-_STALLED_SECONDS = 5.0  # seconds; at the end, give up on a subscriber that has read nothing for this long
+# seconds after which, at the end, to give up on a subscriber that has read nothing in that time
+_STALLED_SECONDS = 5.0
 
 
 class Player:
@@ -133,7 +134,7 @@ class Player:
         return self._playback.options.loop
 
     def set_paused(self, paused: bool) -> bool:
-        """Pause or resume; return whether that changed the state. Thread-safe."""
+        """Pause or resume; return whether the state has changed. Thread-safe."""
         with self._lock:
             changed = self._playback.set_paused(paused, time.perf_counter_ns())
         self._wait.wake()
@@ -303,7 +304,7 @@ class Player:
             end="",
         )
 
-    # --- what comes from outside
+    # --- callbacks
 
     def _on_key(self, key: str) -> None:
         with self._lock:

@@ -10,7 +10,7 @@ from minirospy.base.clock import SignalSafeEvent
 
 __all__ = ["PreciseWait"]
 
-# ns before the deadline from which to sleep instead of waiting on the event, which is imprecise
+# SignalSafeEvent.wait() is imprecise, so sleep instead for the last N ns before the deadline.
 _EVENT_NS = 5_000_000
 
 # Linux's PR_SET_TIMERSLACK, which sets by how much the kernel may delay a thread's wake-up; by default 50 us

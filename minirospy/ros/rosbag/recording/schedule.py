@@ -175,7 +175,7 @@ class Schedule:
         return True
 
     def step(self) -> None:
-        """If paused, make the current message due now, or if there is none, the next one to be offered."""
+        """If paused, make the current message due now or, if there is no current message, the next one to be offered."""
         if self._paused:
             self._steps += 1
 
@@ -204,7 +204,7 @@ class Schedule:
         return Status(state, self._clock, self._clock - self._first, self._last - self._first, behind)
 
     def run_on(self, wall: int) -> int:
-        """Advance the clock past the last message, for ``--keep-alive``; return the wall time until which to wait."""
+        """Advance the clock past the last message, for ``--keep-alive``; return the wall time of the next call."""
         if not (self._paused or self._delayed):
             self._clock = max(self._clock, self._bag_time(wall))
         wait = wall + _SECOND // 10

@@ -24,7 +24,7 @@ _BATCHES = 8
 
 
 class Selection(NamedTuple):
-    """The messages to play: on these topics (empty: all), from ``start`` to ``end`` (None: no limit)."""
+    """The messages to play: the topics (empty: all), and the times ``start`` and ``end`` (None: no limit)."""
 
     topics: Collection[str] = ()
     start: int | None = None
@@ -131,7 +131,7 @@ class ReadAhead:
         self._first.wait()
 
     def close(self) -> None:
-        """Tell the thread to stop."""
+        """Request the thread to stop."""
         self._stop.set()
 
     def join(self) -> None:

@@ -249,7 +249,7 @@ class Bag(OpenedBag):
 
     @property
     def compression(self) -> str:
-        """Return the compression for later chunks. Setting an unknown one raises ValueError."""
+        """Return the compression for later chunks. Assigning an unknown compression raises ValueError."""
         return self._compression
 
     @compression.setter
@@ -264,7 +264,7 @@ class Bag(OpenedBag):
     def chunk_threshold(self) -> int:
         """Return the size in bytes, before compression, at which a chunk is complete.
 
-        Setting a negative size raises ValueError.
+        Assigning a negative size raises ValueError.
         """
         return self._chunk_threshold
 
@@ -461,7 +461,7 @@ class Bag(OpenedBag):
         return info.as_text(self._summary(frequencies=not self._skip_index))
 
     def _get_yaml_info(self, key: str | None = None) -> str | None:
-        """Return the info as YAML, or the value for a key such as ``topics[0].type``, or None if there is no such key."""
+        """Return the info as YAML, or the value for a key such as ``topics[0].type``, or None if the info has no such key."""
         text = info.as_yaml(self._summary(frequencies=not self._skip_index))
         if not key:
             return text

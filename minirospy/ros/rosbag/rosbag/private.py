@@ -1,4 +1,4 @@
-"""The names in rosbag.Bag that are private in the real module, but used by rqt_bag and other programs."""
+"""Attributes of rosbag.Bag that are private in the real module, but used by rqt_bag and other programs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ConnectionFilter = Callable[[str, str, str, str, Header], object]
 
 
 class BagMessage(NamedTuple):
-    """A message; with ``raw``, the message is a tuple: type, bytes, md5sum, position and class."""
+    """A message; if ``raw``, the message is a tuple: type, bytes, md5sum, position and class."""
 
     topic: str
     message: object
@@ -51,12 +51,12 @@ class BagMessageWithConnectionHeader(NamedTuple):
 
 
 class PrivateBag(ABC):
-    """The private names in rosbag.Bag."""
+    """Provides the private attributes of rosbag.Bag."""
 
     _file: BinaryIO | None
     _connection_indexes_read = False  # True once the index has been read, or if it is read on demand
     _chunks_of_program: Iterable[_ChunkInfo] | None = None
-    """The list of chunks that a program has set in place of the bag's own; None if it has not."""
+    """The list of chunks that a program has assigned in place of the bag's own, or None."""
 
     @abstractmethod
     def _current(self) -> BagReader:
@@ -111,7 +111,7 @@ class PrivateBag(ABC):
         return {connection.topic: connection for connection in self._connections.values()}
 
     def _clear_index(self) -> None:
-        """Forget the list of chunks that a program has set."""
+        """Forget the list of chunks that a program has assigned."""
         self._chunks_of_program = None
 
     @contextlib.contextmanager
@@ -238,7 +238,7 @@ class PrivateBag(ABC):
 def nanoseconds_of(stamp: Time | None) -> int | None:
     """Return a time limit in nanoseconds, or None for time 0, as the real module does.
 
-    Raise TypeError if it is not a rospy.Time.
+    Raise TypeError if the limit is not a rospy.Time.
     """
     if not stamp:
         return None

@@ -69,7 +69,7 @@ class _BagReader200(_BagReader):
         records._skip_sized(self.bag._open_file())
 
     def read_chunk_header(self) -> _ChunkHeader:
-        """Return the chunk header at the file's position. Raise ROSBagFormatException if there is none."""
+        """Return the chunk header at the file's position. Raise ROSBagFormatException if there is no chunk header."""
         file = self.bag._open_file()
         header = records._read_header(file, records._OP_CHUNK)
         compression = records._read_str_field(header, "compression")
@@ -78,7 +78,10 @@ class _BagReader200(_BagReader):
         return _ChunkHeader(compression, compressed_size, size, file.tell())
 
     def read_connection_record(self, f: BinaryIO, encrypt: bool = False) -> _ConnectionInfo:
-        """Return the connection whose record is next in ``f``. Raise ROSBagFormatException if there is none."""
+        """Return the connection whose record is next in ``f``.
+
+        Raise ROSBagFormatException if the next record is not a connection.
+        """
         header = records._read_header(f, records._OP_CONNECTION)
         number = records._read_uint32_field(header, "conn")
         topic = records._read_str_field(header, "topic")
@@ -88,7 +91,7 @@ class _BagReader200(_BagReader):
         )
 
     def read_chunk_info_record(self) -> _ChunkInfo:
-        """Return the chunk info at the file's position. Raise ROSBagFormatException if there is none."""
+        """Return the chunk info at the file's position. Raise ROSBagFormatException if there is no chunk info."""
         file = self.bag._open_file()
         header = records._read_header(file, records._OP_CHUNK_INFO)
         info = _ChunkInfo(
@@ -96,7 +99,7 @@ class _BagReader200(_BagReader):
             records._read_time_field(header, "start_time"),
             records._read_time_field(header, "end_time"),
         )
-        records._read_uint32(file)  # the length of the counts
+        records._read_uint32(file)  # the length of the message counts
         for _ in range(records._read_uint32_field(header, "count")):
             number = records._read_uint32(file)
             info.connection_counts[number] = records._read_uint32(file)

@@ -191,12 +191,12 @@ def _unpacked(data: bytes, name: str, unpack: Callable[[bytes], _T]) -> _T:
 
 
 def _read_sized(f: BinaryIO) -> bytes:
-    """Return the bytes after a length. Raise ROSBagException or ROSBagFormatException at the end of the file."""
+    """Read a length, and return that many bytes. Raise ROSBagException or ROSBagFormatException at the end of the file."""
     return _read(f, _read_uint32(f))
 
 
 def _skip_sized(f: BinaryIO) -> None:
-    """Skip the bytes after a length."""
+    """Read a length, and skip that many bytes."""
     f.seek(_read_uint32(f), os.SEEK_CUR)
 
 
@@ -207,7 +207,7 @@ def _skip_record(f: BinaryIO) -> None:
 
 
 def _read_record_data(f: BinaryIO) -> bytes:
-    """Return a record's data, after its header has been read. Raise ROSBagFormatException if it is incomplete."""
+    """Return a record's data, after its header has been read. Raise ROSBagFormatException if the data is incomplete."""
     try:
         return _read_sized(f)
     except ROSBagException as error:
@@ -245,7 +245,7 @@ def _build_header_from_str(header_str: bytes, req_op: int | None) -> Header:
 
 
 def _peek_next_header_op(f: BinaryIO) -> int:
-    """Return the operation of the next record, and stay where the file is."""
+    """Return the operation of the next record without advancing the file's position."""
     position = f.tell()
     header = _read_header(f)
     op = _read_uint8_field(header, "op")
@@ -254,7 +254,7 @@ def _peek_next_header_op(f: BinaryIO) -> int:
 
 
 def _read_field(header: Mapping[str, bytes], field: str, unpack_fn: Callable[[bytes], _T]) -> _T:
-    """Return a header field's value. Raise ROSBagFormatException if it is missing or invalid."""
+    """Return a header field's value. Raise ROSBagFormatException if the field is missing or invalid."""
     if field not in header:
         raise ROSBagFormatException(f'expected "{field}" field in record')
     try:
@@ -291,7 +291,7 @@ def _read_time_field(header: Mapping[str, bytes], field: str) -> Time:
 
 
 def _write_sized(f: BinaryIO, v: bytes | str) -> None:
-    """Write a length and the bytes."""
+    """Write the length of the bytes, then the bytes."""
     data = v.encode() if isinstance(v, str) else v
     f.write(_pack_uint32(len(data)))
     f.write(data)
@@ -310,7 +310,7 @@ def _write_header(f: BinaryIO, header: Mapping[str, bytes | str]) -> bytes:
 def _write_record(
     f: BinaryIO, header: Mapping[str, bytes | str], data: bytes | str = "", padded_size: int | None = None
 ) -> None:
-    """Write a record. With ``padded_size``, spaces take the place of the data, so that both parts have that size together."""
+    """Write a record. If ``padded_size`` is given, pad the data with spaces to give header and data that total size."""
     written = _write_header(f, header)
     if padded_size is not None:
         data = " " * max(0, padded_size - len(written))

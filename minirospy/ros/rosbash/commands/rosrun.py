@@ -80,7 +80,7 @@ def _rosrun(words: list[str]) -> int:
 
 
 def _what_there_is(words: list[str], packages: Packages) -> str:
-    """Return a hint for a missing program or package. Raise NotFoundError if nothing similar is found."""
+    """Return a hint for a missing program or package. Raise NotFoundError if no similar name is found."""
     if not words:
         return " (`rosrun -h` shows more)"
     try:
@@ -97,7 +97,7 @@ def _what_there_is(words: list[str], packages: Packages) -> str:
 def _find(packages: Packages, package: str, program: str) -> list[list[str]]:
     """Return the commands that run a program.
 
-    Raise WordedError, with the exit status of ROS's rosrun, if there is none.
+    Raise WordedError, with the exit status of ROS's rosrun, if the program does not exist.
     """
     try:
         folder = packages.find(package)
@@ -124,7 +124,10 @@ def _split(prefix: str) -> list[str]:
 
 
 def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> list[str]:
-    """Prompt the user to choose one of several programs with the same name, and return it. Raise UsageError at end of input."""
+    """Prompt the user to choose one of several programs with the same name, and return its command.
+
+    Raise UsageError at end of input.
+    """
     paths = [command[-1] for command in commands]
     print("[rosrun] You have chosen a non-unique executable, please pick one of the following:", flush=True)
     for number, path in enumerate(paths, 1):
@@ -140,7 +143,7 @@ def _choose(package: str, commands: Sequence[list[str]], packages: Packages) -> 
 
 
 def become(command: list[str]) -> int:
-    """Replace this process by the program, which then receives its signals and determines its exit status."""
+    """Replace this process by the program, so that the program receives its signals and determines its exit status."""
     if sys.platform == "win32":
         # On Windows, exec detaches the program from the console, so wait for it instead, and let it handle Ctrl-C.
         try:

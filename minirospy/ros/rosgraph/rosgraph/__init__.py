@@ -37,8 +37,8 @@ __all__ = [
 
 
 def myargv(argv: Sequence[str] | None = None) -> list[str]:
-    """Return the command line without each argument that contains ``:=``.
+    """Return the command line without the arguments that contain ``:=``.
 
-    `rospy.myargv` keeps those that do not start with a name.
+    Unlike this function, `rospy.myargv` keeps arguments that do not start with a name.
     """
     return [argument for argument in (sys.argv if argv is None else argv) if ":=" not in argument]

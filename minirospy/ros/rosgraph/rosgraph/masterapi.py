@@ -71,7 +71,7 @@ class Master:
     def handle(self) -> Any:
         """Return the master as Python's `xmlrpc.client.ServerProxy`, whose methods return (code, text, value).
 
-        From then on every call uses it, because a program may replace it, or one of its methods.
+        From then on, all calls use this proxy, because a program may replace the proxy or one of its methods.
         """
         from xmlrpc.client import ServerProxy
 

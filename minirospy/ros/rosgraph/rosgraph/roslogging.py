@@ -1,4 +1,4 @@
-"""rosgraph.roslogging: the names used in logging configuration files, and in programs that subclass its classes."""
+"""rosgraph.roslogging: the names used in logging configuration files, and by programs that subclass this module's classes."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ __all__ = [
     "renew_latest_logdir",
 ]
 
-_FILE_BYTES = 50_000_000  # size of a log file before another is started
-_FILE_BACKUPS = 4  # number of earlier log files that are kept
+_FILE_BYTES = 50_000_000  # size in bytes at which a new log file is started
+_FILE_BACKUPS = 4  # number of earlier log files to keep
 _FORMAT = "[%(name)s][%(levelname)s] %(asctime)s: %(message)s"
 
 
 class LoggingException(Exception):
-    """Logging cannot be configured."""
+    """Raised if logging cannot be configured."""
 
 
 class RospyLogger(logging.Logger):
-    """rospy's logger class. minirospy does not need it to find a call's line, but programs patch it."""
+    """rospy's logger class. minirospy does not need it to find the line of a log call, but programs patch it."""
 
 
 def configure_logging(
     logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
 ) -> str | None:
-    """Log to a file in the log folder, and what logger `rosout` gets to the terminal, too; return the file's path.
+    """Log to a file in the log folder, and log the records of `rosout` also to the terminal; return the file's path.
 
-    Replaces the handlers of the root logger and of `rosout`; ``level`` has no effect, as in ROS. A configuration file (of
-    ROS_PYTHON_LOG_CONFIG_FILE, or in ROS_HOME) replaces these settings. Set ROS_LOG_FILENAME to the path. Return None, with a
-    warning, if the folder cannot be created. Raise LoggingException if a file is in its place.
+    Replace the handlers of the root logger and of `rosout`; ``level`` has no effect, as in ROS. A configuration file
+    (ROS_PYTHON_LOG_CONFIG_FILE, or a file in ROS_HOME) takes precedence over these settings. Set ROS_LOG_FILENAME to the path.
+    Return None, with a warning, if the folder cannot be created. Raise LoggingException if a file has the folder's name.
     """
     from pathlib import Path
 
@@ -89,7 +89,7 @@ def configure_logging(
 
 
 def makedirs_with_parent_perms(p: str) -> None:
-    """Create a folder and its parents with the owner and the permissions of the nearest folder that exists."""
+    """Create a folder and its parents with the owner and the permissions of the nearest existing parent."""
     path = os.path.abspath(p)
     parent = os.path.dirname(path)
     if os.path.exists(path) or parent == path:
@@ -104,7 +104,7 @@ def makedirs_with_parent_perms(p: str) -> None:
 
 
 def renew_latest_logdir(logfile_dir: str) -> bool:
-    """Link `latest`, next to a run's folder, to that folder. Return False if something else has the name."""
+    """Create the link `latest` to a run's folder, next to that folder. Return False if `latest` exists and is not a link."""
     latest = os.path.join(os.path.dirname(logfile_dir), "latest")
     if os.path.lexists(latest):
         if not os.path.islink(latest):

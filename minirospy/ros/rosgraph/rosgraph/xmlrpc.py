@@ -1,6 +1,6 @@
 """rosgraph.xmlrpc: an XML-RPC server in a thread, for programs that implement a node themselves.
 
-It is based on Python's xmlrpc; minirospy's own nodes do not use it.
+The server is based on Python's xmlrpc; minirospy's own nodes do not use it.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
         self._is_closed = False
 
     def serve_forever(self, poll_interval: float = 0.5) -> None:
-        """Handle requests until :meth:`close` is called; return immediately if it was called before."""
+        """Handle requests until :meth:`close` is called; return immediately if :meth:`close` was called before."""
         with self._serving:
             if self._is_closed:
                 return
@@ -130,7 +130,7 @@ class XmlRpcNode:
             self.on_run_error(error)
 
     def _run(self) -> None:
-        """Start the server and handle requests; subclasses override this to do something before or after."""
+        """Start the server and handle requests; subclasses override this method to add steps before or after."""
         self._run_init()
         if self.server is not None:
             self.server.serve_forever(poll_interval=0.1)

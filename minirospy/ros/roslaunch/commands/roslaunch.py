@@ -337,7 +337,7 @@ def _check(sources: list[LaunchSource], packages: Packages) -> int:
     return 1 if problems else 0
 
 
-# --- what is shown of a spec
+# --- output of the options that print information
 
 
 def _show_files(spec: LaunchSpec, _: object, __: Packages) -> None:

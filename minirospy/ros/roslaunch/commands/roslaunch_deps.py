@@ -1,4 +1,4 @@
-"""`roslaunch-deps`: print the packages that launch files need.
+"""`roslaunch-deps`: print the packages on which launch files depend.
 
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools#roslaunch-deps.
 """

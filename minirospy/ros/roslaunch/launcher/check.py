@@ -29,7 +29,7 @@ def find_problems(sources: Sequence[LaunchSource], packages: Packages) -> tuple[
 def faults_of(file: str, packages: Packages, *, ignore_unset_args: bool = False) -> Problems:
     """Return a launch file's errors.
 
-    With ``ignore_unset_args``, return no errors if an arg has no value, because the missing value may cause other errors.
+    If ``ignore_unset_args``, return no errors if an arg has no value, because the missing value may cause other errors.
     """
     _, problems = find_problems([LaunchSource(file, None, {})], packages)
     is_unset = any(problem.text.startswith("requires the '") for problem in problems)

@@ -56,7 +56,7 @@ def node_environment(
 
 
 def node_folder(node: NodeSpec, packages: Packages, environment: Environment) -> Path:
-    """Return the working folder for a node's process. Raise MinirospyError as node_program does, if cwd is "node"."""
+    """Return the working folder for a node's process. If cwd is "node", raise MinirospyError as node_program does."""
     return Path(node_program(node, packages)[-1]).parent if node.cwd == "node" else environment.home
 
 

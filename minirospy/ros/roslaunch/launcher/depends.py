@@ -59,7 +59,7 @@ def file_needs(
 def missing_declarations(needs: Mapping[str, FileNeeds], *, tests: bool = False) -> dict[str, list[str]]:
     """Return the packages that launch files need but package.xml does not declare, sorted, by the package that lacks them.
 
-    With ``tests``, test dependencies also count as declared. Raise ManifestError if a package.xml is invalid.
+    If ``tests``, test dependencies also count as declared. Raise ManifestError if a package.xml is invalid.
     """
     found: dict[str, set[str]] = {}
     for file, what in needs.items():

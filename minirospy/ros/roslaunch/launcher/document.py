@@ -85,7 +85,7 @@ class Tag:
         return key in self.element.attributes
 
     def resolve(self, text: str) -> str:
-        """Return a string with its substitutions resolved. Raise LaunchError if one cannot be resolved."""
+        """Return a string with its substitutions resolved. Raise LaunchError if a substitution cannot be resolved."""
         try:
             return self._substitution.apply(text)
         except (SubstitutionError, NotFoundError) as error:
@@ -100,7 +100,7 @@ class Tag:
         return None if text is None else self.resolve(text)
 
     def required(self, key: str, *, may_be_empty: bool = False) -> str:
-        """Return a required attribute. Raise LaunchError if it is missing, or empty without ``may_be_empty``."""
+        """Return a required attribute. Raise LaunchError if it is missing, or if it is empty and ``may_be_empty`` is False."""
         text = self.optional(key)
         if text is None:
             unknown = self.element.attributes.keys() - ATTRIBUTES[self.name]
@@ -112,7 +112,10 @@ class Tag:
         return text
 
     def flag(self, key: str) -> bool:
-        """Return a boolean attribute, or False if the tag does not have it. Raise LaunchError if it is not a boolean."""
+        """Return a boolean attribute, or False if the tag does not have the attribute.
+
+        Raise LaunchError if it is not a boolean.
+        """
         text = self.optional(key)
         if text is None:
             return False
@@ -122,7 +125,10 @@ class Tag:
         return value
 
     def number(self, key: str, default: float) -> float:
-        """Return a numeric attribute, or the default if the tag does not have it. Raise LaunchError if it is not a number."""
+        """Return a numeric attribute, or the default if the tag does not have the attribute.
+
+        Raise LaunchError if it is not a number.
+        """
         text = self.optional(key)
         try:
             return default if text is None else float(text)
@@ -148,9 +154,9 @@ class Tag:
         return text or choices[0]
 
     def applies(self) -> bool:
-        """Return whether the tag applies, according to its ``if`` or ``unless``.
+        """Return whether the tag applies, according to its ``if`` or ``unless`` attribute.
 
-        Raise LaunchError if it has both, or an invalid value.
+        Raise LaunchError if the tag has both attributes, or one with an invalid value.
         """
         if self.has("if") and self.has("unless"):
             raise self.error("cannot set both 'if' and 'unless' on the same tag")
@@ -166,7 +172,7 @@ class Tag:
         return True
 
     def unknown_attributes(self) -> Iterator[tuple[LaunchError, str]]:
-        """Yield a warning about each attribute that this tag does not support, and its name: most are typing errors."""
+        """Yield (warning, attribute name) for each attribute that this tag does not support. Most are typos."""
         known = ATTRIBUTES[self.name]
         for key in self.element.attributes:
             if key not in known:

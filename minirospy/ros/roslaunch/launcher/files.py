@@ -1,4 +1,4 @@
-"""Finds the launch files named on a command line or in an ``<include>``, and suggests similar names if one is missing."""
+"""Finds the launch files named on a command line or in an ``<include>``, and suggests similar names if a file is missing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ __all__ = [
     "read_launch_file",
 ]
 
-_MAX_LAUNCH_FILE = 16 * 1024 * 1024  # bytes; a launch file for a hundred robots has about 100 kB
+# maximum size in bytes; a launch file for a hundred robots has about 100 kB
+_MAX_LAUNCH_FILE = 16 * 1024 * 1024
 
 
 class LaunchFileNotFoundError(MinirospyError):
@@ -34,7 +35,7 @@ class LaunchFileNotFoundError(MinirospyError):
 
 
 def find_files(what: list[str], packages: Packages) -> list[str]:
-    """Return the launch files that a command line names: PACKAGE FILE, or files.
+    """Return the launch files that a command line specifies: PACKAGE FILE, or paths.
 
     Raise LaunchFileNotFoundError if a file is not found, MinirospyError if an argument is malformed.
     """
@@ -63,7 +64,7 @@ def find_files(what: list[str], packages: Packages) -> list[str]:
 
 
 def read_launch_file(file: str) -> bytes:
-    """Return a file's bytes. Raise LaunchError if it cannot be read or is too large."""
+    """Return a file's bytes. Raise LaunchError if the file cannot be read or is too large."""
     try:
         return read_bytes(file)
     except (OSError, ValueError) as error:
@@ -74,7 +75,8 @@ def read_launch_file(file: str) -> bytes:
 def read_bytes(file: str, limit: int = _MAX_LAUNCH_FILE) -> bytes:
     """Return a file's bytes.
 
-    Raise OSError if it cannot be read, or ValueError if it has more than ``limit`` bytes, as a device such as /dev/zero has.
+    Raise OSError if the file cannot be read, or ValueError if it has more than ``limit`` bytes, as devices such as /dev/zero
+    do.
     """
     with open(file, "rb") as stream:
         data = stream.read(limit + 1)
@@ -91,7 +93,7 @@ def near_files(file: str) -> str:
             return ""
         folder, package = wanted.parent, _package_of(wanted)
         for files in (folder.iterdir() if folder.is_dir() else (), package.rglob("*.*") if package else ()):
-            # Compare names without suffixes, which are the same for all launch files.
+            # Compare names without suffixes, because all launch files have the same suffix.
             known: dict[str, Path] = {}
             for path in files:
                 if path.suffix in (".launch", ".xml", ".test") and path.name != "package.xml":
@@ -126,7 +128,7 @@ def _launch_files_of(package: str, packages: Packages) -> str:
 
 
 def _package_with(file: str, packages: Packages) -> str:
-    """Return the hint for a launch file that was given without its package, or with the wrong one."""
+    """Return the hint for a launch file that was given without its package, or with the wrong package."""
     for package, folder in sorted(packages.folders().items()):
         if Path(file).name == file and any((folder / below / file).is_file() for below in ("launch", "")):
             return f"; did you mean `roslaunch {package} {file}`?"

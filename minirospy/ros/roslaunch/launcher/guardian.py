@@ -98,6 +98,6 @@ if __name__ == "__main__":
         float(sys.argv[1]),
         float(sys.argv[2]),
         sys.argv[3],
-        # Leave the processes alone, because other processes may have reused these process ids already.
+        # Leave the processes alone, because other processes may already have reused their process ids.
         (lambda *_: None) if leaves_them else end_groups,
     )

@@ -1,4 +1,4 @@
-"""Loads launch files into a LaunchSpec. It reads files, and runs the programs of ``<param command=...>``, but no others.
+"""Loads launch files into a LaunchSpec. Reads files, and runs the commands in ``<param command=...>``, but no nodes.
 
 Source: http://wiki.ros.org/roslaunch/XML.
 """
@@ -62,8 +62,8 @@ class LaunchSource(NamedTuple):
 class _Scope:
     """The settings that a tag inherits from the enclosing tags. ``private``: parameters that every following node receives.
 
-    ``machine`` is the default machine. Unlike other settings, it still applies after the group or include that declares
-    it has ended.
+    ``machine`` is the default machine. Unlike other settings, it still applies after the end of the group or include that
+    declares it.
     """
 
     namespace: str = "/"
@@ -86,14 +86,14 @@ class _Args:
 def load_files(
     files: list[str], args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load launch files one after another, with ``args`` from the command line. Raise LaunchError if one is invalid."""
+    """Load launch files one after another, with ``args`` from the command line. Raise LaunchError if a file is invalid."""
     return load_sources([LaunchSource(file, None, args) for file in files], packages, environ)
 
 
 def load_text(
     text: str, args: Mapping[str, str], packages: Packages, environ: Mapping[str, str] | None = None
 ) -> LaunchSpec:
-    """Load one launch file from a string, for example from standard input. Raise LaunchError if it is invalid."""
+    """Load one launch file from a string, for example from standard input. Raise LaunchError if the file is invalid."""
     return load_sources([LaunchSource(STDIN, text.encode(), args)], packages, environ)
 
 
@@ -213,7 +213,7 @@ class _File:
         self._warn_of_attributes(tag)
         try:
             if tag.name == "arg" and not self._depth:
-                # The arg is known even if its `if` excludes the tag.
+                # The arg counts as known even if its `if` excludes the tag.
                 self._substitution.used.add(tag.element.attributes.get("name", ""))
             return reader(tag, scope) if tag.applies() else scope
         except _TooManyIncludesError:
@@ -223,7 +223,7 @@ class _File:
             self.report(error)
             return scope
 
-    # --- args, and what structures a file
+    # --- args, groups, includes and the settings of a scope
 
     def _arg(self, tag: Tag, scope: _Scope) -> _Scope:
         name, value, default = _arg_texts(tag)

@@ -42,7 +42,7 @@ class LaunchMaster:
 
     @property
     def log_folder(self) -> Path:
-        """The folder for this run's log files."""
+        """The folder for the run's log files."""
         return self._environment.log_dir / self.run_id
 
     def is_online(self) -> bool:
@@ -66,7 +66,7 @@ class LaunchMaster:
         Raise MasterUnreachableError if the master URI names another machine, MinirospyError if the process cannot be started.
         """
         if not self._environment.master_is_local:
-            # Make this call for its error message, which states the reason, such as an unknown host name or a
+            # Make this call for its error message, which contains the reason, such as an unknown host name or a
             # suspended master.
             self._proxy.get_pid()
             raise MasterUnreachableError(self._environment.master_uri)
@@ -94,8 +94,8 @@ class LaunchMaster:
             self._pause(0.02)
 
         if self.run_id:
-            # Set the run id explicitly, because a program that launches may have set its own, which names the log
-            # folder.
+            # Set the run id explicitly, because the launching program may have set its own run id, which names the
+            # log folder.
             self._proxy.set_param("/run_id", self.run_id)
         # Do not warn again: if the master cannot write its log, it has already printed a warning.
         self.find_run_id(warns=False)

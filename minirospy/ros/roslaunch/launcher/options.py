@@ -13,9 +13,9 @@ __all__ = ["RunOptions"]
 class RunOptions:
     """The options for running a spec.
 
-    ``screen``, ``log``: send the output of all nodes there, regardless of the launch file; ``log_errors``: also log the nodes'
-    stderr. ``required``: treat every node as required. ``local``: skip the nodes of other machines.
-    ``strict``: stop the launch if a node cannot be started. ``watch``: restart a node if its files change.
+    ``screen``, ``log``: send the output of all nodes to the screen or to log files, regardless of the launch file;
+    ``log_errors``: also log the nodes' stderr. ``required``: treat every node as required. ``local``: skip the nodes of other
+    machines. ``strict``: stop the launch if a node cannot be started. ``watch``: restart a node if its files change.
     ``name`` is shown in the terminal's title.
     """
 

@@ -24,8 +24,8 @@ INFO, ERROR = 2, 8  # levels of rosgraph_msgs/Log
 class Output:
     """Prints lines to stdout and stderr; adds colours and titles on a terminal.
 
-    ``listener`` also receives (level, text) for each line: a child roslaunch sends them to its parent.
-    ``title`` allows it to set the terminal's title. ``has_color`` is determined when a line is printed.
+    ``listener`` also receives (level, text) for each line; a child roslaunch uses it to send the lines to its parent. If
+    ``title`` is False, the terminal's title is not set. ``has_color`` is determined when a line is printed.
     """
 
     handlers: ClassVar[list[Callable[[int, str], None]]] = []

@@ -29,7 +29,7 @@ __all__ = ["param_value", "rosparam_values"]
 _XACRO = ("xacro", "xacro.py")
 _STYLE = re.compile(r"\x1b\[[0-9;]*m")  # matches terminal colours
 _ERROR = re.compile(r"\berror: ", re.IGNORECASE)
-# number of bytes at the end of a command's stderr in which to look for the reason of a failure
+# number of bytes at the end of a command's stderr to search for the reason of a failure
 _ERRORS_KEPT = 65_536
 _ERRORS_SECONDS = 1.0
 # maximum size in bytes of a file or of a command's output; the master rejects larger requests

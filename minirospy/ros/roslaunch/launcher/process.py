@@ -45,9 +45,10 @@ class Process:
     stdout_file: Path | None = None
     starts: int = 1
     started: float = field(default_factory=time.monotonic)
-    is_ending: bool = False  # its exit was requested, so do not report the exit
+    is_ending: bool = False  # set after the process's exit was requested, so that the exit is not reported
 
-    is_restarting: bool = False  # restart it after its exit, because its file has changed
+    # set if the process is to be restarted after its exit, because its file has changed
+    is_restarting: bool = False
 
     @property
     def pid(self) -> int:
@@ -109,7 +110,8 @@ class Guardian:
         self._children.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        # If a parent is killed while it starts a process outside its job, that process would remain, suspended.
+        # A process that is started outside the job would remain, suspended, if its parent were killed while starting
+        # it.
         return start_outside_of_job(
             [sys.executable, "-I", "-S", *self._words],
             stdin=subprocess.PIPE,
@@ -139,7 +141,7 @@ def start_process(
     stdin: int | None = subprocess.DEVNULL,
     stdout: int | None = None,
 ) -> Process:
-    """Start a process. Its stdout (and its stderr, with ``log_errors``) is written to ``stdout_file``, or is inherited.
+    """Start a process. Its stdout (if ``log_errors``, also its stderr) is written to ``stdout_file``, or is inherited.
 
     Raise MinirospyError if the process cannot be started or the file cannot be written.
     """

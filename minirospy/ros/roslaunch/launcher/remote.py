@@ -250,7 +250,7 @@ class RemoteMachines:
                 child.ssh.popen.wait(_SHUTDOWN_SECONDS)
         end_processes([child.ssh], Timeouts(1.0, 1.0), lambda _: None)
 
-    # --- what the children call
+    # --- XML-RPC methods that the children call
 
     def _register(self, name: str, uri: str) -> int:
         child = self._children.get(name)

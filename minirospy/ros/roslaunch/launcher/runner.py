@@ -133,7 +133,7 @@ class Launcher:
         if not had_master:
             self._output.print(f"setting /run_id to {self.run_id}", bold=True)
             self._output.print("started core service [/rosout]")
-            # Skip the first number, which a roslaunch that starts the master uses for /rosout in ROS.
+            # Skip the first number: in ROS, a roslaunch that starts the master uses it for /rosout.
             next(self._numbers)
 
         self.set_parameters()
@@ -154,7 +154,7 @@ class Launcher:
         return f"{node.name.lstrip('/')}-{next(self._numbers)}"
 
     def start_node(self, node: NodeSpec, name: str = "") -> Process | None:
-        """Start a node as the process ``name`` (empty: a new name); warn and return None if it cannot be started."""
+        """Start a node as the process ``name`` (empty: a new name). If the node cannot be started, warn and return None."""
         self._has_run = True
         try:
             process = self._start_process(node, name or self.process_name(node))
@@ -294,7 +294,7 @@ class Launcher:
     def _on_end(self, process: Process) -> None:
         """Handle a node's exit; a hook for subclasses."""
 
-    # --- ending
+    # --- shutdown
 
     def close(self) -> None:
         """Terminate all processes: the nodes in reverse order, then the master. Idempotent."""
@@ -337,7 +337,7 @@ class Launcher:
         return end_processes(processes, self._options.timeouts, self._output.warn)
 
     def _unregister(self, nodes: list[str]) -> None:
-        """Remove the registrations that nodes left, unless the master exits together with the nodes."""
+        """Unregister what exited nodes have left at the master, unless the master exits together with the nodes."""
         if not self.supervisor.master:
             for node in nodes:
                 self._dead.add(node)

@@ -15,9 +15,9 @@ __all__ = ["ArgDoc", "LaunchSpec", "MachineSpec", "NodeSpec", "ParameterCommand"
 class NodeSpec:
     """A ``<node>``. ``name`` is global; ``remaps`` and ``env`` include those of the enclosing groups.
 
-    If a ``<test>`` has no name, ``name`` is a namespace that ends with a slash. The test's parameters are set in it, and
-    ``named()`` generates a name before the test runs. ``output`` and ``cwd`` are empty if the file does not set them,
-    which means ``log`` and ``ROS_HOME``.
+    If a ``<test>`` has no name, ``name`` is a namespace that ends with a slash. The test's parameters are set in that
+    namespace, and ``named()`` generates a name before the test runs. ``output`` and ``cwd`` are empty if the file does not set
+    them, which means ``log`` and ``ROS_HOME``.
     """
 
     name: str
@@ -47,7 +47,7 @@ class NodeSpec:
         return self.name.rpartition("/")[0] + "/"
 
     def named(self) -> NodeSpec:
-        """Return the node; if it has no name, return a copy with a unique generated name."""
+        """Return the node; if the node has no name, return a copy with a unique generated name."""
         if self.base_name:
             return self
         base = "".join(c if c.isalnum() else "_" for c in self.type)
@@ -113,7 +113,7 @@ class ParameterCommand:
 
 @dataclass(frozen=True)
 class ArgDoc:
-    """An ``<arg>`` in the first file, with its default (None if it is required) and its doc."""
+    """An ``<arg>`` in the first file, with its default (None if the arg is required) and its doc."""
 
     name: str
     default: str | None
@@ -161,7 +161,7 @@ class LaunchSpec:
     def add_param(
         self, name: str, value: object, error: Callable[[str], LaunchError], file: str | None = None
     ) -> None:
-        """Add a parameter; ``error`` makes errors with the tag's place. ``file`` has the ``<param>``, if it is in no node."""
+        """Add a parameter. ``error`` creates errors with the tag's line. ``file`` has the ``<param>``, unless it is in a node."""
         upper = name
         while upper := upper.rpartition("/")[0]:
             if upper in self.params and not isinstance(self.params[upper], dict):
@@ -184,11 +184,11 @@ class LaunchSpec:
             raise LaunchError(machine.file, machine.line, text)
 
     def add_warning(self, warning: LaunchError, ros_text: str = "") -> None:
-        """Add a warning about content that is ignored; ``ros_text`` is how ROS's roslaunch words it, if that differs."""
+        """Add a warning about content that is ignored; ``ros_text`` is the wording of ROS's roslaunch, if it differs."""
         self.warnings.append(warning)
 
     def runs_command(self, text: str) -> None:
-        """Handle that the command of a ``<param>`` is run now."""
+        """Handle the start of a ``<param>``'s command."""
 
     # --- reading
 

@@ -19,8 +19,10 @@ __all__ = ["Supervisor"]
 _RESPAWN_SECONDS = 0.1  # minimum interval between two starts of a node that exits immediately
 
 _SLICE = 0.5
-"""Seconds. The main thread, which receives signals, waits in slices, because a signal just before a wait, and on Windows any
-signal, takes effect only after the slice. Changed files and remote processes are checked between slices.
+"""Seconds per slice in which the main thread, which receives signals, waits.
+
+A signal that arrives just before a wait, and on Windows any signal, takes effect only after the slice. Changed files and
+remote processes are checked between slices.
 """
 
 _BAR = "=" * 80
@@ -109,7 +111,7 @@ class Supervisor:
         self.on_change()
 
     def add_master(self, process: Process) -> None:
-        """Watch a master; when it exits, the run is over."""
+        """Watch a master; the run is over when the master exits."""
         self.master = process
         self._attend(process)
 
@@ -136,7 +138,7 @@ class Supervisor:
     # --- in the thread that runs the launch
 
     def watch(self, *, forever: bool = False) -> int | None:
-        """Watch until all processes or a required one have exited, or stop() was called.
+        """Watch until all processes, or a required one, have exited, or stop() is called.
 
         Return the exit status, or None if no process is left. ``forever``: continue even if no process is left.
         """

@@ -78,7 +78,7 @@ class ROSLaunchConfig:
         self.tests.append(test)
 
     def add_executable(self, exe: Executable) -> None:
-        """Add a command. Of a program's own, only `rosparam delete` and `rosparam dump` run. Raise ValueError if it is None."""
+        """Add a command. Only `rosparam delete` and `rosparam dump` are run. Raise ValueError if ``exe`` is None."""
         if not exe:
             raise ValueError("exe is None")
         self.executables.append(exe)
@@ -108,7 +108,7 @@ class ROSLaunchConfig:
         return any(node.machine is not None and not is_machine_local(node.machine) for node in nodes)
 
     def summary(self, local: bool = False) -> str:
-        """Return the summary that roslaunch prints before it starts any process; unless ``local``, it lists the machines."""
+        """Return the summary that roslaunch prints before it starts any process; the summary lists machines unless ``local``."""
         return summary(
             self.spec.nodes,
             {name: param.value for name, param in self.params.items()},
@@ -117,7 +117,7 @@ class ROSLaunchConfig:
         )
 
     def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> None:
-        """Add a parameter. It is a configuration error if its name is below another parameter's."""
+        """Add a parameter. If its name is below another parameter's name, record a configuration error."""
         for parent in namespaces_of(p.key):
             if parent in self.params:
                 self.add_config_error(f"parameter [{p.key}] conflicts with parent parameter [{parent}]")
@@ -146,7 +146,7 @@ class ROSLaunchConfig:
 
     @property
     def spec(self) -> LaunchSpec:
-        """The whole configuration as a LaunchSpec, for running."""
+        """The whole configuration as a LaunchSpec, from which it is run."""
         return LaunchSpec(
             nodes=[node.spec for node in self.nodes],
             params={name: _as_sent(param.value) for name, param in self.params.items()},
@@ -167,7 +167,7 @@ def load_config_default(
     assign_machines: bool = True,
     ignore_unset_args: bool = False,
 ) -> ROSLaunchConfig:
-    """Return the combined configuration from launch files and strings. Raise RLException if one is invalid."""
+    """Return the combined configuration from launch files and strings. Raise RLException if a file or string is invalid."""
     config, loader = ROSLaunchConfig(), loader or XmlLoader()
     if port:
         environment = Environment.read()
@@ -193,7 +193,7 @@ def get_roscore_filename() -> str | None:
 
 
 def _parameter_command(exe: Executable) -> ParameterCommand | None:
-    """Return a rosparam command as the launcher runs it, or None if it is another one."""
+    """Return a rosparam command in the launcher's form, or None if the launcher does not support the command."""
     match (exe.command, *exe.args):
         case ("rosparam", "delete", name):
             return ParameterCommand(name)

@@ -56,11 +56,11 @@ __all__ = [
 
 PHASE_SETUP, PHASE_RUN, PHASE_TEARDOWN = "setup", "run", "teardown"
 
-TEST_TIME_LIMIT_DEFAULT = 60  # seconds, for a <test> without a time limit
+TEST_TIME_LIMIT_DEFAULT = 60  # time limit in seconds for a <test> without a time limit
 
 
 class RLException(Exception):
-    """A launch failed."""
+    """Raised if a launch fails."""
 
 
 class Master:
@@ -79,11 +79,11 @@ class Master:
         return Environment.read()._replace(master_uri=self.uri)
 
     def get_host(self) -> str:
-        """Return the URI's host. Raise ValueError if the URI is not a URL."""
+        """Return the host in the master's URI. Raise ValueError if the URI is not a URL."""
         return _host_and_port(self.uri)[0]
 
     def get_port(self) -> int:
-        """Return the URI's port, or 80 if it has none. Raise ValueError if the URI is not a URL."""
+        """Return the port in the master's URI, or 80 if the URI has no port. Raise ValueError if the URI is not a URL."""
         return _host_and_port(self.uri)[1]
 
     def get(self) -> ServerProxy:
@@ -203,7 +203,7 @@ def local_machine() -> Machine:
 
 
 def is_machine_local(machine: Machine) -> bool:
-    """Return whether a machine is this one. Raise RLException if its address cannot be resolved."""
+    """Return whether a machine is this one. Raise RLException if the machine's address cannot be resolved."""
     try:
         socket.getaddrinfo(machine.address or ".", None)
     except (OSError, UnicodeError) as error:
@@ -224,7 +224,7 @@ class Executable:
 
 
 class RosbinExecutable(Executable):
-    """A command of ROS, such as rosparam."""
+    """A ROS command, such as rosparam."""
 
     def __repr__(self) -> str:
         return f"ros/bin/{super().__repr__()}"
@@ -278,7 +278,7 @@ class Node:
         self.machine: Machine | None = None
         self.process_name: str | None = None
 
-        # The caller's own list, as in ROS, also if the caller changes it later.
+        # As in ROS, store the caller's own list, which the caller may change later.
         self.remap_args: Sequence[Sequence[str]] = remap_args or []
         self.env_args: Sequence[tuple[str, str]] = env_args or []
         self.output = output
@@ -297,7 +297,7 @@ class Node:
         )  # fmt: skip
 
     def give_name(self) -> None:
-        """Generate a unique name if the node has none."""
+        """Generate a unique name if the node has no name."""
         self.name = self.spec.named().base_name
 
     def xmltype(self) -> str:
@@ -305,7 +305,7 @@ class Node:
         return "node"
 
     def xmlattrs(self) -> list[tuple[str, object]]:
-        """Return (name, value) for each of the tag's attributes; the value is None for unset ones."""
+        """Return (name, value) for each of the tag's attributes; the value is None for an attribute that is not set."""
         return [
             *self._placed(),
             ("respawn", self.respawn),
@@ -399,7 +399,7 @@ class Test(Node):
         return "test"
 
     def xmlattrs(self) -> list[tuple[str, object]]:
-        """Return (name, value) for each of the tag's attributes, with retry and time-limit if they differ from the default."""
+        """Return (name, value) for each of the tag's attributes; retry and time-limit only if they differ from the defaults."""
         attributes = [*self._placed(), *self._named(), ("test-name", self.test_name)]
         if self.retry:
             attributes.append(("retry", str(self.retry)))
@@ -440,7 +440,7 @@ class _Handler:
         if (level >= ERROR) == self.errors:
             try:
                 self._function(text)
-            except Exception:  # the program's own function; as in ROS, the line is printed anyway
+            except Exception:  # the program's own function failed; as in ROS, the line is printed anyway
                 logging.getLogger("roslaunch").debug("a handler of roslaunch's output raised", exc_info=True)
 
 
@@ -517,7 +517,7 @@ def set_child_mode(child_mode: bool) -> None:
 
 
 def rle_wrapper(fn: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that calls ``fn`` and raises RLException for every exception."""
+    """Return a function that calls ``fn`` and converts every exception to RLException."""
 
     def call(*args: object) -> object:
         try:
@@ -529,7 +529,7 @@ def rle_wrapper(fn: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def remap_localhost_uri(uri: str, force_localhost: bool = False) -> str:
-    """Return a URI on localhost with this machine's address in place of it; others unchanged, unless ``force_localhost``."""
+    """Replace localhost in a URI with this machine's address; if ``force_localhost``, replace any host."""
     parts = urlsplit(uri)
     if force_localhost or parts.hostname == "localhost":
         return f"http://{Environment.read().host}:{parts.port}/"
@@ -537,7 +537,7 @@ def remap_localhost_uri(uri: str, force_localhost: bool = False) -> str:
 
 
 def _xml_escape(s: object) -> object:
-    """Return a string with XML's entities; other values unchanged."""
+    """Escape a string for XML; return other values unchanged."""
     from xml.sax.saxutils import escape
 
     return escape(s, {'"': "&quot;"}) if isinstance(s, str) else s

@@ -27,7 +27,7 @@ NAME = "roslaunch-deps"
 
 
 class RoslaunchDepsException(Exception):
-    """The dependencies of a launch file cannot be determined."""
+    """Raised if the dependencies of a launch file cannot be determined."""
 
 
 class RoslaunchDeps:
@@ -62,7 +62,7 @@ def roslaunch_deps(
     use_test_depends: bool = False,
     ignore_unset_args: bool = False,
 ) -> tuple[str | None, dict[str, RoslaunchDeps], dict[str, set[str]]]:
-    """Return the first file's package, each file's dependencies, and by package, those that package.xml does not declare.
+    """Return the first file's package, each file's dependencies, and by package, the dependencies missing in package.xml.
 
     Raise RoslaunchDepsException if a file or package.xml is invalid.
     """
@@ -103,7 +103,7 @@ def fullusage() -> None:
 
 
 def print_deps(base_pkg: object, file_deps: Mapping[str, RoslaunchDeps], verbose: bool) -> None:
-    """Print the packages that launch files need, in one line; with ``verbose`` before it each program and file."""
+    """Print the packages that launch files need, in one line; if ``verbose``, print each program and file before that line."""
     if verbose:
         for file, deps in file_deps.items():
             for package, program in deps.nodes:
@@ -123,7 +123,7 @@ def calculate_missing(
     file_deps: Mapping[str, RoslaunchDeps],
     use_test_depends: bool = False,
 ) -> dict[str, set[str]]:
-    """Add the packages that launch files need, but their package.xml does not declare, to ``missing``; return it."""
+    """Add the packages that launch files need, but their package.xml does not declare, to ``missing``; return ``missing``."""
     for file, deps in file_deps.items():
         package = package_of(file)
         if package is None:

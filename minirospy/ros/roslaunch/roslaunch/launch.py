@@ -115,7 +115,7 @@ class ROSLaunchRunner:
         return [str(process) for process in monitor.procs], [node.base_name for node in self._launcher.failed]
 
     def launch_node(self, node: Node, core: bool = False) -> tuple[Process | str, bool]:
-        """Start another node. Return (its process, True), or (its name, False) if it fails to start.
+        """Start another node. Return (its process, True), or (its name, False) if the node fails to start.
 
         Raise RLException after a shutdown.
         """
@@ -195,7 +195,7 @@ class ROSLaunchRunner:
         return self.pm
 
     def _load_parameters(self) -> None:
-        """Set only the parameters. Raise RLException if one cannot be set."""
+        """Only set the parameters. Raise RLException if a parameter cannot be set."""
         try:
             self._launcher.set_parameters()
         except (MinirospyError, RpcError) as error:
@@ -210,7 +210,7 @@ def master_options(timeout: float | None, logger_level: str | bool) -> tuple[str
 
 
 def replacement_of(module: str, name: str, ours: Function) -> Function:
-    """Return the function with which a program has replaced one in roslaunch's modules, or else the original.
+    """Return the function with which a program has replaced a function in roslaunch's modules, else the original.
 
     For example, programs disable roslaunch's signal handlers with ``roslaunch.pmon._init_signal_handlers = ...``.
     """
@@ -219,7 +219,7 @@ def replacement_of(module: str, name: str, ours: Function) -> Function:
 
 
 def unify_clear_params(params: Iterable[str]) -> list[str]:
-    """Return the namespaces to delete, each with a trailing slash, omitting those inside another."""
+    """Return the namespaces to delete, each with a trailing slash, omitting namespaces that are inside another one."""
     names = [name if name.endswith("/") else f"{name}/" for name in params]
     return [
         name

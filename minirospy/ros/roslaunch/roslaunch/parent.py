@@ -73,7 +73,7 @@ class ROSLaunchParent:
     def start(self, auto_terminate: bool = True) -> None:
         """Start everything; return when all nodes have been started. Raise RLException if that fails.
 
-        Without ``auto_terminate``, the run continues after the last node has exited.
+        If not ``auto_terminate``, the run continues after the last node has exited.
         """
         if self.runner is not None:
             raise RLException("this roslaunch instance has been started before: make another one")

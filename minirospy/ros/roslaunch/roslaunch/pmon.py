@@ -47,7 +47,7 @@ __all__ = [
 
 
 _BAR = "=" * 80
-_POLL_SECONDS = 0.1  # between checks of a program's own processes
+_POLL_SECONDS = 0.1  # seconds between checks of the program's own processes
 
 
 class ProcessListener:
@@ -69,7 +69,7 @@ class ApiLauncher(Launcher):
         self.known: dict[str, LaunchedProcess] = {}
 
     def command(self, node: NodeSpec) -> list[str]:
-        """Return a node's command. Raise LaunchError if it cannot be built."""
+        """Return a node's command. Raise LaunchError if the command cannot be built."""
         return node_command(node, self._packages)
 
     def variables(self, node: NodeSpec) -> dict[str, str]:
@@ -121,8 +121,8 @@ class Process:
 
         self.lock = threading.Lock()
         self.exit_code: int | None = None
-        self.spawn_count = 0  # how many times the process was started
-        self.time_of_death: float | None = None  # time.time() of its exit
+        self.spawn_count = 0  # number of times the process was started
+        self.time_of_death: float | None = None  # time.time() when the process exited
 
     def __str__(self) -> str:
         return f"Process<{self.name}>"
@@ -151,13 +151,13 @@ class Process:
         return None
 
     def is_alive(self) -> bool:
-        """Return whether the process is running; when it no longer is, set ``time_of_death``."""
+        """Return whether the process is running; set ``time_of_death`` after it has exited."""
         if self.time_of_death is None:
             self.time_of_death = time.time()
         return False
 
     def should_respawn(self) -> float | bool:
-        """Return the seconds until the process may be restarted, or False if it must not be."""
+        """Return the seconds until the process may be restarted, or False if it must not be restarted."""
         if not self.respawn:
             return False
         return (self.time_of_death or time.time()) + self.respawn_delay - time.time()
@@ -197,7 +197,8 @@ class LaunchedProcess(Process):
     """A node's process, which is either running, or created by create_node_process() and not started yet."""
 
     def __init__(self, launcher: ApiLauncher, node: NodeSpec, name: str) -> None:
-        # As properties, `args`, `env`, `spawn_count` and `exit_code` follow the process: do not set them.
+        # Do not set `args`, `env`, `spawn_count` and `exit_code`: as properties, they return the process's current
+        # values.
         self.name = name
         self.package = node.package
         self.respawn = node.respawn
@@ -245,7 +246,7 @@ class LaunchedProcess(Process):
 
     @property
     def spawn_count(self) -> int:  # type: ignore[override]
-        """Return how many times the process was started."""
+        """Return the number of times the process was started."""
         return self.process.starts if self.process else 0
 
     @property
@@ -312,7 +313,7 @@ class ProcessMonitor:
     """The processes of a launch."""
 
     _living: ClassVar[weakref.WeakSet[ProcessMonitor]] = weakref.WeakSet()
-    """The monitors whose processes are terminated by a signal, or by pmon_shutdown(): not those that a program has made."""
+    """The monitors whose processes a signal or pmon_shutdown() terminates, excluding monitors that a program has created."""
 
     def __init__(self, name: str = "ProcessMonitor", *, launcher: ApiLauncher | None = None) -> None:
         self.name = name
@@ -323,26 +324,26 @@ class ProcessMonitor:
         if launcher is not None:
             self._living.add(self)
 
-        # Processes of the program's own classes; the launcher has the others
+        # These are the processes of the program's own classes; the launcher manages all others.
         self.plock = threading.RLock()
         self._own: list[Process] = []
         self._own_dead: list[Process] = []
         self.core_procs: list[Process] = []
-        self._is_complete = False  # no more processes will be registered
+        self._is_complete = False  # set if no more processes will be registered
         self._own_thread: threading.Thread | None = None
 
-    daemon = True  # as threading.Thread has it, ROS's base class
+    daemon = True  # an attribute of threading.Thread, which is the base class in ROS
 
     def getName(self) -> str:
         """Return the monitor's name."""
         return self.name
 
     def has_main_thread_jobs(self) -> bool:
-        """Return whether the main thread has something to do: never."""
+        """Return False, because the main thread has nothing to do."""
         return False
 
     def do_main_thread_jobs(self) -> None:
-        """Do nothing: no process is started by the main thread only."""
+        """Do nothing, because no process must be started by the main thread."""
 
     @property
     def listeners(self) -> list[ProcessListener]:
@@ -402,7 +403,7 @@ class ProcessMonitor:
         return process is not None
 
     def register(self, p: Process) -> None:
-        """Watch a process; call this before the start() of one from create_node_process().
+        """Watch a process. For a process from create_node_process(), call this method before the process's start().
 
         Raise RLException if another process has its name, or after a shutdown.
         """
@@ -428,7 +429,7 @@ class ProcessMonitor:
         self.core_procs.append(p)
 
     def unregister(self, p: Process) -> None:
-        """Stop watching a process, without terminating it. Raise ValueError if it is not watched."""
+        """Stop watching a process, without terminating it. Raise ValueError if the process is not watched."""
         with self.plock:
             self._own.remove(p)
 
@@ -455,7 +456,7 @@ class ProcessMonitor:
             finally:
                 self.close()
 
-        # If the program is killed, this thread stops too, and the guardian terminates the nodes.
+        # If the program is killed, this thread stops, too, and the guardian terminates the nodes.
         self._thread = threading.Thread(target=watch, name="roslaunch", daemon=True)
         self.is_watching = True
         self._thread.start()
@@ -530,7 +531,7 @@ class ProcessMonitor:
     def close(self) -> None:
         """Terminate the remaining processes in the calling thread."""
         errors: list[str] = []
-        # The core's processes last, the others in the reverse order of their registration.
+        # Terminate the core's processes last, the others in the reverse order of their registration.
         others = [each for each in reversed(self._own) if each not in self.core_procs]
         for process in (*others, *(each for each in self.core_procs if each in self._own)):
             Output(title=False).print(f"[{process.name}] killing on exit")
@@ -575,7 +576,7 @@ class ProcessMonitor:
         return [monitor for monitor in cls._living if not monitor.done]
 
 
-_shutting_down = False  # programs set it to False to launch again after a signal
+_shutting_down = False  # set to False by programs that launch again after a signal
 
 
 def start_process_monitor() -> ProcessMonitor | None:
@@ -598,7 +599,7 @@ def shutdown_process_monitor(process_monitor: ProcessMonitor | None) -> bool:
 
 
 def create_node_process(run_id: str | None, node: Node, master_uri: str) -> LaunchedProcess:
-    """Return a process for a node; it is not started yet. Raise NodeParamsException if the node has no program."""
+    """Return a process for a node, without starting it. Raise NodeParamsException if the node has no program."""
     node.give_name()
     launcher = ApiLauncher(
         LaunchSpec(), Environment.read()._replace(master_uri=master_uri), run_id=run_id or ""
@@ -650,5 +651,5 @@ _init_signal_handlers = init_signal_handlers
 
 
 def rl_signal(sig: int, stackframe: FrameType | None) -> None:
-    """Stop everything that this program has launched, when a signal arrives."""
+    """Handle a signal: stop everything that this program has launched."""
     pmon_shutdown()

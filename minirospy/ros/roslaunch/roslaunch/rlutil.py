@@ -68,7 +68,7 @@ def get_or_generate_uuid(options_runid: str | None, options_wait_for_master: boo
 
 
 def resolve_launch_arguments(args: Sequence[str]) -> list[str]:
-    """Return the paths of the launch files that a command line (package and file, or files) names.
+    """Return the paths of the launch files that a command line (package and file, or files) specifies.
 
     Raise RLException if a file is not found.
     """

@@ -51,13 +51,13 @@ class XmlParseException(RLException):
 
 
 class Configuration(Protocol):
-    """The object into which launch files are loaded: a ROSLaunchConfig, or a program's own with these methods.
+    """The object into which launch files are loaded: a ROSLaunchConfig, or a program's own object with these methods.
 
-    They are called in the order of the tags.
+    The methods are called in the order of the tags.
     """
 
     def add_roslaunch_file(self, f: str) -> None:
-        """Handle that a file is read now."""
+        """Handle the start of reading a file."""
 
     def add_node(self, node: Node, core: bool = False, verbose: bool = True) -> object:
         """Add a node."""
@@ -66,7 +66,7 @@ class Configuration(Protocol):
         """Add a test."""
 
     def add_param(self, p: Param, filename: str | None = None, verbose: bool = True) -> object:
-        """Add a parameter; ``filename`` is given for a ``<param>`` that is in no node."""
+        """Add a parameter; ``filename`` is given for a ``<param>`` that is not in a node."""
 
     def add_clear_param(self, param: str) -> object:
         """Add a namespace to delete."""
@@ -82,19 +82,19 @@ class Configuration(Protocol):
 
 
 class ConfigError(str):
-    """A warning as ROS words it; ``error`` is minirospy's, with the line."""
+    """A warning in ROS's wording; ``error`` is minirospy's warning, with the line."""
 
     error: LaunchError
 
     def __new__(cls, text: str, error: LaunchError) -> ConfigError:
-        """Return ``text`` with the error."""
+        """Return ``text`` as a ConfigError that contains ``error``."""
         made = super().__new__(cls, text)
         made.error = error
         return made
 
 
 class _Forwarded(LaunchSpec):
-    """Passes the content of launch files to a configuration."""
+    """Forwards the content of launch files to a configuration."""
 
     def __init__(self, config: Configuration, *, core: bool, verbose: bool) -> None:
         super().__init__()
@@ -103,7 +103,7 @@ class _Forwarded(LaunchSpec):
         self._verbose = verbose
 
     def add_file(self, path: str, name: str) -> None:
-        """Pass a file on, except for a string."""
+        """Print that a file is loaded. Add the file to the configuration, unless it was given as a string."""
         if name == STDIN:
             self._print("... loading XML")
             return
@@ -111,7 +111,7 @@ class _Forwarded(LaunchSpec):
         self._config.add_roslaunch_file(name)
 
     def end_include(self, name: str) -> None:
-        """Print the end of an included file."""
+        """Print that an included file has been loaded."""
         self._print(f"... done importing include file [{name}]")
 
     def runs_command(self, text: str) -> None:
@@ -119,19 +119,19 @@ class _Forwarded(LaunchSpec):
         self._print(f"... executing command param [{text}]")
 
     def add_node(self, node: NodeSpec) -> None:
-        """Pass a node on."""
+        """Add a node to the configuration."""
         node = replace(node, file=_shown(node.file))
         self._config.add_node(Node.of(node), core=self._core, verbose=self._verbose)
 
     def add_test(self, test: TestSpec) -> None:
-        """Pass a test on."""
+        """Add a test to the configuration."""
         test = replace(test, node=replace(test.node, file=_shown(test.node.file)))
         self._config.add_test(Test.of_test(test), verbose=self._verbose)
 
     def add_param(
         self, name: str, value: object, error: Callable[[str], LaunchError], file: str | None = None
     ) -> None:
-        """Pass a parameter on; a file's content becomes an xmlrpc.client.Binary."""
+        """Add a parameter to the configuration; a file's content becomes an xmlrpc.client.Binary."""
         if isinstance(value, bytes):
             from xmlrpc.client import Binary
 
@@ -143,22 +143,22 @@ class _Forwarded(LaunchSpec):
             self._config.add_param(param, filename=_shown(file), verbose=self._verbose)
 
     def add_clear(self, name: str) -> None:
-        """Pass a namespace on."""
+        """Add a namespace to the configuration."""
         self._config.add_clear_param(f"{name.rstrip('/')}/")
 
     def add_command(self, command: ParameterCommand) -> None:
-        """Pass a command on."""
+        """Add a command to the configuration."""
         words: tuple[str, ...] = ("delete", command.name)
         if command.file is not None:
             words = ("dump", command.file, f"{command.name.rstrip('/')}/")
         self._config.add_executable(RosbinExecutable("rosparam", words, PHASE_SETUP))
 
     def add_machine(self, machine: MachineSpec) -> None:
-        """Pass a machine on."""
+        """Add a machine to the configuration."""
         self._config.add_machine(Machine.of(machine), verbose=self._verbose)
 
     def add_warning(self, warning: LaunchError, ros_text: str = "") -> None:
-        """Pass a warning on."""
+        """Add a warning to the configuration."""
         text = ros_text.replace(f"[{STDIN}]", "[string]") if ros_text else warning.text
         self._config.add_config_error(ConfigError(text, warning))
 
@@ -168,7 +168,7 @@ class _Forwarded(LaunchSpec):
 
 
 def _shown(file: str) -> str:
-    """Return a file's name as ROS has it."""
+    """Return a file's name as ROS prints it."""
     return "string" if file == STDIN else file
 
 
@@ -188,14 +188,14 @@ class XmlLoader:
         argv: Sequence[str] | None = None,
         verbose: bool = True,
     ) -> None:
-        """Load a file, with its args as ``["name:=value", ...]``. Raise XmlParseException if it is invalid."""
+        """Load a file, with its args as ``["name:=value", ...]``. Raise XmlParseException if the file is invalid."""
         source = LaunchSource(filename, None, names.parse_launch_arguments(argv or ()))
         self._load(source, _Forwarded(ros_config, core=core, verbose=verbose))
 
     def load_string(
         self, xml_text: str, ros_config: Configuration, core: bool = False, verbose: bool = True
     ) -> None:
-        """Load a launch file given as a string. Raise XmlParseException if it is invalid."""
+        """Load a launch file given as a string. Raise XmlParseException if the string is invalid."""
         source = LaunchSource(STDIN, xml_text.encode(), {})
         self._load(source, _Forwarded(ros_config, core=core, verbose=verbose))
 

@@ -18,7 +18,7 @@ _interactive = [False]
 
 
 def is_interactive() -> bool:
-    """Return the value that set_interactive() has set: whether the process is interactive."""
+    """Return whether the process is interactive, as set by set_interactive()."""
     return _interactive[0]
 
 

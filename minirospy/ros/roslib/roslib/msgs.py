@@ -1,4 +1,4 @@
-"""roslib.msgs: types and definitions, as programs of before genmsg read them, and a table of definitions by name."""
+"""roslib.msgs: types and definitions in the form used before genmsg, and a table of definitions by name."""
 
 from __future__ import annotations
 
@@ -83,11 +83,11 @@ RESERVED_TYPES = [*BUILTIN_TYPES, HEADER]
 
 
 class MsgSpecException(Exception):
-    """A definition cannot be read."""
+    """Raised if a definition cannot be read."""
 
 
 class Constant:
-    """A constant of a message: ``type``, ``name``, ``val`` and the ``val_text`` that defines it."""
+    """A message's constant: ``type``, ``name``, ``val``, and ``val_text``, the value as written in the definition."""
 
     __slots__ = ["name", "type", "val", "val_text"]
 
@@ -112,7 +112,7 @@ class Constant:
 
 
 class Field:
-    """A field of a message: ``name``, ``type``, and what `parse_type` finds in the type."""
+    """A message's field: ``name``, ``type``, and the values that `parse_type` returns for the type."""
 
     def __init__(self, name: str, type: str) -> None:
         self.name = name
@@ -126,7 +126,7 @@ class Field:
 
 
 class MsgSpec:
-    """The definition of a message: its fields' ``types`` and ``names``, its ``constants``, and the ``text``."""
+    """A message's definition: its fields' ``types`` and ``names``, its ``constants``, and its ``text``."""
 
     def __init__(
         self,
@@ -138,7 +138,7 @@ class MsgSpec:
         short_name: str = "",
         package: str = "",
     ) -> None:
-        """Raise MsgSpecException if two fields have the same name."""
+        """Create the definition. Raise MsgSpecException if two fields have the same name."""
         if len(set(names)) != len(names):
             raise MsgSpecException(f"Duplicate field names in message: {names}")
         assert len(types) == len(names), f"len({types}) != len({names})"
@@ -153,7 +153,7 @@ class MsgSpec:
         self._parsed_fields = [Field(name, type_) for name, type_ in zip(names, types, strict=True)]
 
     def fields(self) -> list[tuple[str, str]]:
-        """Return (type, name) of each field."""
+        """Return (type, name) for each field."""
         return list(zip(self.types, self.names, strict=True))
 
     def parsed_fields(self) -> list[Field]:
@@ -182,23 +182,23 @@ class MsgSpec:
 
 
 def is_verbose() -> bool:
-    """Return whether the functions that load definitions print what they do."""
+    """Return whether the functions that load definitions print progress messages."""
     return VERBOSE
 
 
 def set_verbose(v: bool) -> None:
-    """Set whether the functions that load definitions print what they do."""
+    """Set whether the functions that load definitions print progress messages."""
     global VERBOSE  # noqa: PLW0603 - programs read it
     VERBOSE = v
 
 
 def base_msg_type(type_: str | None) -> str | None:
-    """Return a type without the brackets of an array."""
+    """Return a type without array brackets."""
     return type_ if type_ is None else type_.partition("[")[0]
 
 
 def resolve_type(type_: str, package_context: str) -> str:
-    """Return a type with its package, which is ``package_context`` if it has none."""
+    """Return a type with its package; the default package is ``package_context``."""
     base = type_.partition("[")[0]
     if base == HEADER:
         return "std_msgs/Header"
@@ -223,12 +223,12 @@ def parse_type(type_: str) -> tuple[str, bool, int | None]:
 
 
 def is_header_type(type_: str) -> bool:
-    """Return whether a type is the header's."""
+    """Return whether a type is one of the names for std_msgs/Header."""
     return genmsg.is_header_type(type_)
 
 
 def is_valid_msg_field_name(x: str) -> bool:
-    """Return whether a name is a legal field name."""
+    """Return whether a string is a legal field name."""
     return bool(genmsg.is_valid_msg_field_name(x))
 
 
@@ -238,12 +238,15 @@ def list_msg_types(package: str, include_depends: bool) -> list[str]:
 
 
 def msg_file(package: str, type_: str) -> str:
-    """Return the path of a message's file, which need not exist. Raise InvalidROSPkgException if the package does not."""
+    """Return the path to a message's definition file, which need not exist.
+
+    Raise InvalidROSPkgException if the package does not exist.
+    """
     return resource_file(package, "msg", type_ + EXT)
 
 
 def get_pkg_msg_specs(package: str) -> tuple[list[tuple[str, MsgSpec]], list[str]]:
-    """Return (name, definition) of each message of a package, and the names of those that cannot be read."""
+    """Return (name, definition) for each of a package's messages, and the names of messages that cannot be read."""
     _init()
     found: list[tuple[str, MsgSpec]] = []
     failed: list[str] = []
@@ -257,7 +260,7 @@ def get_pkg_msg_specs(package: str) -> tuple[list[tuple[str, MsgSpec]], list[str
 
 
 def load_by_type(msgtype: str, package_context: str = "") -> tuple[str, MsgSpec]:
-    """Return (full name, definition) of a type. Raise MsgSpecException if its package does not exist."""
+    """Return (full name, definition) for a type. Raise MsgSpecException if the type's package does not exist."""
     package, slash, name = msgtype.partition(SEP)
     package, name = (package, name) if slash else (package_context, msgtype)
     try:
@@ -270,7 +273,7 @@ def load_by_type(msgtype: str, package_context: str = "") -> tuple[str, MsgSpec]
 
 
 def load_from_file(file_path: str, package_context: str = "") -> tuple[str, MsgSpec]:
-    """Return (full name, definition) of a file. Raise MsgSpecException if it is invalid."""
+    """Return (full name, definition) for a definition file. Raise MsgSpecException if the file is invalid."""
     if VERBOSE:
         print(
             "Load spec from", file_path, *([f"into package [{package_context}]"] if package_context else [])
@@ -292,9 +295,9 @@ def load_from_file(file_path: str, package_context: str = "") -> tuple[str, MsgS
 def load_from_string(
     text: str, package_context: str = "", full_name: str = "", short_name: str = ""
 ) -> MsgSpec:
-    """Return the definition in a text; types without a package are in ``package_context``.
+    """Return the definition parsed from a string; types without a package belong to ``package_context``.
 
-    Raise MsgSpecException if the text is invalid.
+    Raise MsgSpecException if the string is invalid.
     """
     types: list[str] = []
     names: list[str] = []
@@ -322,7 +325,7 @@ def load_from_string(
 def _constant(type_: str, declared: str, line: str) -> Constant:
     if not is_valid_constant_type(type_):
         raise MsgSpecException(f"{type_} is not a legal constant type")
-    # A text goes to the end of the line, with what looks like a comment.
+    # A string constant extends to the end of the line, including anything that looks like a comment.
     name, _, value = (line if type_ == "string" else declared).strip().partition(" ")[2].partition(CONSTCHAR)
     if type_ != "string" and CONSTCHAR in value:
         raise MsgSpecException(f"Invalid declaration: {declared}")
@@ -333,7 +336,7 @@ def _constant(type_: str, declared: str, line: str) -> Constant:
 
 
 def _convert_val(type_: str, val: str) -> object:
-    """Return a constant's value. Raise MsgSpecException or ValueError if it does not fit its type."""
+    """Return a constant's value. Raise MsgSpecException or ValueError if the value does not match the type."""
     if type_ in ("float32", "float64"):
         return float(val)
     if type_ == "string":
@@ -350,7 +353,7 @@ def _convert_val(type_: str, val: str) -> object:
 
 
 def _strify_spec(spec: MsgSpec, buff: TextIO | None = None, indent: str = "") -> str:
-    """Return a definition with the fields of its messages, which must be registered; write it to ``buff``."""
+    """Return a definition with the fields of the messages that it uses, which must be registered; write it to ``buff``."""
     stream = StringIO() if buff is None else buff
     for constant in spec.constants:
         stream.write(f"{indent}{constant.type} {constant.name}={constant.val_text}\n")
@@ -369,7 +372,7 @@ _initialized = [False]
 
 
 def _init() -> None:
-    """Register the types that every package knows."""
+    """Register the types that are known to every package."""
     if _initialized[0]:
         return
     _initialized[0] = True
@@ -381,7 +384,7 @@ def _init() -> None:
 
 
 def reinit() -> None:
-    """Forget all registered definitions, except those that every package knows."""
+    """Forget all registered definitions, except those that are known to every package."""
     _initialized[0] = False
     _loaded.clear()
     REGISTERED_TYPES.clear()
@@ -389,7 +392,7 @@ def reinit() -> None:
 
 
 def load_package(package: str) -> None:
-    """Register the messages of a package, with and without its name."""
+    """Register a package's messages, both with and without the package's name."""
     _init()
     if VERBOSE:
         print("Load package", package)
@@ -407,7 +410,7 @@ def load_package(package: str) -> None:
 
 
 def load_package_dependencies(package: str, load_recursive: bool = False) -> None:
-    """Register the messages of the packages that a package depends on, with ``load_recursive`` of theirs, too."""
+    """Register the messages of a package's direct dependencies; if ``load_recursive``, also those of the indirect ones."""
     from minirospy.ros.rospkg.rospkg.rospack import RosPack
 
     _init()
@@ -430,7 +433,7 @@ def is_registered(msg_type_name: str) -> bool:
 def get_registered(msg_type_name: str, default_package: str | None = None) -> MsgSpec:
     """Return the definition that is registered under a name, or under that name in ``default_package``.
 
-    Raise KeyError if there is none.
+    Raise KeyError if no definition is registered.
     """
     if msg_type_name not in REGISTERED_TYPES and default_package and SEP not in msg_type_name:
         return REGISTERED_TYPES[f"{default_package}{SEP}{msg_type_name}"]
@@ -445,5 +448,5 @@ def register(msg_type_name: str, msg_spec: MsgSpec) -> None:
 
 
 def _msg_filter(f: str) -> bool:
-    """Return whether a path is that of a message's file."""
+    """Return whether a path is a message definition file."""
     return os.path.isfile(f) and f.endswith(EXT)

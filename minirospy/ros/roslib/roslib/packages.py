@@ -53,7 +53,10 @@ class MultipleNodesException(ROSPkgException):
 def get_pkg_dir(
     package: str, required: bool = True, ros_root: str | None = None, ros_package_path: str | None = None
 ) -> str | None:
-    """Return a package's folder. If there is none, raise InvalidROSPkgException if ``required``, else return None."""
+    """Return a package's folder.
+
+    If the package does not exist, raise InvalidROSPkgException if ``required``, else return None.
+    """
     paths = [path for path in (ros_package_path or "").split(os.pathsep) if path]
     rospack = RosPack([*paths, *RosPack().get_ros_paths()])
     try:
@@ -163,9 +166,9 @@ def _find_resource(d: str, resource_name: str, filter_fn: Callable[[str], bool] 
 def _get_pkg_subdir_by_dir(
     package_dir: str, subdir: str, required: bool = True, env: Mapping[str, str] | None = None
 ) -> str:
-    """Return a folder in a package, given the package's path; create it if it is missing and ``required``.
+    """Return a folder in a package, given the package's path; create the folder if it is missing and ``required``.
 
-    Raise OSError if it cannot be created.
+    Raise OSError if the folder cannot be created.
     """
     path = os.path.join(package_dir, subdir)
     if required:

@@ -40,12 +40,12 @@ class ROSEnvException(ROSLibException):
 
 
 def get_ros_root(required: bool = True, env: Mapping[str, str] | None = None) -> str | None:
-    """Return ROS_ROOT. Raise ROSEnvException if it is ``required`` and not set."""
+    """Return ROS_ROOT. If it is not set, raise ROSEnvException if ``required``, else return None."""
     return _variable(ROS_ROOT, required, env)
 
 
 def get_ros_package_path(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
-    """Return ROS_PACKAGE_PATH. Raise ROSEnvException if it is ``required`` and not set."""
+    """Return ROS_PACKAGE_PATH. If it is not set, raise ROSEnvException if ``required``, else return None."""
     return _variable(ROS_PACKAGE_PATH, required, env)
 
 

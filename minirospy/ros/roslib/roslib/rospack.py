@@ -27,12 +27,12 @@ warnings.warn("roslib.rospack is deprecated, please use rospkg", stacklevel=2)
 
 
 def rospackexec(args: Sequence[str]) -> str:
-    """Return what `rospack` prints to stdout with these arguments, stripped: an empty string if it fails."""
+    """Return the stripped stdout of `rospack` run with these arguments, or an empty string if it fails."""
     return _output("main", args)
 
 
 def rosstackexec(args: Sequence[str]) -> str:
-    """Return what `rosstack` prints to stdout with these arguments, stripped: an empty string if it fails."""
+    """Return the stripped stdout of `rosstack` run with these arguments, or an empty string if it fails."""
     return _output("rosstack", args)
 
 

@@ -61,7 +61,7 @@ def list_stacks(env: Mapping[str, str] | None = None) -> list[str]:
 
 
 def get_stack_dir(stack: str, env: Mapping[str, str] | None = None) -> str:
-    """Return the folder of a stack or metapackage. Raise InvalidROSStackException if there is none."""
+    """Return the folder of a stack or metapackage. Raise InvalidROSStackException if neither exists."""
     folders = _stacks(env)
     if stack in folders:
         return folders[stack]
@@ -80,7 +80,7 @@ def get_stack_version(stack: str, env: Mapping[str, str] | None = None) -> str |
 
 
 def stack_of(pkg: str, env: Mapping[str, str] | None = None) -> str | None:
-    """Return the stack that contains a package, or None if none does.
+    """Return the stack that contains a package, or None if no stack contains it.
 
     Raise InvalidROSPkgException if there is no such package.
     """
@@ -135,7 +135,7 @@ def _packages(env: Mapping[str, str] | None) -> dict[str, str]:
 
 
 def get_stack_version_by_dir(stack_dir: str) -> str | None:
-    """Return the version of the stack in a folder: that of its stack.xml, else that of its CMakeLists.txt, else None."""
+    """Return the version of the stack in a folder, from its stack.xml, else from its CMakeLists.txt, else None."""
     from minirospy.ros.rospkg.rospkg.manifest import parse_manifest_file
 
     if os.path.isfile(os.path.join(stack_dir, STACK_FILE)):
@@ -150,7 +150,7 @@ def get_stack_version_by_dir(stack_dir: str) -> str | None:
 
 
 def _get_cmake_version(text: str) -> str | None:
-    """Return the version in the `rosbuild_make_distribution` of a CMakeLists.txt; None if it has none."""
+    """Return the version in the `rosbuild_make_distribution` of a CMakeLists.txt, or None if it has no version."""
     for line in text.split("\n"):
         if line.strip().startswith("rosbuild_make_distribution"):
             return line.partition("(")[2].partition(")")[0] or None

@@ -328,7 +328,7 @@ async def _run(
 
 
 def _status(environment: Environment, port: int) -> int:
-    """Print one line about the running master. For ROS's rosmaster, the information comes from calls to its API."""
+    """Print one line about the running master. For ROS's rosmaster, the information is obtained by calling its API."""
     host = environment.master_address[0]
     uri = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     master = MasterProxy(uri, "/master_status")
@@ -441,7 +441,7 @@ def _port_error(name: str, host: str, port: int, journal: Path | None, error: OS
                 f"port {port} is taken by another program{late if isinstance(failure, RpcTimeout) else ''}: "
                 f"choose one with `{name} -p PORT`"
             )
-        # The master is running, because its journal is still locked; it just does not respond.
+        # The master is running, because its journal is still locked, but it does not respond.
         silence = (
             f"; it{f' (pid {pid})' if pid else ''} does not answer: it is suspended, or reads a large journal"
         )
@@ -469,7 +469,7 @@ def _holder(path: Path) -> int | None:
 
 
 def _quiet(line: str) -> None:
-    """Discard a line about a registration."""
+    """Discard a log line about a registration."""
 
 
 class _Shown(logging.Handler):
@@ -492,7 +492,7 @@ def _log_to_file(
 ) -> tuple[Path | None, Callable[[str], object]]:
     """Log to ``folder``/master.log; ``latest`` next to the folder links to it if links are supported.
 
-    Return the file, and the function that logs registrations. If it cannot be written, the master runs without a log.
+    Return the file, and the function that logs registrations. If the file cannot be written, the master runs without a log.
     """
     path = folder / "master.log"
     logger = logging.getLogger("minirospy")

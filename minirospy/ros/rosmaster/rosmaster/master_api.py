@@ -45,18 +45,18 @@ _logger = logging.getLogger("rosmaster.master")
 
 
 def mloginfo(msg: str, *args: object) -> None:
-    """Log a message of the master."""
+    """Log a message from the master."""
     _logger.info(msg, *args)
 
 
 def mlogwarn(msg: str, *args: object) -> None:
-    """Log and print a warning of the master."""
+    """Log and print a warning from the master."""
     _logger.warning(msg, *args)
     print("WARN: " + (msg % args if args else str(msg)))
 
 
 def publisher_update_task(api: str, topic: str, pub_uris: Sequence[str]) -> None:
-    """Send the URIs of a topic's publishers to the node at ``api``. Raise OSError if it does not respond."""
+    """Send the URIs of a topic's publishers to the node at ``api``. Raise OSError if the node does not respond."""
     node: Any = xmlrpcapi(api)
     call = f"publisherUpdate[{topic}] -> {api} {pub_uris}"
     mloginfo(call)
@@ -72,7 +72,7 @@ def publisher_update_task(api: str, topic: str, pub_uris: Sequence[str]) -> None
 
 
 def service_update_task(api: str, service: str, uri: str) -> None:
-    """Send a service's URI to the node at ``api``. Raise OSError if it does not respond."""
+    """Send a service's URI to the node at ``api``. Raise OSError if the node does not respond."""
     node: Any = xmlrpcapi(api)
     mloginfo("serviceUpdate[%s, %s] -> %s", service, uri, api)
     node.serviceUpdate(_CALLER_ID, service, uri)

@@ -75,7 +75,7 @@ class ParamDictionary:
         return self._tree.subscribe(key, caller_id, uri)
 
     def unsubscribe_param(self, key: str, unregistration_args: tuple[str, str]) -> tuple[int, str, int]:
-        """Unsubscribe (node, API); return the Master API's response."""
+        """Unsubscribe (node, API) from a parameter; return the Master API's response."""
         caller_id, uri = unregistration_args
         shown = key if key.endswith("/") else f"{key}/"
         if self._tree.unsubscribe(key, caller_id, uri):
@@ -100,7 +100,8 @@ def compute_param_updates(
 ) -> list[tuple[list[tuple[str, str]], str, object]]:
     """Return ([(node, API)], key, value) for each subscribed key that setting ``param_key`` changes.
 
-    ``subscribers``: subscribed key -> [(node, API)], with ``iterkeys()`` as rosmaster's tables, or a dictionary.
+    ``subscribers`` maps each subscribed key to [(node, API)]. It is a dictionary, or a table with ``iterkeys()`` as in
+    rosmaster.
     """
     if not subscribers:
         return []
@@ -114,7 +115,7 @@ def compute_param_updates(
             nodes = [each for each in subscribers[subscribed] if each[0] != caller_id_to_ignore]
             updates.append((nodes, param_key, param_value))
         elif keys is not None and namespace.startswith(param_key) and subscribed not in keys:
-            updates.append((subscribers[subscribed], subscribed, {}))  # it was deleted
+            updates.append((subscribers[subscribed], subscribed, {}))  # the parameter was deleted
     for key in keys or ():
         if key in subscribers:
             value: Any = param_value
@@ -127,7 +128,7 @@ def compute_param_updates(
 def _compute_all_keys(
     param_key: str, param_value: dict[str, Any], all_keys: list[str] | None = None
 ) -> list[str]:
-    """Return the keys, each with a slash at its end, of a dictionary's values and namespaces below ``param_key``."""
+    """Return the keys of all values and namespaces in a dictionary set at ``param_key``, each with a trailing slash."""
     found = [] if all_keys is None else all_keys
     for name, value in param_value.items():
         key = f"{param_key.rstrip(SEP)}{SEP}{name}{SEP}"

@@ -60,7 +60,7 @@ class Registrations:
         return [api for _, api in self[key]]
 
     def get_service_api(self, service: str) -> str | None:
-        """Return a service's address, or None if it is not registered."""
+        """Return a service's address, or None if the service is not registered."""
         return (self.service_api_map or {}).get(service, ("", None))[1]
 
     def get_state(self) -> list[list[object]]:
@@ -156,7 +156,7 @@ class NodeRef:
 
 
 def shutdown_node_task(api: str, caller_id: str, reason: str) -> None:
-    """Request that a node shut down. Ignore a node that does not respond, because it has already exited."""
+    """Request that a node shut down. Ignore a node that does not respond, because it has probably exited already."""
     with contextlib.suppress(OSError, Error):
         if node := xmlrpcapi(api):
             node.shutdown("/master", f"[{caller_id}] Reason: {reason}")

@@ -18,7 +18,10 @@ class _Task(NamedTuple):
 
 
 class MarkedThreadPool:
-    """Runs tasks in daemon threads, in order. The marker is a node, so that a slow node occupies only one thread."""
+    """Runs tasks in daemon threads, in order, at most one at a time per marker.
+
+    The master uses a node's URI as the marker, so that a slow node occupies only one thread.
+    """
 
     def __init__(self, numThreads: int) -> None:
         self._changed = threading.Condition()

@@ -15,7 +15,7 @@ __all__ = [
     "xmlrpcapi",
 ]
 
-_CLOSE_WAIT = 8  # Linux: the other end has closed the connection
+_CLOSE_WAIT = 8  # TCP state CLOSE_WAIT in Linux: the peer has closed the connection
 
 
 class _Proxies(threading.local):
@@ -27,7 +27,7 @@ _PROXIES = _Proxies()
 
 
 def xmlrpcapi(uri: str | None) -> ServerProxy | None:
-    """Return the proxy for a URI, or None if the URI has no host. Raise OSError if it is not an http URI."""
+    """Return the proxy for a URI, or None if the URI has no host. Raise OSError if the URI is not an http URI."""
     if uri is None or not urlparse(uri).netloc:
         return None
     if uri not in _PROXIES.by_uri:

@@ -1,6 +1,6 @@
 """rosmsg-proto: print a message or request with default values as YAML, for completion in shells and editors.
 
-Source: `rosmsg-proto -h` of ROS 1. Output and exit statuses are the same.
+Source: the output of `rosmsg-proto -h` in ROS 1. Output and exit statuses are the same as in ROS.
 """
 
 from __future__ import annotations

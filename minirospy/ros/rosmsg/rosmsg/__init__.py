@@ -302,12 +302,12 @@ def _add_single_line(parser: OptionParser, listed: str) -> None:
 
 
 def _parse(parser: OptionParser, argv: Sequence[str] | None) -> tuple[Values, list[str]]:
-    """Parse a command line that starts with the verb; the default is that of this process."""
+    """Parse a command line that starts with the verb, by default this process's command line."""
     return parser.parse_args(list(sys.argv[1:] if argv is None else argv)[1:])
 
 
 def _stdin_arg(parser: OptionParser, full: object) -> tuple[Values, str]:
-    """Return the options and the only name of this process's command line; without a name, read it from stdin."""
+    """Return the options and the only name on this process's command line; if there is no name, read it from stdin."""
     options, words = parser.parse_args(sys.argv[2:])
     if len(words) > 1:
         parser.error(f"you may only specify one {full}")
@@ -316,11 +316,11 @@ def _stdin_arg(parser: OptionParser, full: object) -> tuple[Values, str]:
     for line in sys.stdin:
         if line.strip():
             return options, line.strip()
-    raise EOFError("no name on standard input")  # ROS reads on for ever
+    raise EOFError("no name on standard input")  # ROS would loop forever
 
 
 def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) -> list[str]:
-    """Return the names in a folder whose path ``rfilter`` accepts; none if the folder does not exist."""
+    """Return the names in a folder whose paths ``rfilter`` accepts, or [] if the folder does not exist."""
     if not os.path.isdir(path):
         return []
     return [name for name in os.listdir(path) if rfilter(os.path.join(path, name))]

@@ -143,7 +143,7 @@ def _no_answer(error: NodeUnreachableError) -> str:
 
 
 def _ping_once(graph: Graph, node: NodeAddress, times: list[float]) -> None:
-    """Ping and print the time. Append the milliseconds to ``times`` before printing, in case Ctrl-C is pressed."""
+    """Ping a node and print the time. Append the milliseconds to ``times`` before printing, in case Ctrl-C is pressed."""
     times.append(ping_node(graph, node, _PING_SECONDS) * 1000.0)
     print(f"xmlrpc reply from {node.uri}\ttime={times[-1]:f}ms", flush=True)
 

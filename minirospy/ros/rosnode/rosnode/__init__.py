@@ -86,7 +86,7 @@ def get_api_uri(master: masterapi.Master, caller_id: str, skip_cache: bool = Fal
 
 
 def lookup_uri(master: masterapi.Master, system_state: Sequence[Any], topic: str, uri: str) -> str:
-    """Return `NODE (URI)` for the node of a topic in the master's ``system_state`` that has this URI; else the URI."""
+    """Return `NODE (URI)` for the node with this URI that uses a topic in the master's ``system_state``, else the URI."""
     from minirospy.ros.rostopic.rostopic import get_api
 
     for rows in system_state[:2]:
@@ -125,10 +125,10 @@ def get_node_connection_info_description(node_api: str, master: masterapi.Master
 def rosnode_ping(
     node_name: str, max_count: int | None = None, verbose: bool = False, skip_cache: bool = False
 ) -> bool:
-    """Return whether a node responds to ``max_count`` pings. With None, ping until one fails.
+    """Return whether a node responds to ``max_count`` pings. If ``max_count`` is None, ping until a ping fails.
 
     Raise ROSNodeIOException if the master does not respond. The reason for a failure is always printed to stderr,
-    everything else only with ``verbose``.
+    everything else only if ``verbose``.
     """
     with _graph() as graph:
         name = graph.resolve(node_name)
@@ -221,7 +221,7 @@ def get_machines_by_nodes() -> list[str]:
 
 
 def get_nodes_by_machine(machine: str) -> list[str]:
-    """Return the nodes on a machine. Raise ROSNodeException if its name cannot be resolved."""
+    """Return the nodes on a machine. Raise ROSNodeException if the machine's name cannot be resolved."""
     try:
         wanted = socket.gethostbyname(machine)
     except OSError as error:
@@ -240,7 +240,7 @@ def rosnode_listnodes(namespace: str | None = None, list_uri: bool = False, list
 
 
 def rosnode_info(node_name: str, quiet: bool = False) -> None:
-    """Print the output of `rosnode info`; with ``quiet``, do not query the node.
+    """Print the output of `rosnode info`; if ``quiet``, do not query the node.
 
     Raise ROSNodeIOException if the master does not respond.
     """
@@ -303,7 +303,7 @@ _rosnode_cmd_ping = _verb("ping")
 
 
 def _rosnode_cmd_kill(argv: Sequence[str]) -> int:
-    """Run `rosnode kill`; return its status. Raise ROSNodeException if a name is no node."""
+    """Run `rosnode kill`; return its status. Raise ROSNodeException if a name is not a node's name."""
     names = [script_resolve_name(ID, word) for word in argv[2:] if not word.startswith("-")]
     if names:
         try:

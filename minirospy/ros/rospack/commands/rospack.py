@@ -67,12 +67,12 @@ class _Tool(NamedTuple):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command; return 1 if rospack would."""
+    """Run the command; return 1 in the cases in which ROS's rospack does."""
     return _run(_Tool("rospack", "package", _VERBS), argv)
 
 
 def rosstack(argv: Sequence[str] | None = None) -> int:
-    """Run the command rosstack; return 1 if rosstack would."""
+    """Run the command rosstack; return 1 in the cases in which ROS's rosstack does."""
     return _run(_Tool("rosstack", "stack", _STACK_VERBS), argv)
 
 
@@ -145,7 +145,7 @@ def _parse(words: list[str], tool: _Tool) -> _Line:
 
 
 def _checked(line: _Line, tool: _Tool) -> _Verb:
-    """Return a command line's verb. Raise _RospackError if it does not exist or does not support the options."""
+    """Return a command line's verb. Raise _RospackError if the verb does not exist or does not support the options."""
     verb = tool.verbs.get(line.verb)
     if verb is None:
         raise _RospackError(f"command {line.verb} not implemented{did_you_mean(line.verb, tool.verbs)}")

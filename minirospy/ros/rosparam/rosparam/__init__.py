@@ -123,7 +123,7 @@ def set_param_raw(param: str, value: object, verbose: bool = False) -> None:
 
 
 def _with_bytes(value: object) -> object:
-    """Return a value with each Binary replaced by bytes, and numpy's numbers and arrays by Python's."""
+    """Return a value with each Binary replaced by bytes, and numpy numbers and arrays replaced by Python numbers and lists."""
     if is_numpy(value):
         return _with_bytes(value.tolist())  # type: ignore[attr-defined]
     if isinstance(value, Binary):
@@ -279,7 +279,7 @@ def _rosparam_cmd_set_load(cmd: str, argv: Sequence[str]) -> None:
 
 
 def _rosparam_cmd_get_param(param: str, pretty: bool = False, verbose: bool = False) -> None:
-    """Print a parameter as `rosparam get` does. Raise RosParamException if it is not set."""
+    """Print a parameter as `rosparam get` does. Raise RosParamException if the parameter is not set."""
     if verbose:
         print(f"getting parameter [{param}]")
     try:
@@ -290,13 +290,13 @@ def _rosparam_cmd_get_param(param: str, pretty: bool = False, verbose: bool = Fa
 
 
 def _pretty_print(value: dict[str, object], indent: str = "") -> None:
-    """Print a dictionary as `rosparam get -p` does: texts of several lines as they are."""
+    """Print a dictionary as `rosparam get -p` does; strings with several lines are printed unchanged."""
     if value:
         print(format_pretty(_with_bytes(value), indent))
 
 
 def _set_optparse_neg_args(parser: OptionParser, argv: Sequence[str]) -> tuple[Values, list[str]]:
-    """Return the options and values of a command line of `rosparam set`, whose values may be negative numbers."""
+    """Return the options and values on a command line of `rosparam set`, whose values may be negative numbers."""
     values: list[str] = []
     options: list[str] = []
     takes_value = False
@@ -310,18 +310,18 @@ def _set_optparse_neg_args(parser: OptionParser, argv: Sequence[str]) -> tuple[V
 
 
 def _get_caller_id() -> str:
-    """Return the caller id of this process's calls to the master."""
+    """Return the caller id for this process's calls to the master."""
     from minirospy.ros.rosgraph.rosgraph.names import make_caller_id
 
     return make_caller_id(f"rosparam-{os.getpid()}")
 
 
 pattern = re.compile(r"^rad\([^\)]*\)$")
-"""The last of the two patterns by which ROS recognizes angles."""
+"""The last of the two patterns by which ROS recognizes angles; programs use this name."""
 
 
 def construct_angle_degrees(loader: Any, node: Any) -> float:
-    """Return `deg(90)` or the number in a node of YAML as radians. Raise RosParamException if it is not a number."""
+    """Return the value of `deg(90)`, or of a number, in a YAML node in radians. Raise RosParamException if it is not a number."""
     value = loader.construct_scalar(node)
     try:
         return math.radians(arithmetic(value.strip()[4:-1] if value.startswith("deg(") else value))
@@ -330,9 +330,10 @@ def construct_angle_degrees(loader: Any, node: Any) -> float:
 
 
 def construct_angle_radians(loader: Any, node: Any) -> float:
-    """Return the value of an expression such as `rad(pi/2)` in a node of YAML.
+    """Return the value of an expression such as `rad(pi/2)` in a YAML node.
 
-    Raise RosParamException if it is none. Unlike ROS, which runs it as Python, read arithmetic with `pi` only.
+    Raise RosParamException if the expression is invalid. Only arithmetic with `pi` is evaluated, whereas ROS runs the
+    expression as Python code.
     """
     value = loader.construct_scalar(node).strip()
     try:
@@ -342,22 +343,23 @@ def construct_angle_radians(loader: Any, node: Any) -> float:
 
 
 def construct_yaml_binary(loader: Any, node: Any) -> Binary:
-    """Return bytes in a node of YAML as xmlrpc.client.Binary."""
+    """Return the bytes in a YAML node as an xmlrpc.client.Binary."""
     return Binary(loader.construct_yaml_binary(node))
 
 
 def represent_xml_binary(loader: Any, data: Binary) -> Any:
-    """Return a node of YAML for an xmlrpc.client.Binary."""
+    """Return the YAML node for an xmlrpc.client.Binary."""
     encoded = base64.b64encode(data.data).decode()
     return loader.represent_scalar("tag:yaml.org,2002:binary", encoded, style="|")
 
 
 def represent_foo(loader: Any, data: str) -> Any:
-    """Return a node of YAML with the tag `#`."""
+    """Return a YAML node with the tag `#`."""
     return loader.represent_scalar("#", data)
 
 
-# Programs that import rosparam can read deg(90) and rad(pi/2), and get bytes as Binary, with PyYAML's own loaders, as in ROS.
+# As in ROS, programs that import rosparam can read deg(90) and rad(pi/2), and get bytes as Binary, with PyYAML's own
+# loaders.
 for _loader in (yaml.SafeLoader, yaml.FullLoader, yaml.Loader):
     add_angles(_loader)
     _loader.add_constructor("!degrees", construct_angle_degrees)

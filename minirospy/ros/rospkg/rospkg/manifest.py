@@ -93,7 +93,7 @@ def _people(read: manifest.Manifest) -> str:
 def parse_manifest_file(dirpath: str, manifest_name: str = PACKAGE_FILE, rospack: object = None) -> Manifest:
     """Return a folder's parsed package.xml. Every dependency in it counts as a package.
 
-    Raise InvalidManifest if it cannot be parsed.
+    Raise InvalidManifest if the package.xml cannot be parsed.
     """
     from minirospy.workspace.manifest import read_manifest
 

@@ -130,11 +130,11 @@ class OsDetector:
         raise NotImplementedError("is_os unimplemented")
 
     def get_version(self) -> str:
-        """Return the system's version. Raise OsNotDetected if this is not the system that is running."""
+        """Return the system's version. Raise OsNotDetected if this is not the OS that is running."""
         raise NotImplementedError("get_version unimplemented")
 
     def get_codename(self) -> str:
-        """Return the system's codename. Raise OsNotDetected if this is not the system that is running."""
+        """Return the system's codename. Raise OsNotDetected if this is not the OS that is running."""
         raise NotImplementedError("get_codename unimplemented")
 
 
@@ -150,11 +150,11 @@ class FdoDetect(OsDetector):
         return self.release_info is not None
 
     def get_version(self) -> str:
-        """Return VERSION_ID. Raise OsNotDetected if this is not the system that is running."""
+        """Return VERSION_ID. Raise OsNotDetected if this is not the OS that is running."""
         return self._info().get("VERSION_ID", "")
 
     def get_codename(self) -> str:
-        """Return VERSION_CODENAME. Raise OsNotDetected if this is not the system that is running."""
+        """Return VERSION_CODENAME. Raise OsNotDetected if this is not the OS that is running."""
         release = self._info()
         codename = release.get("VERSION_CODENAME", "")
         if not codename and "(" in (version := release.get("VERSION", "")):

@@ -63,7 +63,7 @@ class ManifestManager:
         return self.ros_paths
 
     def list(self) -> Names:
-        """Return the names, sorted."""
+        """Return the names of all packages or stacks, sorted."""
         return list(self._folders())
 
     def get_path(self, name: str) -> str:
@@ -81,7 +81,7 @@ class ManifestManager:
         return Manifest(self._read(name), *self._split(name))
 
     def get_depends(self, name: str, implicit: bool = True) -> Names:
-        """Return a package's direct dependencies; with ``implicit``, also the indirect ones.
+        """Return a package's direct dependencies; if ``implicit``, also the indirect ones.
 
         Raise ResourceNotFound if a package does not exist, InvalidManifest if a manifest cannot be parsed.
         """
@@ -93,7 +93,7 @@ class ManifestManager:
         return list(found)
 
     def get_depends_on(self, name: str, implicit: bool = True) -> Names:
-        """Return the packages that depend on this one directly; with ``implicit``, also those that depend on it indirectly."""
+        """Return the packages that depend on this one directly; if ``implicit``, also those that depend on it indirectly."""
         found = []
         for other in self._folders():
             try:
@@ -148,7 +148,7 @@ class RosPack(ManifestManager):
     """Finds packages."""
 
     def get_rosdeps(self, package: str, implicit: bool = True) -> Names:
-        """Return a package's dependencies that are not packages; with ``implicit``, also those of packages it depends on.
+        """Return a package's dependencies that are not packages; if ``implicit``, also those of the packages it depends on.
 
         Raise ResourceNotFound if a package does not exist, InvalidManifest if a manifest cannot be parsed.
         """
@@ -199,7 +199,7 @@ def list_by_path(manifest_name: str, path: str, cache: dict[str, str]) -> list[s
 
 
 def get_package_name(path: str) -> str | None:
-    """Return the package that contains a path, or None if there is none."""
+    """Return the package that contains a path, or None if no package contains it."""
     place = Path(path).absolute()
     return next(filter(None, map(package_name, (place, *place.parents))), None)
 

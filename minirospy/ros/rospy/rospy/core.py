@@ -131,7 +131,7 @@ def _base_logger(
     level: str = "info",
     once: bool = False,
 ) -> None:
-    """Log with the source position of the caller's caller, as rospy's log functions do; programs wrap this function similarly.
+    """Log with the source position of the caller's caller. rospy's log functions wrap this function, and programs may do so, too.
 
     ``level`` is a logging.Logger method name (``warning``), ``kwargs`` may contain ``logger_name``.
     """
@@ -205,7 +205,7 @@ def parse_rosrpc_uri(uri: str) -> tuple[str, int]:
 
 
 def is_topic(param_name: str) -> Validator:
-    """Return a check that the argument ``param_name`` is a topic name. The check raises ParameterInvalid if it is not."""
+    """Return a check that the argument ``param_name`` is a topic name. The check raises ParameterInvalid for other values."""
     resolved = valid_name(param_name)
 
     def check(param_value: object, caller_id: str) -> str:

@@ -1,6 +1,6 @@
 """rospy's internal variables that programs read and set, as properties of their modules.
 
-`import rospy` imports this module last, because it needs the others.
+`import rospy` imports this module last, because this module needs the others.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _Put = Callable[[Any], object]
 
 
 def _install(module: ModuleType, **names: tuple[_Get, _Put]) -> None:
-    """Add attributes to ``module``; for each, ``names`` has a function that returns its value, and one that sets it.
+    """Add attributes to ``module``. ``names`` maps each attribute to two functions: one returns its value, the other sets it.
 
     Deleting an attribute restores its previous value, because unittest.mock deletes it at the end of a patch.
     """
@@ -91,7 +91,7 @@ _install(
         lambda: _identity().remappings,
         lambda value: setattr(_identity(), "remappings", value),
     ),
-    # A new name keeps the namespace, as in rospy, where the two are separate variables.
+    # Setting a new name keeps the namespace, as in rospy, which stores the two in separate variables.
     _caller_id=(
         lambda: _identity().name,
         lambda value: _identity().be_called(value, _identity().namespace),

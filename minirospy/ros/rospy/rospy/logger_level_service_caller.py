@@ -50,7 +50,7 @@ class LoggerLevelServiceCaller:
         return self._current_loggers
 
     def send_logger_change_message(self, node: str, logger: str, level: str) -> bool:
-        """Set a level; return False if it was already set according to get_loggers().
+        """Set a level; return False if get_loggers() has reported this level already.
 
         Raise rosservice.ROSServiceException if the call fails.
         """

@@ -37,7 +37,8 @@ _master_arg_remap = {
         "unregisterSubscriber",
         "unsubscribeParam",
     )
-}  # method -> the positions of its arguments that are names of graph resources, without the caller's name
+}
+"""Maps each method to the positions of its arguments that are graph resource names, not counting the caller's name."""
 
 
 class ServerProxy:
@@ -77,8 +78,8 @@ class MasterProxy:
 
     Results are ``[status code, text, value]``: ``code, _, uri = rospy.get_master().lookupNode("talker")``.
     ``proxy[key]``, ``proxy[key] = value``, ``del proxy[key]`` (KeyError), ``key in proxy`` and iteration
-    access the parameters. A program may replace ``target``. Errors: see :class:`ServerProxy`, and ROSException if the
-    master refuses a question about parameters.
+    access the parameters. A program may replace ``target``. Calls raise the same errors as :class:`ServerProxy`, and
+    ROSException if the master rejects a call about parameters.
     """
 
     def __init__(self, uri: str) -> None:
@@ -124,13 +125,13 @@ class MasterProxy:
         return iter(value)
 
     def search_param(self, key: str) -> str | None:
-        """Return the name of the closest parameter, searched upwards from this node's namespace, or None if there is none."""
+        """Return the name of the closest parameter, searched upwards from this node's namespace, or None if none is found."""
         check_sendable(key)
         code, _, value = self.target.searchParam(current_session().name, key)
         return value if code == 1 else None
 
     def get_param_cached(self, key: str) -> Any:
-        """Return a parameter's value from this node's cache. Raise KeyError if it is not set."""
+        """Return a parameter's value from this node's cache. Raise KeyError if the parameter is not set."""
         return get_param_cached(key)
 
 
@@ -141,13 +142,13 @@ def get_master(env: Mapping[str, str] = os.environ) -> MasterProxy:
 
 
 def xmlrpcapi(uri: str | None, cache: bool = True) -> ServerProxy | None:
-    """Return a proxy for the XML-RPC server at ``uri``, the same one on each call, or None if ``uri`` is invalid."""
+    """Return a proxy for the XML-RPC server at ``uri``, or None if ``uri`` is invalid. Each call returns the same proxy."""
     if not uri or not uri.startswith(("http://", "rosrpc://")):
         return None
     return _server(uri, os.getpid()) if cache else ServerProxy(uri)
 
 
-# Cache it per process, because a forked child must not use its parent's connections.
+# Cache the proxy per process, because a forked child must not use its parent's connections.
 @functools.cache
 def _master(uri: str, pid: int) -> MasterProxy:
     return MasterProxy(uri)

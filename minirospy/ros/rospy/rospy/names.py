@@ -66,7 +66,7 @@ __all__ = [
 
 
 def _set_caller_id(caller_id: str) -> None:
-    """Use another node name, without telling the master. Raise ValueError if ``caller_id`` is None."""
+    """Change the node's name without notifying the master. Raise ValueError if ``caller_id`` is None."""
     namespace(caller_id)
     current_session().identity.be_called(caller_id)
 
@@ -74,7 +74,7 @@ def _set_caller_id(caller_id: str) -> None:
 ANYTYPE = TOPIC_ANYTYPE = SERVICE_ANYTYPE = "*"
 
 Validator = Callable[[object, str], str]
-"""Checks an argument of a call from the node ``caller_id``, and returns the value to use."""
+"""A function that checks an argument of a call from the node ``caller_id``, and returns the value to use."""
 
 
 class ParameterInvalid(Exception):
@@ -97,7 +97,7 @@ def get_mappings() -> dict[str, str]:
 
 
 def get_resolved_mappings() -> dict[str, str]:
-    """Return the remappings with global names; empty before init_node. Changes to the dict apply at once."""
+    """Return the remappings with global names; empty before init_node. Changes to the dict take effect immediately."""
     return current_session().identity.remappings
 
 
@@ -107,7 +107,7 @@ def reload_mappings(argv: Sequence[str]) -> None:
 
 
 def initialize_mappings(node_name: str) -> None:
-    """Resolve the remappings again, with the node name ``node_name``. Raise ValueError if it is None."""
+    """Resolve the remappings again, with the node name ``node_name``. Raise ValueError if ``node_name`` is None."""
     namespace(node_name)
     identity = current_session().identity
     identity.remappings = identity.resolved_mappings(node_name)
@@ -128,7 +128,7 @@ def scoped_name(caller_id: str, name: str) -> str:
 
 
 def global_name(param_name: str) -> Validator:
-    """Return a check that the argument ``param_name`` is a global name. The check raises ParameterInvalid if it is not."""
+    """Return a check that the argument ``param_name`` is a global name. The check raises ParameterInvalid for other values."""
 
     def validator(param_value: object, caller_id: str) -> str:
         text = _text(param_name, param_value)
@@ -149,12 +149,12 @@ def valid_name(param_name: str, resolve: bool = True) -> Validator:
 
 
 def valid_name_validator_resolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return an argument's global name without remapping it. Raise ParameterInvalid if it is not a valid name."""
+    """Return an argument's global name without remapping it. Raise ParameterInvalid if the argument is not a valid name."""
     return resolve_name_for(valid_name_validator_unresolved(param_name, param_value, caller_id), caller_id)
 
 
 def valid_name_validator_unresolved(param_name: str, param_value: object, caller_id: str) -> str:
-    """Return an argument unchanged. Raise ParameterInvalid if it is not a valid name."""
+    """Return an argument unchanged. Raise ParameterInvalid if the argument is not a valid name."""
     text = _text(param_name, param_value)
     if ":" in text or " " in text:
         raise ParameterInvalid(f"ERROR: parameter [{param_name}] contains illegal chars")

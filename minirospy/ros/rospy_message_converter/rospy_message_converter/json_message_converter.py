@@ -23,7 +23,7 @@ def convert_json_to_ros_message(
 ) -> object:
     """Convert a JSON object to a message of the given type.
 
-    Raise ValueError or TypeError if it does not match the type, NotFoundError if the type is unknown.
+    Raise ValueError or TypeError if the object does not match the type, NotFoundError if the type is unknown.
     """
     return convert_dictionary_to_ros_message(
         message_type,

@@ -46,8 +46,8 @@ def convert_dictionary_to_ros_message(
 ) -> Any:
     """Convert a dict to a message of the given type, for example std_msgs/String.
 
-    ``kind``: "message", or "request" or "response" of a service. Unknown fields raise ValueError; without ``strict_mode``
-    they are only logged. With ``check_missing_fields``, a field without a value raises ValueError; with ``check_types``,
+    ``kind``: "message", or "request" or "response" of a service. Unknown fields raise ValueError; unless ``strict_mode``,
+    they are only logged. If ``check_missing_fields``, a field without a value raises ValueError; if ``check_types``,
     a value of another type raises TypeError. Raise NotFoundError if the type is unknown.
     """
     if kind == "message":
@@ -76,7 +76,7 @@ def convert_dictionary_to_ros_message(
 def convert_ros_message_to_dictionary(
     message: Message, binary_array_as_bytes: bool = True
 ) -> dict[str, object]:
-    """Convert a message to a dict. Byte arrays become base64 strings; without ``binary_array_as_bytes`` they become lists."""
+    """Convert a message to a dict. Byte arrays become base64 strings; if not ``binary_array_as_bytes``, they become lists."""
     return {
         name: _from_ros(type_, getattr(message, name), binary_array_as_bytes)
         for name, type_ in zip(message.__slots__, message._slot_types, strict=True)

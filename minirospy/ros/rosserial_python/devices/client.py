@@ -60,11 +60,11 @@ _VERSIONS = {
 }
 _OPEN_SECONDS = 3.0
 _READY_SECONDS = 0.1
-_BOOT_SECONDS = 2.0  # to let a device boot; an Arduino restarts when its port is opened
+_BOOT_SECONDS = 2.0  # seconds for a device to boot, because an Arduino restarts when its port is opened
 
 
 class SerialClient:
-    """A device. ``port``: a port name, or an object with ``read``, ``write`` and ``inWaiting``."""
+    """A device on a port. ``port`` is a port name, or an object with ``read``, ``write`` and ``inWaiting``."""
 
     header = b"\xff"
     protocol_ver1 = b"\xff"
@@ -132,7 +132,7 @@ class SerialClient:
         rospy.loginfo("shutdown hook activated")
         self._ended.set()
 
-    # --- the line
+    # --- serial connection
 
     def run(self) -> None:
         """Forward messages until the node is shut down. Raise PortError if the connection is lost."""
@@ -255,7 +255,7 @@ class SerialClient:
         except (rospy.ROSException, MinirospyError, ValueError, KeyError, TypeError) as error:
             rospy.logerr("A message of topic id %d is dropped: %s", packet.topic_id, error)
 
-    # --- what a device sends
+    # --- messages from the device
 
     def setPublishSize(self, size: int) -> None:
         """Set the size of the device's output buffer; only the first call has an effect."""
@@ -413,7 +413,7 @@ def _info(data: bytes) -> TopicInfo:
 
 
 class _Creation:
-    """A context manager that logs why a topic or service cannot be created, and suppresses the error."""
+    """A context manager that logs the reason why a topic or service cannot be created, and suppresses the error."""
 
     def __init__(self, what: str) -> None:
         self._what = what

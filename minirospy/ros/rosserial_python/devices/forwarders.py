@@ -1,7 +1,7 @@
 """rosserial_python's own classes for a device's topics and services, for programs that read a device's bytes themselves.
 
-They have the constructors and methods of ROS's: ``parent`` is an object with ``send(topic_id, data)``, such as a
-SerialClient. A SerialClient uses those of minirospy.ros.rosserial_python.devices.endpoints. Source:
+The classes have the constructors and methods of ROS's classes: ``parent`` is an object with ``send(topic_id, data)``, such as
+a SerialClient. A SerialClient itself uses the classes in minirospy.ros.rosserial_python.devices.endpoints. Source:
 http://wiki.ros.org/rosserial_python.
 """
 
@@ -31,14 +31,17 @@ __all__ = [
 
 
 class Parent(Protocol):
-    """Sends bytes to a device."""
+    """An object that sends bytes to a device."""
 
     def send(self, topic: int, msg: bytes) -> object:
-        """Send a message on the topic of that number."""
+        """Send a message on the topic with this id."""
 
 
 def load_pkg_module(package: str, directory: str) -> ModuleType | None:
-    """Return a package, whose module ``directory`` (msg or srv) is imported; log why and return None if there is none."""
+    """Import a package's module ``directory`` (msg or srv), and return the package.
+
+    If that fails, log the reason and return None.
+    """
     try:
         import_module(f"{package}.{directory}")
     except ImportError:
@@ -49,7 +52,7 @@ def load_pkg_module(package: str, directory: str) -> ModuleType | None:
 
 
 def load_message(package: str, message: str) -> type[Message]:
-    """Return a message's class. Raise AttributeError if there is none."""
+    """Return a message's class. Raise AttributeError if there is no such class."""
     found: type[Message] = getattr(_module(package, "msg"), message)
     return found
 
@@ -59,7 +62,7 @@ def _module(package: str, directory: str) -> Any:
 
 
 def load_service(package: str, service: str) -> tuple[Any, type[Message], type[Message]]:
-    """Return a service's class, and those of its request and response. Raise AttributeError if there is none."""
+    """Return the classes of a service, its request and its response. Raise AttributeError if there is no such service."""
     module = _module(package, "srv")
     return (
         getattr(module, service),
@@ -69,7 +72,10 @@ def load_service(package: str, service: str) -> tuple[Any, type[Message], type[M
 
 
 class Publisher(endpoints.Publisher):
-    """Forwards messages from the device to ROS. Raise EndpointError if the type is not installed or differs."""
+    """Forwards messages from the device to ROS.
+
+    Raise EndpointError if the type is not installed, or its md5sum differs from the device's.
+    """
 
     def handlePacket(self, data: bytes) -> None:
         """Publish a message."""
@@ -77,7 +83,10 @@ class Publisher(endpoints.Publisher):
 
 
 class Subscriber(endpoints.Subscriber):
-    """Forwards messages from ROS to the device. Raise EndpointError if the type is not installed or differs."""
+    """Forwards messages from ROS to the device.
+
+    Raise EndpointError if the type is not installed, or its md5sum differs from the device's.
+    """
 
     def __init__(self, topic_info: TopicInfo, parent: Parent) -> None:
         self.parent = parent
@@ -123,7 +132,7 @@ class ServiceClient:
     """Service calls from the device. Set ``id`` to the topic on which the device receives responses."""
 
     def __init__(self, topic_info: TopicInfo, parent: Parent) -> None:
-        """Wait for the service. Raise AttributeError if its type is not installed."""
+        """Wait for the service. Raise AttributeError if the service's type is not installed."""
         self.topic: str = topic_info.topic_name
         self.id = -1
         self.parent = parent

@@ -14,7 +14,7 @@ __all__ = ["MAX_MESSAGE_LENGTH", "Decoder", "Fault", "Packet", "WrongVersion", "
 
 _SYNC, _VERSION = 0xFF, 0xFE
 _HEAD = struct.Struct("<HBH")
-MAX_MESSAGE_LENGTH = 0xFFFF  # bytes; the packet's length field has 16 bits
+MAX_MESSAGE_LENGTH = 0xFFFF  # maximum size in bytes; the packet's length field has 16 bits
 
 
 class Packet(NamedTuple):

@@ -52,7 +52,7 @@ class File(Protocol):
 
 
 class SerialPort:
-    """A serial port. Raise PortError if it cannot be opened, ImportError without pyserial."""
+    """A serial port. Raise PortError if the port cannot be opened, ImportError if pyserial is not installed."""
 
     def __init__(self, path: str, baud: int, *, uses_handshake: bool = False) -> None:
         try:

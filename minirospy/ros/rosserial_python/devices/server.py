@@ -15,7 +15,7 @@ _LOOK_SECONDS = 0.2
 
 
 class RosSerialServer:
-    """Listens on a TCP port. It serves one device at a time, or with ``fork_server``, each in its own thread."""
+    """Listens on a TCP port. Serves one device at a time or, if ``fork_server``, each device in its own thread."""
 
     def __init__(self, tcp_portnum: int, fork_server: bool = False) -> None:
         rospy.loginfo("Fork_server is: %s", fork_server)

@@ -274,7 +274,7 @@ FAMILY = Family(
             {"service": RosText("ERROR: unknown service")},
         ),
         Verb("list", "list active services", _list_parser, _list),
-        # ROS has this verb, but its help does not list it.
+        # ROS supports this verb, but its help does not list it.
         Verb("node", "", _node_parser, _node, {"service": RosText("Unknown service: {name}")}),
         Verb(
             "type",

@@ -80,7 +80,7 @@ def get_service_list(
 ) -> list[Any]:
     """Return the services' names, optionally only those of one node or in one namespace.
 
-    With ``include_nodes``, return [name, [nodes]] for each service.
+    If ``include_nodes``, return [name, [nodes]] for each service.
     """
     with _graph() as graph:
         found = services.list_services(graph, graph.resolve(namespace) if namespace else "/")
@@ -248,7 +248,7 @@ def _print_or_exit(text: str | None, error: str) -> None:
 
 
 def _rosservice_list(namespace: str | None = None, print_nodes: bool = False) -> None:
-    """Print the services below a namespace; ``print_nodes``: with the nodes that provide them."""
+    """Print the services below a namespace; if ``print_nodes``, also print the nodes that provide each service."""
     for name, nodes in sorted(get_service_list(namespace=namespace, include_nodes=True)):
         print(f"{name} {','.join(nodes)}" if print_nodes else name)
 
@@ -274,7 +274,10 @@ def _rosservice_call(
     verbose: bool = False,
     service_class: ServiceClass | None = None,
 ) -> None:
-    """Call a service and print its response, after the request if ``verbose``. Raise ROSServiceException if it fails."""
+    """Call a service; print its response or, if ``verbose``, request and response.
+
+    Raise ROSServiceException if the call fails.
+    """
     request, response = call_service(script_resolve_name(NAME, service_name), service_args, service_class)
     if verbose:
         print(f"{request}\n---")
@@ -282,7 +285,10 @@ def _rosservice_call(
 
 
 def _optparse_service_only(cmd: str, argv: Sequence[str] = sys.argv) -> str:
-    """Return the global name of the only service in a command line. Print the usage and exit if it has none or several."""
+    """Return the global name of the only service on a command line.
+
+    If there is none or more than one, print the usage and exit.
+    """
     from optparse import OptionParser
 
     parser = OptionParser(usage=f"usage: %prog {cmd} /service", prog=NAME)
@@ -293,12 +299,12 @@ def _optparse_service_only(cmd: str, argv: Sequence[str] = sys.argv) -> str:
 
 
 def _resource_name_package(name: str) -> str | None:
-    """Return the package of `pkg/Name`; None for a name without a package."""
+    """Return the package in `pkg/Name`, or None if the name has no package."""
     return name.partition("/")[0] if "/" in name else None
 
 
 def _stdin_yaml_arg() -> Iterator[Any]:
-    """Yield each YAML document of standard input that a line with three hyphens or an empty line ends."""
+    """Yield each YAML document on stdin; a line with three hyphens, or an empty line, ends a document."""
     lines: list[str] = []
     while True:
         line = sys.stdin.readline()
@@ -317,7 +323,7 @@ def _stdin_yaml_arg() -> Iterator[Any]:
 
 
 def _succeed(args: Sequence[object]) -> object:
-    """Return the value in a response (code, status message, value). Raise ROSServiceException if it is an error."""
+    """Return the value in a response (code, status message, value). Raise ROSServiceException if the response is an error."""
     code, text, value = args
     if code != 1:
         raise ROSServiceException(f"remote call failed: {text}")
@@ -330,7 +336,7 @@ def _fullusage() -> None:
 
 
 def _resolved(graph: Graph, name: str) -> str:
-    """Return a name's global name. A value that is not a string is converted to one, which matches no service, as in ROS."""
+    """Return the global name for a name. A value of another type is converted to a name that matches no service, as in ROS."""
     return graph.resolve(name) if isinstance(name, str) else str(name)
 
 

@@ -207,7 +207,7 @@ def _base(folder: str | None) -> Path:
 def _file(what: list[str], packages: Packages) -> Path:
     """Return the launch file named on the command line.
 
-    Raise MinirospyError if it does not exist or the arguments are invalid.
+    Raise MinirospyError if the file does not exist or the arguments are invalid.
     """
     if len(what) == 1:
         if Path(what[0]).is_file():

@@ -41,7 +41,7 @@ class ROSTestLaunchParent(ROSLaunchParent):
     def setUp(self) -> None:
         """Start or connect to the master.
 
-        Raise RLException if it cannot be started, MasterUnreachableError if a reused master does not respond.
+        Raise RLException if the master cannot be started, MasterUnreachableError if a reused master does not respond.
         """
         environment = self._open.enter_context(
             master_of_tests(Environment.read(), self.run_id, reuse=self.reuse_master, clear=self.clear)

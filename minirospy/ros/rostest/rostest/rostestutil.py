@@ -61,4 +61,4 @@ def printRostestSummary(result: unittest.TestResult, rostest_results: Result) ->
 
 
 def getErrors() -> None:
-    """Return None: the errors are in `rostest.runner.getResults()`."""
+    """Return None: the errors can be queried with `rostest.runner.getResults()`."""

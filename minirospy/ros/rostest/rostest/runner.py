@@ -55,7 +55,7 @@ _run = _Run()
 
 
 class RosTestCase(unittest.TestCase):
-    """The attributes of the class that :func:`createUnitTest` returns; programs also build such classes themselves."""
+    """The attributes of the class that :func:`createUnitTest` returns. Programs may also build such classes themselves."""
 
     config: ROSLaunchConfig
     test_file: str

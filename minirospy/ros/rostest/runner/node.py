@@ -24,9 +24,9 @@ def rosrun(
     test: type[unittest.TestCase] | str,
     sysargs: Sequence[str] | None = None,
 ) -> None:
-    """Run a TestCase that is a node. The program that a ``<test>`` names calls this as its main function.
+    """Run a TestCase that is a node. A ``<test>``'s program calls this as its main function.
 
-    This works like rosunit.unitrun, but shuts the node down afterwards. Raise SystemExit(1) if a test fails.
+    This function works like rosunit.unitrun, but shuts the node down afterwards. Raise SystemExit(1) if a test fails.
     """
     try:
         unit.unitrun(package, test_name, test, sysargs)
@@ -42,7 +42,7 @@ def run(
     test: type[unittest.TestCase] | str,
     sysargs: Sequence[str] | None = None,
 ) -> None:
-    """Call rosrun, under its old name."""
+    """Call rosrun. This is the function's old name."""
     rosrun(package, test_name, test, sysargs)
 
 

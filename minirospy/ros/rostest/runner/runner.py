@@ -156,7 +156,7 @@ class RosTest:
         node = replace(
             test.node,
             args=" ".join(filter(None, words)),
-            # When the test exits, stop the whole launch.
+            # When the test exits, the whole launch stops.
             required=True,
             output="screen" if self.text else "log",
         )

@@ -33,7 +33,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return FAMILY.main(argv)
 
 
-# --- what the master knows
+# --- data from the master
 
 
 def _list_parser() -> Parser:
@@ -179,7 +179,7 @@ def _find(type: str, arguments: Arguments | None = None) -> None:
         print("\n".join(topics.find_topics_of_type(graph, type)))
 
 
-# --- what goes over a topic
+# --- messages on a topic
 
 
 def _echo_parser() -> Parser:
@@ -277,7 +277,7 @@ def _echo(
         field = wait_for_topic(graph, name, lambda: warn_unpublished(graph, name))
 
     def report(error: Exception) -> None:
-        """Print ROS's message and minirospy's for an index that exceeds an array."""
+        """Print ROS's message and minirospy's message for an index that exceeds an array."""
         print(f"{error.__cause__}: /{field.path}\nrostopic: {error}", file=sys.stderr)
 
     printed = 0

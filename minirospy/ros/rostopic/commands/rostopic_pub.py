@@ -219,7 +219,7 @@ def _message_class(type_: str) -> type[Message]:
 def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> list[object]:
     """Return the first message's values.
 
-    Raise WordedError if the file does not exist, Misuse if an argument is not YAML.
+    Raise WordedError if the file does not exist, Misuse if an argument is not valid YAML.
     """
     try:
         return next(all_values)
@@ -232,7 +232,7 @@ def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> l
 
 
 def _ros_argument_error(text: str) -> str:
-    """Return ROS's error message for an argument that is not YAML; it contains the error of PyYAML's own parser."""
+    """Return ROS's error message for an argument that is not valid YAML; it contains the error of PyYAML's own parser."""
     import yaml
 
     try:
@@ -250,7 +250,7 @@ def _filled(cls: type[Message], values: list[object]) -> Message:
         return fill_message(cls, values)
     except MessageException as error:
         if isinstance(error.__cause__, SerializationError):
-            raise  # ROS finds these errors only when it publishes, and does not print them
+            raise  # ROS detects these errors only when it publishes, and does not print them
         text = f"ERROR: {error.__cause__ or error}\n\nArgs are: [{get_printable_message_args(cls())}]"
         raise WordedError(error, RosText(text)) from error
 

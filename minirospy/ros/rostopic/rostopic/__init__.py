@@ -122,7 +122,7 @@ __all__ = [
 
 NAME = "rostopic"
 _Topic = tuple[str, str, list[str]]
-# topic, type, and the nodes that publish (or subscribe to) the topic
+# (topic, type, nodes that publish or subscribe to the topic)
 _TopicRow = tuple[str, str, list[str]]
 
 
@@ -135,7 +135,7 @@ def get_topic_type(
 ) -> tuple[str | None, str | None, Callable[[Message], object] | None]:
     """Return (type, topic, function that extracts the field from a message), or (None, None, None) if there is no such topic.
 
-    ``topic`` may include a field name. With ``blocking``, wait until the topic exists or the node shuts down.
+    ``topic`` may include a field name. If ``blocking``, wait until the topic exists or the node shuts down.
     """
     with _graph() as graph:
         name = graph.resolve(topic)
@@ -155,7 +155,10 @@ def get_topic_type(
 def get_topic_class(
     topic: str, blocking: bool = False
 ) -> tuple[type[Message] | None, str | None, Callable[[Message], object] | None]:
-    """Return the same as get_topic_type(), but with the message class as type. Raise ROSTopicException if it is not installed."""
+    """Return the same as get_topic_type(), but with the message class as type.
+
+    Raise ROSTopicException if the class is not installed.
+    """
     from minirospy.core.idl.load import get_message_class
 
     type_, real_topic, function = get_topic_type(topic, blocking)
@@ -247,7 +250,7 @@ def get_info_text(topic: str) -> str:
 
 
 def get_api(master: masterapi.Master, caller_id: str) -> str:
-    """Return a node's URI, or `unknown address` with the node's name.
+    """Return a node's URI, or `unknown address` with the node's name if the node is unknown.
 
     Raise ROSTopicIOException if the master does not respond.
     """
@@ -386,7 +389,7 @@ def _rostopic_type(topic: str) -> None:
 def _rostopic_echo(
     topic: str, callback_echo: CallbackEcho, bag_file: str | None = None, echo_all_topics: bool = False
 ) -> None:
-    """Pass a topic's messages, or one of their fields, to ``callback_echo`` until its ``done`` is true."""
+    """Pass a topic's messages, or one of their fields, to ``callback_echo`` until its ``done`` is True."""
     import rospy
 
     if bag_file:
@@ -405,7 +408,7 @@ def _rostopic_echo(
 
 
 def _rostopic_echo_bag(callback_echo: CallbackEcho, bag_file: str) -> None:
-    """Pass the messages of a bag to ``callback_echo`` until its ``done`` is true.
+    """Pass a bag's messages to ``callback_echo`` until its ``done`` is True.
 
     Raise ROSTopicException if the file does not exist.
     """
@@ -417,7 +420,7 @@ def _rostopic_echo_bag(callback_echo: CallbackEcho, bag_file: str) -> None:
 
 
 def _rostopic_list_bag(bag_file: str, topic: str | None = None) -> None:
-    """Print the topics of a bag, or the number of messages below ``topic`` and their times.
+    """Print a bag's topics; if ``topic`` is given, print the number and times of the messages on it and in its namespace.
 
     Raise ROSTopicException if the file does not exist.
     """
@@ -459,7 +462,7 @@ def _rostopic_hz(
     use_wtime: bool = False,
     tcp_nodelay: bool = False,
 ) -> None:
-    """Print the rates of topics every second until shutdown; wait for each to be published."""
+    """Print the rates of topics every second until shutdown, after waiting for each topic to be published."""
     import rospy
 
     from minirospy.ros.rostopic.rostopic.rates import ROSTopicHz
@@ -477,7 +480,7 @@ def _rostopic_hz(
 
 
 def _rostopic_bw(topic: str, window_size: int = -1) -> None:
-    """Print the bandwidth of a topic every second until shutdown; wait for it to be published."""
+    """Print a topic's bandwidth every second until shutdown, after waiting for the topic to be published."""
     import rospy
 
     from minirospy.ros.rostopic.rostopic.rates import ROSTopicBandwidth
@@ -494,7 +497,7 @@ def _rostopic_bw(topic: str, window_size: int = -1) -> None:
 
 
 def _rostopic_delay(topic: str, window_size: int = -1, tcp_nodelay: bool = False) -> None:
-    """Print the delay of a topic's stamped messages every second until shutdown; wait for it to be published."""
+    """Print the delay of a topic's stamped messages every second until shutdown, after waiting for the topic to be published."""
     import rospy
 
     from minirospy.ros.rostopic.rostopic.rates import ROSTopicDelay
@@ -557,12 +560,12 @@ def _print_counts(rows: Sequence[_Topic], word: str, indent: str) -> None:
 
 
 def _resource_name_package(name: str) -> str | None:
-    """Return the package of `pkg/Name`; None for a name without a package."""
+    """Return the package in `pkg/Name`, or None if the name has no package."""
     return name.partition("/")[0] if "/" in name else None
 
 
 def _optparse_topic_only(cmd: str, argv: Sequence[str]) -> str:
-    """Return the global name of the only topic in a command line. Print the usage and exit if it has none or several."""
+    """Return the global name of the only topic on a command line. If there is none or more than one, print the usage and exit."""
     from optparse import OptionParser
 
     parser = OptionParser(usage=f"usage: %prog {cmd} /topic", prog=NAME)
@@ -573,7 +576,7 @@ def _optparse_topic_only(cmd: str, argv: Sequence[str]) -> str:
 
 
 def _is_shutdown() -> bool:
-    """Return whether this process is a node that is shutting down; False if the program never imported rospy."""
+    """Return whether this process is a node that is shutting down; return False if the program has not imported rospy."""
     rospy: Any = sys.modules.get("rospy")
     return rospy is not None and bool(rospy.is_shutdown())
 

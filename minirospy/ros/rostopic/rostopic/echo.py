@@ -23,8 +23,8 @@ ValueTransform = Callable[[object, object], object]
 class CallbackEcho:
     """Prints messages as `rostopic echo` does: ``rospy.Subscriber(topic, Type, echo.callback, {"topic": topic})``.
 
-    ``msg_eval`` extracts the field to print; messages for which ``filter_fn`` is false are not printed.
-    ``done`` becomes true after ``count`` messages.
+    ``msg_eval`` extracts the field to print; messages for which ``filter_fn`` returns a falsy value are not printed.
+    ``done`` becomes True after ``count`` messages.
     """
 
     def __init__(

@@ -29,7 +29,7 @@ Statistics = tuple[float, float, float, float, int]
 class ROSTopicHz:
     """Measures topic rates: ``rospy.Subscriber(topic, rospy.AnyMsg, hz.callback_hz, callback_args=topic)``.
 
-    ``window_size`` is the number of latest messages to use (-1: all). With ``use_wtime``, the machine's clock is used
+    ``window_size`` is the number of latest messages to use (-1: all). If ``use_wtime``, the machine's clock is used
     instead of rospy's.
     """
 
@@ -61,7 +61,7 @@ class ROSTopicHz:
         return report and (report.rate, report.min, report.max, report.std_dev, report.window)
 
     def print_hz(self, topics: Sequence[str | None] = (None,)) -> None:
-        """Print the rates, two lines for one topic or a table for several."""
+        """Print the rates: two lines for a single topic, or a table for several topics."""
         print(rate_text({str(topic): self._report(topic) for topic in topics}))
 
     def _report(self, topic: str | None) -> Spread | None:

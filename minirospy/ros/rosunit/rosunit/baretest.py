@@ -11,12 +11,12 @@ __all__ = [
     "print_unittest_summary",
 ]
 
-BARE_TIME_LIMIT = 60.0  # seconds, for a program that is a test
-TIMEOUT_SIGINT = 15.0  # seconds after SIGINT before SIGTERM
-TIMEOUT_SIGTERM = 2.0  # seconds after SIGTERM before SIGKILL
+BARE_TIME_LIMIT = 60.0  # time limit in seconds for a test that is a separate program
+TIMEOUT_SIGINT = 15.0  # seconds to wait after SIGINT before sending SIGTERM
+TIMEOUT_SIGTERM = 2.0  # seconds to wait after SIGTERM before sending SIGKILL
 
 
 class TestTimeoutException(Exception):
-    """A test did not end in time."""
+    """Raised if a test exceeds its time limit."""
 
-    __test__ = False  # pytest: this is no test
+    __test__ = False  # prevents pytest from collecting this class as a test

@@ -27,22 +27,22 @@ __all__ = [
 
 
 def printlog(msg: str, *args: object) -> None:
-    """Print a message of rosunit."""
+    """Print a message from rosunit."""
     print("[ROSUNIT]" + (msg % args if args else msg))
 
 
 def printlog_bold(msg: str, *args: object) -> None:
-    """Print a message of rosunit in bold."""
+    """Print a message from rosunit in bold."""
     print(f"\033[1m[ROSUNIT]{msg % args if args else msg}\033[0m")
 
 
 def printerrlog(msg: str, *args: object) -> None:
-    """Print a message of rosunit to stderr."""
+    """Print a message from rosunit to stderr."""
     print("[ROSUNIT]" + (msg % args if args else msg), file=sys.stderr)
 
 
 def makedirs_with_parent_perms(p: str) -> None:
-    """Create a folder and its parents with the owner and the permissions of the nearest folder that exists."""
+    """Create a folder and its parents with the owner and the permissions of the nearest existing parent."""
     path = os.path.abspath(p)
     parent = os.path.dirname(path)
     if os.path.exists(path) or parent == path:

@@ -41,10 +41,10 @@ python2 = False
 
 
 def invalid_char_replacer(m: re.Match[str]) -> str:
-    """Return the text in place of a character that XML does not allow."""
+    """Return the replacement text for a character that XML does not allow."""
     return f"&#x{ord(m.group(0)):04X};"
 
 
 def cdata(cdata_text: str) -> str:
-    """Return a text as a CDATA section."""
+    """Return a string as a CDATA section."""
     return f"<![CDATA[\n{cdata_text}\n]]>"

@@ -28,7 +28,7 @@ _running: list[Any] = []
 
 
 def start_coverage(packages: Sequence[str]) -> None:
-    """Measure the coverage of tests from now on, after earlier results. Print a warning if coverage is not installed."""
+    """Start to measure test coverage, adding to earlier results. If the package coverage is not installed, print a warning."""
     try:
         import coverage  # type: ignore[import-not-found, unused-ignore]
     except ImportError:
@@ -41,7 +41,7 @@ def start_coverage(packages: Sequence[str]) -> None:
 
 
 def stop_coverage(packages: Sequence[str], html: str | None = None) -> None:
-    """Stop :func:`start_coverage`, and print the coverage of ``packages``; also write it into the folder ``html``."""
+    """Stop measuring the coverage, and print the coverage of ``packages``; also write a report into the folder ``html``."""
     if not _running:
         return
     measured = _running.pop()

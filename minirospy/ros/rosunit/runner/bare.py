@@ -51,7 +51,7 @@ def run_bare(
 ) -> tuple[Result, TestCaseResult]:
     """Run a Python file or executable for at most ``seconds``; return (its results, the result of the run itself).
 
-    With ``text``, the test prints its results and writes no file, so the exit status determines the result.
+    If ``text``, the test prints its results and writes no file, so the exit status determines the result.
     """
     case = TestCaseResult("runTest")
     case.classname = "rosunit.baretest.BareTestCase"

@@ -263,7 +263,7 @@ def _read_suite(suite: ElementTree.Element, prefix: str, test_name: str) -> Resu
     return result
 
 
-# --- what is printed
+# --- printed output
 
 
 def headline(text: str) -> str:

@@ -44,7 +44,7 @@ __all__ = [
 XML_OUTPUT_FLAG = "--gtest_output=xml:"
 _LINE = "-" * 61
 
-# folders of modules whose lines are omitted from tracebacks
+# Folders of the modules whose lines are omitted from tracebacks.
 _MACHINERY = {Path(unittest.__file__).parent, Path(__file__).parent}
 
 ExcInfo = tuple[type[BaseException], BaseException, TracebackType] | tuple[None, None, None]

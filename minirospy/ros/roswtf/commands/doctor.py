@@ -55,7 +55,7 @@ def _parser(name: str) -> Parser:
         completer="launch_files",
     )
 
-    # Options of ROS's roswtf that have no effect here.
+    # These options of ROS's roswtf have no effect here.
     parser.accept(
         "--all", help="run roswtf against all packages" if is_roswtf else "accepted, without effect"
     )

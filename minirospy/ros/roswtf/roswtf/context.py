@@ -1,4 +1,4 @@
-"""roswtf.context: the environment, the packages and the launch files that roswtf's checks and plugins look at."""
+"""roswtf.context: the environment, packages and launch files that roswtf's checks and plugins examine."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ _DEFAULT_ROOT = "/usr/share/ros"
 
 
 class WtfException(Exception):
-    """A context cannot be filled."""
+    """Raised if a context cannot be created."""
 
 
 class WtfContext:
-    """What checks look at, the ``warnings`` and the ``errors`` that they find. Attributes are None until they are known."""
+    """The data that checks examine, and the ``warnings`` and ``errors`` that they report. Unknown attributes are None."""
 
     __slots__ = _NAMES
     warnings: list[WtfError]
@@ -54,26 +54,26 @@ class WtfContext:
 
     @staticmethod
     def from_env(env: Mapping[str, str] | None = None) -> WtfContext:
-        """Return a context with the environment alone."""
+        """Return a context that contains only the environment."""
         return _Filled(env).made
 
     @staticmethod
     def from_package(pkg: str, env: Mapping[str, str] | None = None) -> WtfContext:
-        """Return a package's context. Raise WtfException if the package or one that it needs does not exist."""
+        """Return a package's context. Raise WtfException if the package or one of its dependencies does not exist."""
         filled = _Filled(env)
         filled.load_package(pkg)
         return filled.made
 
     @staticmethod
     def from_stack(stack: str, env: Mapping[str, str] | None = None) -> WtfContext:
-        """Return a metapackage's context. Raise WtfException if it or one that it needs does not exist."""
+        """Return a metapackage's context. Raise WtfException if the metapackage or one of its dependencies does not exist."""
         filled = _Filled(env)
         filled.load_stack(stack)
         return filled.made
 
     @staticmethod
     def from_roslaunch(roslaunch_files: Sequence[str], env: Mapping[str, str] | None = None) -> WtfContext:
-        """Return the context of launch files and their package. Raise WtfException if a file is invalid."""
+        """Return the context for launch files and the package that contains them. Raise WtfException if a file is invalid."""
         for file in roslaunch_files:
             try:
                 load_config_default([file], None, assign_machines=False)
@@ -93,7 +93,7 @@ class WtfContext:
 
 
 class _Filled:
-    """A new context with the environment, and the functions that add to it."""
+    """Creates a context with the environment, and adds packages and metapackages to it."""
 
     def __init__(self, env: Mapping[str, str] | None) -> None:
         env = os.environ if env is None else env

@@ -35,7 +35,7 @@ def paths(path: str | None) -> list[str]:
 
 
 def is_executable(path: str) -> int:
-    """Return the permission bits that allow a file to be executed, or 0 if there are none. Raise OSError if it does not exist."""
+    """Return the permission bits that allow a file to be executed, or 0. Raise OSError if the file does not exist."""
     mode = os.stat(path)[stat.ST_MODE]
     return mode & (stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
 
@@ -59,7 +59,7 @@ def invalid_url(url: str | None) -> str | None:
 
 
 def ros_root_check(ctx: Any, ros_root: str | None = None) -> str | None:
-    """Return the error in ROS_ROOT, or None."""
+    """Return the error in ROS_ROOT, or None if there is no error."""
     path = ctx.ros_root if ros_root is None else ros_root
     if os.path.basename(os.path.normpath(path)) in ("ros", "rosbuild"):
         return None
@@ -67,7 +67,7 @@ def ros_root_check(ctx: Any, ros_root: str | None = None) -> str | None:
 
 
 def _writable_dir_check(ctx: Any, path: str | None, name: str) -> str | None:
-    """Return the error in a folder that ROS writes into, or None."""
+    """Return the error in a folder to which ROS writes, or None if there is no error."""
     if path is None:
         return None
     if os.path.isfile(path):
@@ -76,35 +76,35 @@ def _writable_dir_check(ctx: Any, path: str | None, name: str) -> str | None:
 
 
 def ros_home_check(ctx: Any) -> str | None:
-    """Return the error in ROS_HOME, or None."""
+    """Return the error in ROS_HOME, or None if there is no error."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_HOME"), "ROS_HOME")
 
 
 def ros_log_dir_check(ctx: Any) -> str | None:
-    """Return the error in ROS_LOG_DIR, or None."""
+    """Return the error in ROS_LOG_DIR, or None if there is no error."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_LOG_DIR"), "ROS_LOG_DIR")
 
 
 def ros_test_results_dir_check(ctx: Any) -> str | None:
-    """Return the error in ROS_TEST_RESULTS_DIR, or None."""
+    """Return the error in ROS_TEST_RESULTS_DIR, or None if there is no error."""
     return _writable_dir_check(ctx, ctx.env.get("ROS_TEST_RESULTS_DIR"), "ROS_TEST_RESULTS_DIR")
 
 
 def pythonpath_check(ctx: Any) -> str | None:
-    """Return an error if PYTHONPATH has several folders of roslib, else None."""
+    """Return an error if PYTHONPATH contains several roslib folders, else None."""
     if len({path for path in paths(ctx.pythonpath) if "roslib" in path.split(os.sep)}) > 1:
         return "Multiple roslib directories in PYTHONPATH (there should only be one)"
     return None
 
 
 def rosconsole_config_file_check(ctx: Any) -> bool | None:
-    """Return whether the file in ROSCONSOLE_CONFIG_FILE is missing; None if the variable is not set."""
+    """Return whether the file named in ROSCONSOLE_CONFIG_FILE is missing, or None if the variable is not set."""
     file = ctx.env.get("ROSCONSOLE_CONFIG_FILE")
     return None if file is None else not os.path.isfile(file)
 
 
 def path_check(ctx: Any) -> bool | None:
-    """Return True if PATH has /usr/bin before ROS_ROOT on a machine with ROS of the system."""
+    """Return True if ROS is installed system-wide, and PATH lists /usr/bin before ROS_ROOT; else None."""
     path = ctx.env["PATH"]
     system, ros = path.find("/usr/bin"), path.find(ctx.ros_root)
     return True if os.path.exists("/usr/lib/ros/") and 0 <= system < ros else None
@@ -127,7 +127,7 @@ def _not_folders(path: str | None) -> list[str]:
 
 
 def _not_package_folders(path: str | None) -> list[str]:
-    # catkin's folder share is followed by one for stacks, which need not exist.
+    # In a catkin workspace, the folder share is followed by a folder for stacks, which need not exist.
     return [
         each
         for each in _not_folders(path)
@@ -180,7 +180,7 @@ environment_errors: list[Rule] = [
 
 
 def wtf_check_environment(ctx: Any) -> None:
-    """Check the environment variables of a context, and add what is found to it."""
+    """Check the environment variables in a context, and add the errors and warnings to the context."""
     for rule in environment_warnings:
         warning_rule(rule, rule[0](ctx), ctx)
     for rule in environment_errors:

@@ -121,7 +121,7 @@ def read_points_numpy(
 ) -> Values:
     """Return the points as an array of shape (points, values), in the order of ``field_names``.
 
-    With ``reshape_organized_cloud`` its shape is (height, width, values). The array is a read-only view of the message's
+    If ``reshape_organized_cloud``, the shape is (height, width, values). The array is a read-only view of the message's
     data if the values have one type and are evenly spaced, as x, y, z are; else a copy, with a type that can represent all.
     Raise AssertionError if ``cloud`` is not a PointCloud2, ValueError if a field or data is missing.
     """

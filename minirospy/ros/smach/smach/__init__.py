@@ -1,7 +1,7 @@
 """smach: hierarchical state machines for tasks, without ROS. Source: http://wiki.ros.org/smach.
 
 The log and error messages are those of the real package. In two cases, the real package hangs or stays locked, but this
-one raises an error: a child of a Concurrence returns nothing, or the construction of a container raises an exception.
+package raises an error: a child of a Concurrence returns nothing, or the construction of a container raises an exception.
 """
 
 from typing import TYPE_CHECKING

@@ -42,7 +42,7 @@ class Concurrence(Container):
         """Create the container. ``outcome_map`` maps an outcome to a dict from label to that state's outcome.
 
         ``child_termination_cb`` is called each time a state finishes, with the outcomes so far (None for running states).
-        If it returns a true value, the other states are preempted.
+        If it returns a truthy value, the other states are preempted.
         """
         known = list(outcomes)
         super().__init__(known, input_keys, output_keys)
@@ -92,7 +92,7 @@ class Concurrence(Container):
         return state
 
     def check_consistency(self) -> None:
-        """Raise InvalidTransitionError if the outcome map names a state or an outcome that does not exist."""
+        """Raise InvalidTransitionError if the outcome map refers to a state or an outcome that does not exist."""
         for outcomes in self._outcome_map.values():
             for label, outcome in outcomes.items():
                 if label not in self._states:

@@ -66,8 +66,8 @@ class Iterator(Container):
     ) -> None:
         """Set the state for the open iterator.
 
-        An outcome in ``break_outcomes`` ends the loop; if that is empty, any outcome that is not in ``loop_outcomes``
-        does. ``final_outcome_map`` maps the state's last outcome to the iterator's outcome.
+        An outcome in ``break_outcomes`` ends the loop; if ``break_outcomes`` is empty, any outcome that is not in
+        ``loop_outcomes`` does. ``final_outcome_map`` maps the state's last outcome to the iterator's outcome.
         """
         iterator = Iterator._currently_opened_container()
         if loop_outcomes and break_outcomes:
@@ -90,7 +90,7 @@ class Iterator(Container):
     # Execution.
 
     def execute(self, parent_ud: Values | None = None) -> str | None:
-        """Execute the state for each item; return its last outcome, mapped, or the outcome for when no items are left."""
+        """Execute the state for each item. Return the last outcome, mapped, or the exhausted outcome if no items are left."""
         if self._state is None:
             raise InvalidStateError("No contained state was set in iterator")
         self._is_running = True

@@ -38,13 +38,13 @@ class StateMachine(Container):
         self._constants: dict[str, Mapping[str, object]] = {}
         self._initial_state_label: str | None = None
 
-        # For `add_auto`: the last added state, and its outcomes that lead to the next state.
+        # For `add_auto`: the last added state's label, and that state's outcomes that lead to the next state.
         self._last_added_label: str | None = None
         self._connector_outcomes: Sequence[str] = ()
 
         self._is_running = False
         self._current_label: str | None = None
-        # The state that was preempted, but may not have noticed.
+        # The state that was preempted, but may not have handled the preemption.
         self._preempted_label: str | None = None
         self._preempted_state: State | None = None
         # The lock is released only while a state executes, so that a preemption never occurs between two states.
@@ -87,7 +87,7 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Add a state whose ``connector_outcomes`` lead to the next added state; otherwise, do the same as ``add``."""
+        """Add a state whose ``connector_outcomes`` lead to the next added state; apart from that, work as ``add`` does."""
         machine = StateMachine._currently_opened_container()
         machine._add(label, state, transitions, remapping, constants)
         registered = state.get_registered_outcomes()
@@ -231,7 +231,7 @@ class StateMachine(Container):
         return self._terminate(label, state, outcome, target)
 
     def _pass_on_preempt(self, label: str, state: State) -> None:
-        """Preempt a state before it executes if the machine is preempted and the previous state has not noticed."""
+        """Preempt a state before it executes if the machine is preempted and the previous state has not handled that."""
         if not self.preempt_requested():
             return
         loginfo("Preempt requested on state machine before executing the next state.")
@@ -318,7 +318,7 @@ class StateMachine(Container):
         return self._states
 
     def __getitem__(self, key: str) -> State:
-        """Return the state with this label; log and raise KeyError if there is none."""
+        """Return the state with this label; if there is no such state, log and raise KeyError."""
         if key not in self._states:
             logerr(
                 f"Attempting to get state '{key}' from StateMachine container. The only available states are: "
@@ -345,7 +345,7 @@ class StateMachine(Container):
         return [str(self._initial_state_label)]
 
     def get_active_states(self) -> list[str]:
-        """Return the label of the executing state, or "None" if there is none."""
+        """Return the label of the executing state, or "None" if no state is executing."""
         return [str(self._current_label)]
 
     def get_internal_edges(self) -> list[tuple[str, str, str | None]]:

@@ -38,7 +38,7 @@ class ActionServerWrapper:
     ) -> None:
         """Set the userdata keys for the goal, which the container reads, and for feedback and result, which the container writes.
 
-        ``goal_slots_map`` and ``result_slots_map`` map fields of the goal and of the result to keys. With
+        ``goal_slots_map`` and ``result_slots_map`` map fields of the goal and of the result to keys. If
         ``expand_goal_slots`` and ``pack_result_slots``, every field is used under its own name.
         """
         self.wrapped_container = wrapped_container

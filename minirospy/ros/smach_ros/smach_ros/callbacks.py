@@ -32,7 +32,7 @@ class StateCallback:
     ) -> None:
         """Store the callback; raise InvalidStateError if it is not callable.
 
-        ``what`` describes it in messages, for example "Goal".
+        ``what`` describes the callback in messages, for example "Goal".
         """
         if callback is not None and not callable(callback):
             raise InvalidStateError(

@@ -1,4 +1,4 @@
-"""A state that waits until a function returns true."""
+"""A state that waits until a function returns a truthy value."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["ConditionState"]
 class ConditionState(State):
     """Waits until a condition is met.
 
-    Outcomes: "true" when it is met, "false" after the last check or the timeout, "preempted".
+    Outcomes: "true" when the condition is met, "false" after the last check or the timeout, "preempted".
     """
 
     def __init__(
@@ -27,9 +27,9 @@ class ConditionState(State):
         timeout: rospy.Duration | None = None,
         max_checks: int = 1,
     ) -> None:
-        """Create the state. ``cond_cb`` is called with the userdata every ``poll_rate``.
+        """Create the state. ``cond_cb`` is called with the userdata once per ``poll_rate``.
 
-        ``max_checks`` -1 means no limit. As in ROS, the value n allows n + 1 checks.
+        If ``max_checks`` is -1, there is no limit. As in ROS, the value n allows n + 1 checks.
         """
         super().__init__(outcomes=["true", "false", "preempted"], input_keys=input_keys)
         if hasattr(cond_cb, "get_registered_input_keys") and hasattr(cond_cb, "get_registered_output_keys"):

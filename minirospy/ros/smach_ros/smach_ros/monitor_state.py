@@ -18,7 +18,8 @@ _SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
 class MonitorState(State):
     """Checks the messages on a topic against a condition.
 
-    Outcomes: "valid" after ``max_checks`` messages that meet it, "invalid" at the first one that does not, "preempted".
+    Outcomes: "valid" after ``max_checks`` messages that meet the condition, "invalid" at the first message that does not meet
+    it, "preempted".
     """
 
     def __init__(
@@ -32,7 +33,7 @@ class MonitorState(State):
     ) -> None:
         """Create the state. ``cond_cb`` is called with the userdata and a message.
 
-        ``max_checks`` -1 means no limit: the state runs until a message does not meet the condition.
+        If ``max_checks`` is -1, there is no limit: the state runs until a message does not meet the condition.
         """
         super().__init__(
             outcomes=["valid", "invalid", "preempted"], input_keys=input_keys, output_keys=output_keys

@@ -45,7 +45,7 @@ def pickle_userdata(data: Mapping[str, object]) -> tuple[str, list[str]]:
 
 
 def unpickle_userdata(text: str) -> dict[str, object]:
-    """Return the values in a string. Raise ValueError if it is invalid or contains values that are not allowed."""
+    """Return the values in a string. Raise ValueError if the string is invalid or contains values that are not allowed."""
     try:
         data = _Unpickler(io.BytesIO(base64.b64decode(text, validate=True))).load()
     except Exception as error:
@@ -63,7 +63,7 @@ _set_state = pickle._Unpickler.dispatch[pickle.BUILD[0]]
 
 
 class _Unpickler(pickle._Unpickler):
-    """Python's unpickler in the version written in Python, so that its operations can be checked before they run."""
+    """The unpickler that is written in Python, instead of C, so that its operations can be checked before they run."""
 
     stack: list[Any]
     read: Callable[[int], bytes]
@@ -123,7 +123,7 @@ def _check_dtype(target: Any, state: Any) -> None:
 
 
 def _plain(make: Callable[..., object], *kinds: type) -> Callable[..., object]:
-    """Wrap a constructor so that it accepts only these types, not a number, which would be a size, or a range."""
+    """Wrap a constructor so that it accepts only these argument types, and not, for example, a number, which would be a size."""
 
     def made(content: object = (), *more: object) -> object:
         if type(content) not in (*kinds, tuple):

@@ -151,7 +151,7 @@ class SoundClient:
         blocking: bool | None = None,
         **kwargs: object,
     ) -> None:
-        """Send a request. With a timeout of None, wait indefinitely for the server, or for the end of the sound."""
+        """Send a request. If a timeout is None, wait indefinitely for the server, or for the end of the sound."""
         request = SoundRequest(sound=snd, command=cmd, volume=max(0, min(1, vol)), arg=s, arg2=arg2)
         if not (self._blocking if blocking is None else blocking):
             self.pub.publish(request)

@@ -37,7 +37,7 @@ PLAYERS: dict[str, Callable[[str, float], list[str]]] = {
         f"(New-Object Media.SoundPlayer '{file.replace(chr(39), chr(39) * 2)}').PlaySync()"
     ),
 }
-"""Functions from a file and a volume (0 to 1) to a player's arguments, by player, in order of preference."""
+"""Functions from a file and a volume (0 to 1) to a player's arguments; the keys are the players, in order of preference."""
 
 SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
     "espeak-ng": lambda text, voice, volume: Command(_espeak(voice, volume), text),
@@ -53,7 +53,7 @@ SPEAKERS: dict[str, Callable[[str, str, float], Command]] = {
         text,
     ),
 }
-"""Functions that return the command for a program that speaks text, by program, in order of preference."""
+"""Functions that return the command that speaks a text; the keys are the programs, in order of preference."""
 
 _ONLY_ON = {"afplay": "darwin", "say": "darwin", "powershell": "win32"}
 

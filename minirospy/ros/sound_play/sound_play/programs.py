@@ -1,4 +1,4 @@
-"""The programs say.py, play.py and so on, each of which sends a request to soundplay_node.
+"""The programs say.py, play.py and others, each of which sends a request to soundplay_node.
 
 Source: http://wiki.ros.org/sound_play.
 """

@@ -1,6 +1,6 @@
 """Composite transformation matrices (decompose, compose, fit to points), and a virtual trackball.
 
-Each function imports numpy when it is called.
+Each function imports numpy when the function is called.
 """
 
 from __future__ import annotations
@@ -225,7 +225,7 @@ class Arcball:
     """A virtual trackball: converts mouse movements in a window to rotations. Source: Shoemake, Graphics Gems IV (1994)."""
 
     def __init__(self, initial: ArrayLike | None = None) -> None:
-        """Start with the rotation ``initial``, a quaternion or a matrix. Raise ValueError if it is neither."""
+        """Start with the rotation ``initial``, a quaternion or a matrix. Raise ValueError for any other value."""
         import numpy
 
         from minirospy.ros.tf.tf.vectors import quaternion_from_matrix

@@ -1,6 +1,6 @@
 """tf.Transformer, TransformerROS and TransformListener: transforms returned as tuples, and transformed messages.
 
-Methods that need matrices import numpy when they are called. Source: http://wiki.ros.org/tf.
+Methods that need matrices import numpy on first use. Source: http://wiki.ros.org/tf.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def xyzw_to_mat44(ori: geometry_msgs.msg.Quaternion) -> NDArray[numpy.float64]:
 
 
 def strip_leading_slash(s: str) -> str:
-    """Return a frame name without a leading slash, because tf2 rejects one."""
+    """Return a frame name without a leading slash, because tf2 rejects names with a leading slash."""
     return s[1:] if s.startswith("/") else s
 
 
@@ -148,7 +148,7 @@ class Transformer:
         return list(yaml.safe_load(self._buffer.all_frames_as_yaml()) or {})
 
     def getLatestCommonTime(self, source_frame: str, dest_frame: str) -> rospy.Time:
-        """Return the newest time at which a lookup succeeds. Raise tf.Exception if there is none."""
+        """Return the newest time at which a lookup succeeds. Raise tf.Exception if there is no such time."""
         return self._buffer.get_latest_common_time(
             strip_leading_slash(source_frame), strip_leading_slash(dest_frame)
         )
@@ -165,7 +165,7 @@ class Transformer:
     def lookupTransformFull(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> Tuples:
-        """Return the pose between two times, as :meth:`lookupTransform` does."""
+        """Return the pose of a frame at one time relative to a frame at another time, as :meth:`lookupTransform` does."""
         target, source, fixed = map(strip_leading_slash, (target_frame, source_frame, fixed_frame))
         return _tuples(self._buffer.lookup_transform_full(target, target_time, source, source_time, fixed))
 
@@ -199,7 +199,8 @@ class Transformer:
     ) -> tuple[Vector, Vector]:
         """Return the velocities of ``tracking_frame`` relative to ``observation_frame``, expressed in ``reference_frame``.
 
-        They are those of the origin of ``reference_point_frame``, averaged over ``averaging_interval`` around ``time``
+        The velocities are those of the origin of ``reference_point_frame``, averaged over ``averaging_interval`` around
+        ``time``
         (0: until the newest data). ``ref_point`` has no effect, as in real ROS.
         """
         import numpy

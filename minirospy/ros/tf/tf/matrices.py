@@ -165,7 +165,7 @@ def projection_matrix(
 ) -> Floats:
     """Return the matrix that projects onto a plane: from a perspective point, along a direction, or orthogonally.
 
-    With ``pseudo``, a perspective projection preserves relative depths.
+    If ``pseudo``, a perspective projection preserves relative depths.
     """
     import numpy
 
@@ -230,7 +230,7 @@ def clip_matrix(
 ) -> Floats:
     """Return the matrix that maps a view volume to the cube from -1 to 1. Raise ValueError if the volume is invalid.
 
-    With ``perspective``, the volume is a frustum.
+    If ``perspective``, the volume is a frustum.
     """
     import numpy
 
@@ -277,7 +277,10 @@ def shear_matrix(angle: float, direction: ArrayLike, point: ArrayLike, normal: A
 
 
 def shear_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats, Floats]:
-    """Return the angle, the direction, a point in the plane and the plane's normal. Raise ValueError if it is not a shear."""
+    """Return a shear's angle and direction, a point in the plane, and the plane's normal.
+
+    Raise ValueError if it is not a shear.
+    """
     import numpy
 
     m = numpy.asarray(matrix, dtype=numpy.float64)
@@ -304,7 +307,10 @@ def shear_from_matrix(matrix: ArrayLike) -> tuple[float, Floats, Floats, Floats]
 
 
 def _eigenvector(matrix: Floats, value: float, missing: str, *, last: bool = True) -> Floats:
-    """Return the real part of the last (or first) eigenvector for an eigenvalue. Raise ValueError(missing) if there is none."""
+    """Return the real part of the last (or first) eigenvector for an eigenvalue.
+
+    Raise ValueError(missing) if it does not exist.
+    """
     import numpy
 
     values, vectors = numpy.linalg.eig(matrix)

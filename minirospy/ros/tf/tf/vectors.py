@@ -29,7 +29,7 @@ __all__ = [
 
 
 def vector_norm(data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None) -> Any:
-    """Return a vector's length, or the lengths along ``axis``. With ``out``, store them in it and return None."""
+    """Return a vector's length, or the lengths along ``axis``. If ``out`` is given, store the result in it and return None."""
     import numpy
 
     squared = numpy.square(numpy.asarray(data, dtype=numpy.float64))
@@ -54,7 +54,7 @@ def unit_vector(data: ArrayLike, axis: int | None, out: NDArray[numpy.float64]) 
 def unit_vector(
     data: ArrayLike, axis: int | None = None, out: NDArray[numpy.float64] | None = None
 ) -> NDArray[numpy.float64] | None:
-    """Return vectors divided by their lengths. With ``out``, store them in it and return None."""
+    """Return vectors divided by their lengths. If ``out`` is given, store the result in it and return None."""
     import numpy
 
     vectors = numpy.array(data, dtype=numpy.float64)

@@ -1,4 +1,4 @@
-"""tf2_geometry_msgs: transforms points, vectors and poses for tf2_ros. Importing it registers these types."""
+"""tf2_geometry_msgs: transforms points, vectors and poses for tf2_ros. Importing this package registers these types."""
 
 from typing import TYPE_CHECKING
 

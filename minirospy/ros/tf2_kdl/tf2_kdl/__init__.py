@@ -1,4 +1,4 @@
-"""tf2_kdl: transforms PyKDL's types for tf2_ros. Importing it registers these types."""
+"""tf2_kdl: transforms PyKDL's types for tf2_ros. Importing this package registers these types."""
 
 from typing import TYPE_CHECKING
 

@@ -47,7 +47,7 @@ _MAX_WAITING = 1000
 class Buffer:
     """The frames published on /tf and /tf_static over the last ``cache_time`` seconds.
 
-    It receives transforms inside ``async with Buffer(node) as buffer:``. If time jumps back, all non-static transforms
+    The buffer receives transforms inside ``async with Buffer(node) as buffer:``. If time jumps back, all non-static transforms
     are removed.
     """
 
@@ -75,7 +75,7 @@ class Buffer:
             self._listening.append(asyncio.create_task(self._take(subscription, is_static)))
 
     async def close(self) -> None:
-        """Stop receiving transforms. Those received so far can still be looked up. Idempotent."""
+        """Stop receiving transforms. Transforms received so far can still be looked up. Idempotent."""
         listening, self._listening = self._listening, []
         for task in listening:
             task.cancel()
@@ -150,7 +150,7 @@ class Buffer:
         """Return each frame's parent, broadcaster, rate and times, in the format that view_frames reads."""
         return frames_as_yaml(self.tree)
 
-    # --- within
+    # --- internal
 
     async def _wait_for(self, look: Callable[[], _T], timeout: float | None) -> _T:
         try:
@@ -246,6 +246,6 @@ async def _first_of(changed: asyncio.Event, end: asyncio.Future[None]) -> None:
 
 
 async def _quietly(pause: Coroutine[object, object, None]) -> None:
-    """Wait until ``pause`` ends, the node shuts down, or its time jumps."""
+    """Wait until ``pause`` ends, the node shuts down, or the node's time jumps."""
     with contextlib.suppress(ROSInterruptException):
         await pause

@@ -23,8 +23,8 @@ DEFAULT_CAN_TRANSFORM_POLLING_SCALE = 0.01
 class Buffer(BufferCore, BufferInterface):
     """The frames over the last ``cache_time`` (a Duration; 10 s), with lookups that can wait for their data.
 
-    With ``debug``, offer the service ``~tf2_frames``, which lists the frames, unless this node already offers it. A wait
-    returns after the insertion that makes the lookup possible. It raises an exception if simulated time jumps back by
+    If ``debug``, offer the service ``~tf2_frames``, which lists the frames, unless this node already offers it. A wait
+    returns after the insertion that makes the lookup possible. A wait raises an exception if simulated time jumps back by
     more than the fraction CAN_TRANSFORM_POLLING_SCALE of its timeout. Thread-safe.
     """
 
@@ -83,7 +83,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Moment = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> int | tuple[int, str]:
-        """Return whether there is a transform (1 or 0), waiting up to ``timeout``; with ``return_debug_tuple``, also the reason.
+        """Return whether there is a transform (1 or 0), waiting up to ``timeout``; if ``return_debug_tuple``, also the reason.
 
         Raise ROSInterruptException and ROSTimeMovedBackwardsException as :meth:`lookup_transform` does.
         """

@@ -48,13 +48,13 @@ class BufferClient(BufferInterface):
             rospy.logwarn("Argument check_frequency is deprecated and should not be used.")
 
     def wait_for_server(self, timeout: times.Duration = NO_WAIT) -> bool:
-        """Wait for the server; return whether it is connected within ``timeout`` (zero: no limit)."""
+        """Wait for the server; return False if it is not connected within ``timeout`` (zero: no limit)."""
         return self.client.wait_for_server(timeout)
 
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Moment, timeout: Moment = NO_WAIT
     ) -> TransformStamped:
-        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; wait up to ``timeout`` for it.
+        """Return the pose of ``source_frame`` in ``target_frame`` at ``time``, waiting up to ``timeout`` for the transform.
 
         Raise the exception that the server reports, such as LookupException, or TimeoutException if the server does not
         respond.

@@ -43,7 +43,7 @@ class BufferCore:
         )
         self._changed: tuple[Callable[[], object], ...] = ()
 
-    # --- transforms in
+    # --- inserting transforms
 
     def set_transform(self, transform: TransformStamped, authority: str) -> None:
         """Insert a transform that was received from the node ``authority``."""
@@ -54,7 +54,7 @@ class BufferCore:
         self._insert(transform, authority, True)
 
     def insert_message(self, data: bytes, authority: str, is_static: bool = False) -> None:
-        """Insert a serialized TFMessage. If it has the same layout as earlier messages, decode it only when needed.
+        """Insert a serialized TFMessage. If its layout equals that of earlier messages, decode the message only when needed.
 
         The real tf2_py has no such method. Raise DeserializationError if the bytes are invalid.
         """
@@ -67,7 +67,7 @@ class BufferCore:
         with self._lock:
             self._tree.clear()
 
-    # --- lookups out
+    # --- lookups
 
     def lookup_transform_core(self, target_frame: str, source_frame: str, time: Moment) -> TransformStamped:
         """Return the pose of ``source_frame`` in ``target_frame`` at ``time``; time 0 means the latest common time.
@@ -99,7 +99,7 @@ class BufferCore:
         return transform_stamped(target_frame, source_frame, found)
 
     def can_transform_core(self, target_frame: str, source_frame: str, time: Moment) -> tuple[int, str]:
-        """Return whether a lookup would succeed (1 or 0), and the reason if not."""
+        """Return (1, "") if a lookup would succeed, otherwise (0, the reason)."""
         stamp = nanoseconds(time)
         _check_names(target_frame, source_frame)
         return self._possible(lambda: self._tree.why_not(target_frame, source_frame, stamp))
@@ -107,7 +107,7 @@ class BufferCore:
     def can_transform_full_core(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> tuple[int, str]:
-        """Return whether a lookup with a fixed frame would succeed (1 or 0), and the reason if not."""
+        """Return (1, "") if a lookup with a fixed frame would succeed, otherwise (0, the reason)."""
         stamps = nanoseconds(target_time), nanoseconds(source_time)
         _check_names(target_frame, source_frame, fixed_frame)
         return self._possible(
@@ -124,7 +124,7 @@ class BufferCore:
         with self._lock:
             return Time(*divmod(self._tree.latest_common_time(target_frame, source_frame), _BILLION))
 
-    # --- what there is
+    # --- known frames
 
     def all_frames_as_yaml(self, time: Moment | float = 0.0) -> str:
         """Return each frame's parent, broadcaster, rate and times; ``time`` has no effect, as in real ROS."""
@@ -157,7 +157,7 @@ class BufferCore:
         with self._lock:
             return self._tree.frame_names()
 
-    # --- within
+    # --- internal
 
     def on_change(self, function: Callable[[], object]) -> Callable[[], None]:
         """Call ``function`` after each insertion, in the inserting thread; return a function that stops these calls."""

@@ -50,7 +50,7 @@ class NotImplementedException(Exception):
 
 
 class _Registry:
-    """Functions by type, or by a pair of types. The whole process shares them."""
+    """A process-wide table of functions by type, or by pairs of types."""
 
     def __init__(self) -> None:
         self.functions: dict[object, _Function] = {}
@@ -76,7 +76,7 @@ class TransformRegistration:
         self._registry.functions[key] = callback
 
     def get(self, key: type[_T]) -> Callable[[_T, TransformStamped], _T]:
-        """Return the function registered for a type. Raise TypeException if there is none."""
+        """Return the function registered for a type. Raise TypeException if no function is registered."""
         return self._registry.get(key)
 
 

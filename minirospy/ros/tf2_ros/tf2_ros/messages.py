@@ -27,7 +27,7 @@ class Moment(Protocol):
 def nanoseconds(time: Moment) -> int:
     """Return a time in nanoseconds. The result is exact if the time has ``secs`` and ``nsecs``.
 
-    Raise TypeError if it is not a time, as tf2_py does.
+    Raise TypeError if the argument is not a time, as tf2_py does.
     """
     try:
         return time.secs * _BILLION + time.nsecs  # type: ignore[attr-defined, no-any-return]

@@ -14,13 +14,13 @@ from minirospy.ros.tf2_ros.tf2_ros.messages import Moment, nanoseconds
 
 __all__ = ["wait_until"]
 
-_JUMP = times.Duration(3)  # if the wall clock is set back by more than this, a wait is aborted
-# seconds; interval between checks in simulated time, because a change of that time does not wake a blocked thread
+_JUMP = times.Duration(3)  # maximum time by which the wall clock may be set back without aborting a wait
+# interval in seconds between checks in simulated time, because a change of that time does not wake a blocked thread
 _SIMULATED_SLICE = 0.01
 
 
 def wait_until(core: BufferCore, is_possible: Callable[[], bool], timeout: Moment, step: float) -> None:
-    """Wait until ``is_possible()``, which is called after each insertion, is true, or ``timeout`` of ROS time has passed.
+    """Wait until ``is_possible()``, called after each insertion, returns a truthy value, or until ``timeout`` in ROS time.
 
     ``step`` is the fraction of the timeout that the real implementation sleeps between two checks. Raise
     ROSTimeMovedBackwardsException if simulated time jumps back to before the start of such a sleep, ROSInterruptException

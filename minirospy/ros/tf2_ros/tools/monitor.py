@@ -24,9 +24,9 @@ from minirospy.ros.tf2_ros.tools.program import ToolError, report, run_program
 __all__ = ["Delays", "main"]
 
 _USAGE = "TF_Monitor: usage: tf_monitor framea frameb"
-_KEPT = 1000  # number of delays per average, and of messages per rate
+_KEPT = 1000  # number of delays over which to average, and of messages from which to compute a rate
 _STEP = 0.01
-_STEPS = 20  # number of measurements of the delay between two frames per report
+_STEPS = 20  # number of times per report that the delay between two frames is measured
 _SMOOTHING = 0.01
 _MIN_PERIOD = 1e-8
 

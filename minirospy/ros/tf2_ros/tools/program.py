@@ -12,7 +12,8 @@ from minirospy.base.escape import escaped
 
 __all__ = ["USAGE_STATUS", "ToolError", "report", "run_program"]
 
-USAGE_STATUS = 255  # exit status of a usage error, for which ROS's programs return -1
+# exit status after a usage error; ROS's programs return -1, which the shell reports as this status
+USAGE_STATUS = 255
 
 
 class ToolError(MinirospyError):

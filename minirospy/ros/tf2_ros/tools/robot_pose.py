@@ -41,7 +41,7 @@ def _run(words: Sequence[str]) -> None:
         try:
             found = buffer.lookup_transform(map_frame.lstrip("/"), base_frame.lstrip("/"), rospy.Time(0))
         except TransformException:
-            # The robot has no pose until it is localised.
+            # The robot has no pose until it has been localised.
             pass
         else:
             position = found.transform.translation

@@ -47,7 +47,7 @@ class FrameRecord(NamedTuple):
 
 
 def main_tf(words: Sequence[str] | None = None) -> int:
-    """Run tf's view_frames, for received transforms, or with --node for a node's buffer; return the exit status."""
+    """Run tf's view_frames, for the received transforms or, with --node, for a node's buffer; return the exit status."""
     return run_program(_run_tf, words)
 
 
@@ -211,7 +211,7 @@ def _draw_svg(dot: str) -> None:
 
 
 def _save(name: str, text: str) -> None:
-    """Write a file into the current folder. Raise ToolError if it cannot be written."""
+    """Write a file into the current folder. Raise ToolError if the file cannot be written."""
     try:
         Path(name).write_text(text, encoding="utf-8")
     except OSError as error:

@@ -1,4 +1,4 @@
-"""tf2_sensor_msgs: transforms point clouds for tf2_ros. Importing it registers their type."""
+"""tf2_sensor_msgs: transforms point clouds for tf2_ros. Importing this package registers the type PointCloud2."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""mux_select, mux_add, mux_delete and mux_list call a service of a running mux; demux_select and so on call a demux.
+"""mux_select, mux_add, mux_delete and mux_list call a service of a running mux; demux_select etc. call a service of a demux.
 
 The demux programs exist only in minirospy. The exit status is 1 if the call fails (ROS: 0).
 """

@@ -41,7 +41,7 @@ class Output:
     ) -> None:
         """Create the output.
 
-        ``latch`` None means the same as the input; ``on_advertised`` is called after the first message.
+        If ``latch`` is None, the output is latched if the input is; ``on_advertised`` is called after the first message.
         """
         self.topic = checked_topic(topic)
         self._latch = latch
@@ -80,7 +80,7 @@ class Output:
         self._on_advertised()
 
     def close(self) -> None:
-        """Unregister the topic if it is advertised."""
+        """Unregister the topic if it has been advertised."""
         with self._lock:
             if self._publisher is not None:
                 self._publisher.unregister()
@@ -113,7 +113,7 @@ class Input:
         return self._subscriber is not None
 
     def open(self) -> None:
-        """Subscribe, unless already subscribed."""
+        """Subscribe, unless the topic is already subscribed."""
         with self._lock:
             if self._subscriber is None:
                 self._subscriber = rospy.Subscriber(
@@ -121,7 +121,7 @@ class Input:
                 )
 
     def close(self) -> None:
-        """Unsubscribe, if subscribed."""
+        """Unsubscribe, if the topic is subscribed."""
         with self._lock:
             subscriber, self._subscriber = self._subscriber, None
         if subscriber is not None:
@@ -129,7 +129,7 @@ class Input:
 
 
 def base_name(topic: str) -> str:
-    """Return the last part of a topic's name, which becomes part of the node's name. Raise ValueError if it is empty."""
+    """Return the last part of a topic's name, which becomes part of the node's name. Raise ValueError if that part is empty."""
     name = checked_topic(topic).rstrip("/").rpartition("/")[2].lstrip("~")
     if not name:
         raise ValueError(f"[{topic}] is not the name of a topic")
@@ -137,7 +137,7 @@ def base_name(topic: str) -> str:
 
 
 def checked_topic(topic: str) -> str:
-    """Return a topic's name. Raise ValueError if it is invalid."""
+    """Return a topic's name. Raise ValueError if the name is invalid."""
     if not is_legal_name(topic):
         raise ValueError(f"[{topic}] is not the name of a topic")
     return topic
@@ -156,9 +156,9 @@ def run_node(
 ) -> int:
     """Run a program until its node shuts down; return its exit status.
 
-    ``name`` and ``prepare`` are called with the command-line arguments; if they raise ValueError, it is printed with the usage.
-    ``prepare`` checks the arguments, which needs no master, and returns the function that is called once the node runs.
-    ``counts``: the allowed numbers of arguments.
+    ``name`` and ``prepare`` are called with the command-line arguments; if either raises ValueError, the error is printed with
+    the usage. ``prepare`` checks the arguments, which needs no master, and returns the function that is called once the node
+    runs. ``counts``: the allowed numbers of arguments.
     """
     words = rospy.myargv()[1:]
     try:

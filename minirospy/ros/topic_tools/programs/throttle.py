@@ -41,7 +41,9 @@ usage: drop IN_TOPIC X Y [OUT_TOPIC]
 """
 
 Passes = Callable[[float, int], bool]
-"""Given the time in seconds and a message's size in bytes, returns whether the message passes; counts it if so."""
+"""A function that receives the time in seconds and a message's size in bytes, and returns whether to forward the message. If
+so, it counts the message.
+"""
 
 
 def main() -> int:
@@ -98,7 +100,7 @@ def _count(word: str) -> int:
 
 
 class MessageLimit:
-    """Lets a message pass if more than ``period`` seconds have elapsed since the last one that passed."""
+    """Lets a message pass if more than ``period`` seconds have elapsed since the last message that passed."""
 
     def __init__(self, period: float) -> None:
         self._period = period
@@ -148,7 +150,7 @@ def every(dropped: int, of: int) -> Passes:
 
 
 class Filter:
-    """Forwards those messages unchanged that a function selects."""
+    """Forwards the messages that a function selects, unchanged."""
 
     def __init__(
         self,
@@ -163,8 +165,8 @@ class Filter:
         self._passes = passes
         self._clock = clock
         self._is_lazy = is_lazy
-        # The lock covers a subscriber that arrives while the input is being closed, so that the input is opened
-        # again.
+        # The lock covers a subscriber that arrives while the input is being closed, so that the input is reopened for
+        # it.
         self._lock = threading.Lock()
 
         self._output = Output(

@@ -18,7 +18,7 @@ _WARN_SECONDS = 5
 
 
 class MetaLazyTransport(type):
-    """Calls ``_post_init`` after the constructors of all subclasses, by when their publishers exist."""
+    """Calls ``_post_init`` after the constructors of all subclasses, so that their publishers already exist."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         made = super().__call__(*args, **kwargs)
@@ -66,7 +66,7 @@ class LazyTransport(SubscribeListener, metaclass=MetaLazyTransport):
         self._subscribe_once()
 
     def peer_unsubscribe(self, *args: object, **kwargs: object) -> None:
-        """Unsubscribe when none of the node's topics has a subscriber left."""
+        """Unsubscribe when none of the node's topics has any subscribers left."""
         rospy.logdebug(f"[{args[0]}] is unsubscribed")
         if not rospy.get_param("~lazy", True):
             return

@@ -1,6 +1,6 @@
 """`check_urdf`, and `urdf_to_graphviz` with its old name `urdf_to_graphiz`: print or draw a robot description's tree.
 
-The output is the same as that of liburdfdom-tools, except that line numbers refer to the description, not to the tools'
+The output is the same as that of liburdfdom-tools, except that line numbers refer to the description instead of the tools'
 source code. The exit status is 255 if the description cannot be read, as in liburdfdom-tools. Source:
 http://wiki.ros.org/urdf#Verification.
 """

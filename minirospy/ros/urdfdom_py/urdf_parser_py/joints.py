@@ -226,7 +226,7 @@ class TransmissionJoint(Object):
         self.hardwareInterfaces: list[str] = []
 
     def check_valid(self) -> None:
-        """Raise AssertionError if there is no hardware interface."""
+        """Raise AssertionError if the joint has no hardware interface."""
         if not self.hardwareInterfaces:
             raise AssertionError("no hardwareInterface defined")
 
@@ -250,7 +250,7 @@ class Transmission(Object):
         self.actuators: list[Actuator] = []
 
     def check_valid(self) -> None:
-        """Raise AssertionError if there is no joint or no actuator."""
+        """Raise AssertionError if the transmission has no joint or no actuator."""
         if not self.joints:
             raise AssertionError("no joint defined")
         if not self.actuators:

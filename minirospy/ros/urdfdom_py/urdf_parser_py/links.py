@@ -131,7 +131,7 @@ class GeometricType(Codec[Object]):
     _KINDS: dict[str, type[Object]] = {kind.TAG: kind for kind in (Box, Cylinder, Sphere, Mesh)}
 
     def from_xml(self, node: ET.Element, path: Path) -> Object:
-        """Return the shape. Raise AssertionError unless there is exactly one."""
+        """Return the shape. Raise AssertionError unless the element contains exactly one shape."""
         if len(node) != 1:
             raise AssertionError("One element only for geometric")
         kind = self._KINDS.get(node[0].tag)

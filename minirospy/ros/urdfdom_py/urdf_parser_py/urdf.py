@@ -116,7 +116,7 @@ class Robot(Object):
     def from_parameter_server(cls, key: str = "robot_description") -> Robot:
         """Build the robot from the description in a parameter.
 
-        Raise KeyError if the parameter is not set, and the exceptions that from_xml_string raises if it is invalid.
+        Raise KeyError if the parameter is not set, and the exceptions of from_xml_string if the description is invalid.
         """
         from minirospy import client as rospy
 
@@ -161,7 +161,7 @@ class Robot(Object):
         return chain[::-1]
 
     def get_root(self) -> str:
-        """Return the only link without a parent. Raise AssertionError unless there is exactly one."""
+        """Return the only link without a parent. Raise AssertionError unless there is exactly one such link."""
         roots = [name for name in self.link_map if name not in self.parent_map]
         if len(roots) > 1:
             raise AssertionError("Multiple roots detected, invalid URDF.")

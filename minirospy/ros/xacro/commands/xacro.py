@@ -1,8 +1,8 @@
 """`xacro`: expands the macros in robot descriptions with the Python package xacro.
 
 `$(find PACKAGE)` finds minirospy's packages. The options, messages and exit statuses (2 if a file cannot be processed) are
-those of the Python package. Options that earlier releases needed for behaviour that is now standard are accepted. Source:
-http://wiki.ros.org/xacro.
+those of the Python package. Options that enabled now-standard behaviour in earlier releases are accepted without effect.
+Source: http://wiki.ros.org/xacro.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _xacro(words: Sequence[str]) -> int:
-    # The package xacro uses xml.parsers in an `except` clause without importing it.
+    # Import this module here, because the package xacro uses it in an `except` clause without importing it.
     import xml.parsers.expat  # noqa: F401
 
     try:
@@ -61,7 +61,7 @@ def _xacro(words: Sequence[str]) -> int:
     def checked_parse(inp: object, filename: str | None = None) -> object:
         """Parse a file or string after checking that its entities do not expand to gigabytes."""
         if inp is None and filename is not None:
-            # Ignore a file that cannot be opened: xacro reports the error itself.
+            # Ignore a file that cannot be opened, because xacro itself reports the error.
             with contextlib.suppress(OSError), open(Path(xacro.root_dir, filename)) as file:
                 inp = file.read()
         if isinstance(inp, str):

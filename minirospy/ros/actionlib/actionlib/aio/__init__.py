@@ -19,7 +19,7 @@
     async with ActionServer(node, "run_led", runningLedAction, execute):
         await node.spin()
 
-On the wire they are compatible with actionlib. The state transitions are in `minirospy.core.graph.goals`. Source:
+Both are wire-compatible with actionlib. The state transitions are in `minirospy.core.graph.goals`. Source:
 http://wiki.ros.org/actionlib/DetailedDescription. Examples: docs/actions.md.
 """
 

@@ -30,8 +30,8 @@ _M = TypeVar("_M", bound=Message)
 class ClientGoal(Generic[_R, _F]):
     """A goal that was sent; created by :meth:`ActionClient.send`.
 
-    ``async for`` over it yields the feedback until the goal reaches a terminal state. ``await goal`` returns the result. It
-    raises GoalError if the goal was not reached, ROSInterruptException if the client or node was closed before that.
+    ``async for`` over the goal yields feedback until the goal reaches a terminal state. ``await goal`` returns the result, or
+    raises GoalError if the goal was not reached, or ROSInterruptException if the client or node was closed before that.
     ``async with goal:`` cancels the goal if the block is left before the goal has ended.
     """
 
@@ -88,7 +88,7 @@ class ClientGoal(Generic[_R, _F]):
         self._news.set()
 
     def _take_status(self, status: GoalStatus | None) -> None:
-        """Process the goal's status from the server's list, or None if the list does not contain the goal."""
+        """Process the goal's entry in the server's status list; ``status`` is None if the list does not contain the goal."""
         if status is not None:
             self._is_known = True
             self.state, self.text = GoalState(status.status), status.text
@@ -130,7 +130,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         self._status = node.subscribe(self._topic("status"), StatusList, queue_size=WAITING)
         self._result = node.subscribe(self._topic("result"), types.action_result, queue_size=WAITING)
         self._feedback = node.subscribe(self._topic("feedback"), types.action_feedback, queue_size=WAITING)
-        self._statuses: StatusList | None = None  # the last list
+        self._statuses: StatusList | None = None  # the last status list received
         self._status._state.subscription.on_ended.append(self._status_link_ended)
         self._heard = asyncio.Event()
         self._start(self._read(self._status, self._take_status))
@@ -222,7 +222,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
                 del self._goals[goal.id]
 
     def _status_link_ended(self) -> None:
-        """Check after a while whether the server is gone."""
+        """Check after SERVER_SECONDS whether the server is gone."""
         if goals := [goal for goal in self._goals.values() if goal._is_sent]:
             self._check_later(goals)
 
@@ -249,7 +249,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         status = message.status
         goal = self._goals.get(status.goal_id.id)
         if goal is not None:
-            # Feedback arrives on a separate connection: process the feedback that has already arrived first.
+            # Feedback arrives on a separate connection, so process the feedback that has already arrived first.
             end = (goal, GoalState(status.status), status.text, cast("_R", message.result))
             asyncio.get_running_loop().call_soon(self._end_goal, *end)
 

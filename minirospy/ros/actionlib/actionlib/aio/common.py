@@ -53,8 +53,8 @@ class ActionClass(Protocol[_G_co, _R_co, _F_co]):
 class GoalError(MinirospyError):
     """The goal was not reached. ``text`` and ``result`` (if any) come from the server; ``state`` is the final state.
 
-    A server's ``execute`` raises it to abort the goal with a status text and a result. The result may have any type that
-    ``execute`` may return.
+    A server's ``execute`` raises this error to abort the goal with a status text and a result. The result may have any type
+    that ``execute`` may return.
     """
 
     def __init__(self, text: str = "", result: object = None, state: GoalState = GoalState.ABORTED) -> None:

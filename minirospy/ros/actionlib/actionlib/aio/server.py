@@ -69,7 +69,10 @@ class ServerGoal(Generic[_G, _F]):
             self._status.status, self._status.text = int(state), text
 
     def _make_way(self) -> None:
-        """Cancel the goal's task, because the goal was cancelled or preempted. Repeated calls have no effect."""
+        """Cancel the goal's task, because a client has cancelled the goal or a newer goal preempts it.
+
+        Repeated calls have no effect.
+        """
         if self._task and not self.is_cancel_requested:
             self.is_cancel_requested = True
             # If a task is cancelled before it starts, it never runs, and the client would get no result.
@@ -162,7 +165,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
     ) -> None:
         async for message in subscription:
             await take(message)
-        # The node is shutting down: stop the running goals.
+        # The node is shutting down, so stop the running goals.
         for goal in self._running():
             if goal._task:
                 goal._task.cancel()
@@ -215,7 +218,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
                 goal._step(GoalEvent.CANCEL_REQUEST)
                 goal._make_way()
         if cancel.id and cancel.id not in self.goals:
-            # The goal may still arrive after the cancel request.
+            # The goal may still arrive after the cancel request, so remember the request.
             self._canceled_early[cancel.id] = self._node.now().to_nsec()
         self._last_cancel = max(self._last_cancel, stamp)
         self._changed.set()

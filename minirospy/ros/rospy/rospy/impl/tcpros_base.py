@@ -1,4 +1,4 @@
-"""rospy.impl.tcpros_base: a TCPROS connection that a program makes itself."""
+"""rospy.impl.tcpros_base: a TCPROS connection for programs that open connections themselves."""
 
 from minirospy.base.errors import TransportException, TransportInitError, TransportTerminated
 from minirospy.client.length_prefix import deserialize_messages, serialize_message

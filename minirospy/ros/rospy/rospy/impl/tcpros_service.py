@@ -1,4 +1,4 @@
-"""rospy.impl.tcpros_service: services, and the two sides of a connection to one."""
+"""rospy.impl.tcpros_service: services, and the client and server of a service connection."""
 
 from minirospy.base.errors import (
     ROSException,
@@ -40,9 +40,9 @@ __all__ = [
     "wait_for_service",
 ]
 
-ServiceImpl = Service  # in ROS, the base class of Service
+ServiceImpl = Service  # the base class of Service in ROS
 
 
 def convert_return_to_response(response: object, response_class: type[Message]) -> Message:
-    """Return a handler's return value as a response. Raise ServiceException if it does not match."""
+    """Return a handler's return value as a response. Raise ServiceException if the value does not match the response type."""
     return to_response(response_class, response)

@@ -8,7 +8,7 @@ DEFAULT_BUFF_SIZE = 65536
 """The default value for Subscriber's ``buff_size``."""
 
 
-# classes that are imported on use: few programs use them, and `import rospy` need not import their module
+# Classes that are imported on first use: few programs use them, and `import rospy` need not import their module.
 _CLASSES = ("DeadTransport", "ProtocolHandler", "Transport")
 
 

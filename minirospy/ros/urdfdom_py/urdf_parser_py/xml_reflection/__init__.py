@@ -1,4 +1,4 @@
-"""urdf_parser_py.xml_reflection: objects that are read from XML and written to it."""
+"""urdf_parser_py.xml_reflection: objects that are read from XML and written to XML."""
 
 from typing import TYPE_CHECKING
 

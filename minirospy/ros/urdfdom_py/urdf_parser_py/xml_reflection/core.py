@@ -1,4 +1,4 @@
-"""Objects that are converted to and from XML, as described by a table of their attributes, elements, and lists of elements.
+"""Objects that are converted to and from XML, as described by tables of their attributes, elements, and lists of elements.
 
 Error messages and their paths (``/robot[@name='r']/link[1]``) are those of urdf_parser_py.
 """
@@ -102,7 +102,7 @@ class VectorOf(Codec[Iterable[float]]):
         self._count = count
 
     def from_string(self, text: str) -> list[float]:
-        """Convert a string to numbers. Raise AssertionError if their count is wrong, ValueError if one is invalid."""
+        """Convert a string to numbers. Raise AssertionError if their count is wrong, ValueError if a number is invalid."""
         words = text.split()
         if len(words) != self._count:
             raise AssertionError("Invalid vector length")
@@ -190,19 +190,19 @@ class Element:
 
 @dataclass(frozen=True)
 class Many:
-    """Child elements that occur any number of times, stored as a list in the attribute with the name ``name`` + "s"."""
+    """Child elements that occur any number of times, stored as a list in the attribute ``name`` + "s"."""
 
     name: str
     codec: Codec[Any]
 
 
 class Object:
-    """An element as an object: ``TAG`` is its tag, ``FIELDS`` describes its attributes and children."""
+    """An element as an object: ``TAG`` is the element's tag, ``FIELDS`` describes its attributes and children."""
 
     TAG: ClassVar[str] = ""
     FIELDS: ClassVar[tuple[Attribute | Element | Many, ...]] = ()
 
-    # --- XML in
+    # --- parsing XML
 
     @classmethod
     def from_xml_string(cls: type[_T], xml_string: str | bytes) -> _T:
@@ -216,7 +216,7 @@ class Object:
     def from_xml_file(cls: type[_T], file_path: str) -> _T:
         """Return the object parsed from a file.
 
-        Raise OSError if it cannot be read, and the errors that from_xml_string raises.
+        Raise OSError if the file cannot be read, and the errors that from_xml_string raises.
         """
         return cls.from_xml_string(File(file_path).read_bytes())
 
@@ -302,7 +302,7 @@ class Object:
     def pre_write_xml(self) -> None:
         """Do nothing; subclasses in programs override it to prepare for writing."""
 
-    # --- XML out
+    # --- writing XML
 
     def to_xml(self) -> ET.Element:
         """Return the object as an element."""
@@ -372,7 +372,7 @@ class Object:
     def _aggregates(self) -> list[tuple[str, object]]:
         return [(self.aggregate_type[each], each) for each in self.aggregate_order]
 
-    # --- for people
+    # --- human-readable output
 
     def to_yaml(self) -> object:
         """Return the object as data that YAML can represent."""
