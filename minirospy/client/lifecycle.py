@@ -35,7 +35,7 @@ class _ThisThread(threading.local):
 
 
 class _Interrupting:
-    """The context manager that :meth:`Lifecycle.interrupting` returns.
+    """This is a class, because every service call uses it and a generator-based context manager is slower.
 
     It is a class, because each service call uses it and a generator is slower.
     """

@@ -195,7 +195,8 @@ class PublishedTopic(SharedTopic):
     def leave(self, handle: Publisher[Message]) -> None:
         with self._session.lock:
             self._handles.discard(handle)
-            # After a fork, or after the process became another node, the topic is no longer in the table.
+            # After a fork, or after the process became another node, the session's table no longer contains this
+            # topic.
             if self._handles or self._session.published.get(self.resolved_name) is not self:
                 return
             del self._session.published[self.resolved_name]
@@ -309,7 +310,7 @@ class PublishedTopic(SharedTopic):
         return any(link.peer == endpoint_id for link in self.publication.links)
 
     def _log_unheard(self) -> None:
-        """Log that the first message had no subscriber.
+        """Log that the first message was published without a subscriber.
 
         Log a warning only if the master reports a subscriber that is still connecting: many topics have no subscriber at
         first, or never have one.

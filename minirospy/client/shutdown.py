@@ -89,7 +89,7 @@ class ShutdownMachine:
 
         is_leaving = self.phase is Phase.LEAVING
         if is_leaving and self.runs_in_main:
-            # The main thread is not running the program's code.
+            # The main thread is running the shutdown and not the program's code, so do not raise an exception in it.
             return [Action.STOP_LEAVING]
         self._done.add(Action.INTERRUPT)
         return [Action.STOP_LEAVING, Action.KEYBOARD_INTERRUPT] if is_leaving else [Action.KEYBOARD_INTERRUPT]
@@ -114,9 +114,9 @@ class ShutdownMachine:
 
     @property
     def main_ends_by_itself(self) -> bool:
-        """Return whether the main thread needs no exception, because it has exited or has been notified of the shutdown."""
-        # Trust a main thread that polls to exit, except after a request from another process, when no user can press
-        # Ctrl-C again.
+        """Return whether the main thread will exit without an exception, because it has exited or has been notified."""
+        # Trust a main thread that polls to exit by itself. After a request from another process do not rely on this,
+        # because no user can press Ctrl-C again.
         trusted = Awareness.NOTIFIED if self.is_requested else Awareness.POLLS
         return self.main_has_ended or self.main.awareness >= trusted
 

@@ -28,9 +28,10 @@ _FIRST_WINDOW = 2.0
 
 
 class WindowLimits(NamedTuple):
-    """The limits of an adaptive window. Its length doubles below ``min_elements`` messages and halves above ``max_elements``.
+    """The limits of an adaptive window.
 
-    It stays between ``min_size`` and ``max_size`` seconds.
+    The window's length doubles if it has fewer than ``min_elements`` messages, and halves if it has more than
+    ``max_elements``. The length stays between ``min_size`` and ``max_size`` seconds.
     """
 
     min_elements: float = 10
@@ -40,7 +41,7 @@ class WindowLimits(NamedTuple):
 
     @classmethod
     def read(cls, get: Callable[[str, object], float]) -> WindowLimits:
-        """Return the limits set by the parameters /statistics_window_...; ``get(key, default)`` reads one."""
+        """Return the limits set by the parameters /statistics_window_...; ``get(key, default)`` reads one parameter."""
         return cls(
             *(get(f"/statistics_window_{name}", default) for name, default in cls._field_defaults.items())
         )
