@@ -59,7 +59,7 @@ sys.path.append(sys.argv[1])
 from minirospy.board.server import main
 sys.exit(main(sys.argv[2:]))
 """
-"""Code that does the same as `python -m minirospy.board.server`, and also finds a package imported from the current folder."""
+"""Code that does the same as `python -m minirospy.board.server`, but also finds a package imported from the current folder."""
 
 
 class Edge(NamedTuple):
@@ -279,8 +279,9 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
-            # Status 0 without a responding server: the new server found another one that was just exiting. Negative
-            # status: a Ctrl-C for this process killed the new server before it had detached from the terminal.
+            # Status 0 without a responding server: the new server exited because another one was still running, and
+            # that one has exited since. Negative status: a Ctrl-C for this process killed the new server before it
+            # had detached from the terminal.
             process = _start_server(directory)
         time.sleep(pause)
         pause = min(pause * 1.3, 0.05)

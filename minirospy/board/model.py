@@ -1,4 +1,4 @@
-"""A board's behaviour: operations in, changed pins out. Pure.
+"""A board's behaviour: apply operations and return the changed pins. Pure.
 
 A pin is an input or an output. An output's level is its latch; an input's level is the one driven from outside (a
 pressed button, a jumper wire), else its pull resistor, else 0. As on a Raspberry Pi, the latch does not change if the

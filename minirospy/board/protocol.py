@@ -135,7 +135,7 @@ def serialize(message: Message) -> bytes:
 
 
 class Stream:
-    """The decoder for one direction of a connection: bytes in, messages out."""
+    """A decoder that turns the bytes received in one direction of a connection into messages."""
 
     def __init__(self) -> None:
         self._unpacker = msgpack.Unpacker(use_list=False, max_buffer_size=_MAX_BUFFER)
