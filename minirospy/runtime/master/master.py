@@ -61,7 +61,7 @@ _COLLECT = (2000, 5, 1_000_000_000)
 collected automatically.
 """
 
-SWEEP_SECONDS = 10.0  # between the checks for dead nodes if the master is nearly full
+SWEEP_SECONDS = 10.0  # seconds between checks for dead nodes if the master is nearly full
 _MAX_FORGOTTEN_PER_ITERATION = 20  # dead nodes to forget per loop iteration
 
 _OWN_NODE = "/rosout"
@@ -275,7 +275,7 @@ class Master(MasterApi):
             },
         ]
 
-    # --- the journal
+    # --- journal
 
     def _journal_line(self) -> str:
         if self._journal is None:
@@ -373,7 +373,7 @@ class Master(MasterApi):
         self._journal.retry()
         self.touching = asyncio.get_running_loop().call_later(_TOUCH_SECONDS, self.touch)
 
-    # --- the nodes of a master that was killed
+    # --- nodes of a killed master
 
     async def _anybody_lives(self, nodes: Mapping[str, str]) -> bool:
         rpc = AsyncRpcClient(same_host=self._same_host)
@@ -408,7 +408,7 @@ class Master(MasterApi):
     async def _sweep(self) -> None:
         """When the registrations are nearly full, forget the nodes whose port refuses connections.
 
-        Otherwise they would stay full, because this master, like rosmaster, keeps a killed node's registrations.
+        Otherwise the master would stay full, because this master, like rosmaster, keeps a killed node's registrations.
         """
         while True:
             await asyncio.sleep(SWEEP_SECONDS)

@@ -108,7 +108,7 @@ class Notifier:
         self._starts_soon = False
         self._closed = False
 
-        # The last serialized update: all subscribers of a topic get the same bytes.
+        # The last serialized update: cached, because all subscribers of a topic get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
         # The last serialized large update, of a topic or a parameter.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])

@@ -47,13 +47,14 @@ _SHORT_BODY = 4096  # bytes; a longer request is read in steps
 _ALONE_BODY = 1024 * 1024
 
 PROGRESS_BYTES = (
-    65536  # transferred bytes that restart the time limit: slow radio needs long for a large value
+    # transferred bytes that restart the time limit, because a slow radio link needs long for a large value
+    65536
 )
 
 _RECEIVE = 4096
 _RECEIVE_MORE = 16384
-"""Bytes per receive, for a new request and for the rest of a long one. The first number is small, because all pipelined
-requests in one receive are parsed before the next client is served.
+"""Bytes per receive, for a new request and for the rest of a long one. The first is small, because all pipelined requests
+in one receive are parsed before the next client is served.
 """
 
 _END_OF_HEAD = b"\r\n\r\n"
@@ -278,7 +279,7 @@ class Connection:
         self._go_on()
 
     def _go_on(self) -> None:
-        """Read and process further requests if they were waiting for this response."""
+        """Continue reading requests, and process those that were waiting for this response."""
         if self._enter(Event.ANSWERED):
             self._answer_waiting()
             self._set_deadline()
