@@ -1,6 +1,6 @@
 """Bag files by path: open, copy, filter, compress and reindex them, and create their message classes.
 
-This is what the rosbag commands do, without their output.
+The rosbag commands call these functions and add their output.
 """
 
 from __future__ import annotations
@@ -151,7 +151,10 @@ def copy_bag(
 
 
 class Expression:
-    """A Python expression of `rosbag filter` over topic, m and t. Raise ValueTextError if its syntax is invalid."""
+    """A Python expression for `rosbag filter`, with the variables topic, m and t.
+
+    Raise ValueTextError if its syntax is invalid.
+    """
 
     def __init__(self, text: str) -> None:
         try:

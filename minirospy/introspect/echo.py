@@ -100,7 +100,7 @@ class Echo:
         return message
 
     def text(self, message: Message, received: Received) -> str:
-        """Return the output for a message. Raise IndexError if the path's index exceeds the array."""
+        """Return the output for a message. Raise IndexError if the path's index is beyond the end of the array."""
         value = field_value(message, self._steps, self._report)
         return self._row(value, received) if self._plot else self._block(value)
 

@@ -82,7 +82,7 @@ class RateWindow:
 
 
 class BandwidthWindow:
-    """Measures the sizes of the latest messages (at most ``size``)."""
+    """Measures the sizes of the newest messages (at most ``size`` of them)."""
 
     def __init__(self, size: int = 0) -> None:
         self._messages: deque[tuple[float, int]] = deque(maxlen=size or 100)

@@ -40,7 +40,10 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class Survey:
-    """The graph at one time (monotonic seconds). ``counts``: by process, connection and edge; ``loads``: by node."""
+    """The graph at one time (monotonic seconds).
+
+    ``counts`` is a dict by process, connection and edge; ``loads`` is a dict by node.
+    """
 
     seconds: float
     state: SystemState
