@@ -124,7 +124,7 @@ class Manifest(NamedTuple):
 
     @property
     def build_type(self) -> str:
-        """Return the package's build tool; catkin by default."""
+        """Return the name of the package's build tool; catkin by default."""
         return next((export.text for export in self.exports if export.tag == "build_type"), "") or "catkin"
 
 
@@ -402,7 +402,10 @@ _COMPARE = {
 
 
 class _Condition:
-    """The grammar: ``any := all {"or" all}``, ``all := one {"and" one}``, ``one := "(" any ")" | value operator value``."""
+    """Parses and evaluates a condition.
+
+    The grammar is ``any := all {"or" all}``, ``all := one {"and" one}``, ``one := "(" any ")" | value operator value``.
+    """
 
     def __init__(self, text: str, variables: Mapping[str, str]) -> None:
         self._variables = variables

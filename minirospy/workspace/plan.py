@@ -112,7 +112,8 @@ class Test(NamedTuple):
 class Download(NamedTuple):
     """A file to download.
 
-    ``md5`` is "" if any content is right. ``required``: a failed download is an error. ``for_tests``: only tests need the file.
+    ``md5`` is "" if the content is not checked. ``required``: a failed download is an error. ``for_tests``: only tests
+    need the file.
     """
 
     url: str
@@ -306,7 +307,7 @@ class _Collector:
         return f"{path}/" if name.endswith("/") else path
 
     def _project(self, command: Command) -> None:
-        # A subfolder may belong to another project.
+        # Skip commands in a subfolder, which may belong to another project.
         if command.folder == self._folder and command.arguments[:1] != (self._manifest.name,):
             raise _error(
                 command,

@@ -1,7 +1,7 @@
 """Read the contents of a package's setup.py: Python packages, modules and scripts.
 
-The file is executed, so that it may compute these, with a ``setup()`` that only records its arguments. Neither setuptools
-nor catkin_pkg is needed. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
+The file is executed, because it may compute its lists; the ``setup()`` that it calls only records its arguments. Neither
+setuptools nor catkin_pkg is needed. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
 """
 
 from __future__ import annotations
