@@ -35,9 +35,9 @@ class _ThisThread(threading.local):
 
 
 class _Interrupting:
-    """This is a class, because every service call uses it and a generator-based context manager is slower.
+    """The context manager that :meth:`Lifecycle.interrupting` returns.
 
-    It is a class, because each service call uses it and a generator is slower.
+    This is a class, because every service call uses it and a generator-based context manager is slower.
     """
 
     __slots__ = ("_interrupt", "_lifecycle")

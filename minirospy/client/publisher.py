@@ -187,7 +187,7 @@ class PublishedTopic(SharedTopic):
             if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
             # Set this before registering, because a subscriber may connect immediately, and a publish() before the
-            # master's response counts too.
+            # master's response must work too.
             self._registered = True
             wait = self._session.start(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)
