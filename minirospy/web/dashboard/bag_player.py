@@ -118,7 +118,7 @@ class GraphOutput:
         return True
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """See :meth:`Output.running`. Reads no keys, because the process does other work."""
+        """See :meth:`Output.running`. Reads no keys, because the terminal belongs to the dashboard's process."""
         return nullcontext()
 
     def publish(self, number: int, message: StoredMessage) -> None:
@@ -156,7 +156,7 @@ class GraphOutput:
         try:
             self._loop.call_soon_threadsafe(run)
         except RuntimeError:
-            # The loop has been closed.
+            # The loop has been closed, so the message was not queued.
             self._free.release()
 
 

@@ -120,7 +120,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             await self._publisher.close()
             self._publisher = None
 
-    # --- the joints
+    # --- joints
 
     def start_work(self) -> None:
         """Start the task that follows the parameters and publishes.
@@ -184,7 +184,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             parameters = read_parameters(
                 lambda name, default: values.get(f"~{name}", values.get(name, default)), zeros
             )
-            # Parsing a large description takes seconds.
+            # Parse in a thread, because parsing a large description takes seconds.
             loop = asyncio.get_running_loop()
             joints, robot, kinds = await loop.run_in_executor(None, _described, parameters, warnings.append)
         except (JointError, UrdfError) as error:

@@ -31,7 +31,7 @@ __all__ = ["SUBPROTOCOL", "LaunchEndpoint", "LaunchSession"]
 SUBPROTOCOL = "minirospy.launch.v1"
 
 _LOG_SECONDS = 0.2
-"""Poll interval in seconds for a log file that a page shows, because a file reports no changes."""
+"""Poll interval in seconds for a log file that a page shows; polling is necessary, because a file reports no changes."""
 
 _STOPPING_SECONDS = 0.2
 _MAX_RUNS = 50
@@ -67,7 +67,8 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
     async def restart(self, run: LaunchRun) -> None:
         """Stop a launch, and start its file again with the same arguments.
 
-        Do nothing if another client is restarting or has restarted it. Raise UsageError if the file cannot be started.
+        Do nothing if another client is restarting the launch or has restarted it. Raise UsageError if the file cannot be
+        started.
         """
         if run.id in self._restarting or run.id not in self.runs:
             return
@@ -113,7 +114,7 @@ class _Tail:
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)
-        # Query this before reading, so that everything the node wrote before it exited is in the file.
+        # Query this before reading, so that the file contains everything that the node wrote before it exited.
         has_exited = self.run.has_exited(self.node)
         path = self.run.log_file(self.node)
         if path is None:
@@ -242,7 +243,7 @@ class LaunchSession(JsonSession):
             found = {"log": {"id": tail.run.id, "node": tail.node}, "text": text, "isFirst": tail.is_first}
             tail.is_first = False
             self.send(found)
-        # The file may contain more than one read returns.
+        # The file may contain more data than one read returns.
         return is_growing or bool(tail.node and text)
 
 

@@ -114,7 +114,8 @@ class Parameters:
         allowed = self._graph.filters.parameters
         is_empty = value == {}
         leaves = [] if is_empty else [leaf for leaf in _leaves(name.rstrip("/"), value) if allowed(leaf[0])]
-        # The master's notification does not distinguish a deleted namespace from an empty one, so read the value.
+        # The master's notification does not distinguish a deleted namespace from an empty one, so read the value from
+        # the master.
         emptied = name if is_empty and name != _ROOT and allowed(name) else ""
         again = {emptied} - {""}
         for listener, names in list(self._wanted.items()):

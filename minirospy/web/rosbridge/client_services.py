@@ -58,7 +58,7 @@ class ClientServices:
             self._session.count()
 
         self._session.spawn(self._call(event, is_large=self._session.is_large)).add_done_callback(ended)
-        # Do this last, because it closes the client, and cancels the call, if the limit is exceeded.
+        # Report the memory last, because this closes the client, and cancels the call, if the limit is exceeded.
         self._session.count()
 
     async def _call(self, event: protocol.CallService, *, is_large: bool) -> None:

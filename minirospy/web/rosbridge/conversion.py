@@ -1,7 +1,7 @@
 """Convert messages to dictionaries, for JSON and CBOR, and back, with rosbridge's rules and error messages. Pure.
 
-uint8[] and char[] become base64 (bytes in CBOR), NaN and infinities null (in JSON), times {secs, nsecs}. Source:
-ROSBRIDGE_PROTOCOL.md, and the responses of rosbridge_library.
+uint8[] and char[] become base64 (in CBOR: bytes), NaN and infinities become null (in JSON), and times become {secs,
+nsecs}. Source: ROSBRIDGE_PROTOCOL.md, and the responses of rosbridge_library.
 """
 
 from __future__ import annotations

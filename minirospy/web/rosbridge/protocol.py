@@ -196,7 +196,7 @@ class Auth(Event):
 Fields = Mapping[str, Any]
 
 
-# --- in
+# --- parsing
 
 
 def is_quick(data: str | bytes) -> bool:
@@ -273,7 +273,7 @@ def _text_of(value: object, most: int) -> str:
 
 
 def _cut(value: object, most: int, numbers: Iterator[int]) -> object:
-    """Return only the first values in a value from JSON or CBOR, because each one takes at least one character."""
+    """Return only the first items of a value from JSON or CBOR, because each item takes at least one character."""
     # The quotes around a string depend on the quotes in it, including those in the part cut off.
     if isinstance(value, str) and len(value) > most:
         return value[:most] + "".join(quote for quote in "'\"" if quote in value)
@@ -460,7 +460,7 @@ OPERATIONS = (
 """The operations that clients may send, in the order in which errors list them."""
 
 
-# --- out
+# --- encoding
 
 
 def encode(

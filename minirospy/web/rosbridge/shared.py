@@ -25,7 +25,7 @@ _LOG_LINES = 20
 
 # maximum bytes of a message that is encoded immediately; 8,000 numbers take 8 ms
 _MAX_QUICK_BODY = 64 * 1024
-# maximum bytes of an image that is encoded immediately; in base64 it takes 3 ms
+# maximum bytes of an image that is encoded immediately; encoding it in base64 takes 3 ms
 _MAX_QUICK_IMAGE = 1024 * 1024
 _IMAGES = {
     "sensor_msgs/Image",
@@ -37,7 +37,7 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class RosbridgeOptions:
-    """``fragment_timeout`` and ``unregister_timeout`` are in seconds.
+    """The options of the rosbridge server. ``fragment_timeout`` and ``unregister_timeout`` are in seconds.
 
     ``fragment_size`` is the maximum number of characters in a message to clients; None disables fragments.
     """

@@ -5,7 +5,7 @@ the limit is exceeded, the client that uses the most memory, at the address that
 first messages that may be dropped, then its connection. The owner's clients are chosen last. Therefore no client can
 use up the memory, or cause another client to be disconnected.
 
-The same large piece, such as a camera image, may be queued for many clients; it counts only once.
+A large piece, such as a camera image, that is queued for many clients counts only once.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ class Limits:
 
     message: int = 64_000_000
     read_only_message: int = 64 * 1024
-    """Maximum bytes in a message from a read-only client, which subscribes but sends nothing large."""
+    """Maximum bytes in a message from a read-only client, which subscribes but sends no large messages."""
     memory: int = MAX_BYTES
     """Maximum bytes held for all clients together: see account.py."""
     messages_a_second: int = 20_000

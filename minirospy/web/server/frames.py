@@ -42,7 +42,7 @@ class FrameByFrame(ServerProtocol):
                 setattr(self, name, size)
 
     def parse(self) -> Generator[None]:
-        """See the library's method. Called once, before anything is read."""
+        """See the library's method. Called once, before any data is read."""
         self.reader = _GatedReader()
         yield from super().parse()
 

@@ -1,9 +1,9 @@
 """The output queue of one client: limited in size, oldest first, and always with the newest message of each topic.
 
-Pure. A message is queued under a key (its topic or subscription). If the limit is exceeded, the key's own oldest message is
-dropped, then the oldest message of the key with the most bytes, so that a camera does not displace small messages. Responses
-(``put_answer``) are never dropped: the caller disconnects a client that does not read them. Sizes are bytes in memory: of a
-message and of its entry in the queue, which is larger than a small message.
+Pure. A message is queued under a key (its topic or subscription). If the limit is exceeded, the key's own oldest message
+is dropped, then the oldest message of the key with the most bytes, so that a camera does not displace small messages.
+Responses (``put_answer``) are never dropped: the caller disconnects a client that does not read them. Sizes are bytes in
+memory: a message's and that of its entry in the queue, which is larger than a small message.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ def _distance(one: Vector3, other: Vector3) -> float:
 
 
 def _angle(one: Quaternion, other: Quaternion) -> float:
-    """Return the angle between two rotations as quaternions. Like the real node's, it is half the angle of rotation."""
+    """Return the angle between two rotations as quaternions. As in the real node, this is half the angle of rotation."""
     first, second = ((each.x, each.y, each.z, each.w) for each in (one, other))
     norm = math.hypot(*first) * math.hypot(*second)
     if not norm:
