@@ -205,7 +205,7 @@ def _decompress_bz2(data: bytes, output: _Output) -> bytes:
 
 def _decompress_lz4(data: bytes, output: _Output) -> bytes:
     if output.size > len(data) * _MAX_LZ4:
-        # Check this first, because the library allocates the expected size before it reads the data.
+        # Check the size first, because the library allocates it before it reads the data.
         raise BagFormatError(f"a chunk's {output.size} bytes cannot be in {len(data)} bytes of LZ4")
     stream = _lz4_frame().LZ4FrameDecompressor()
     # Pass the data in parts, because the library copies the remaining data each time.

@@ -1,4 +1,4 @@
-"""A bag's summary, as `rosbag info` prints it: a reader in, a summary out, as text or YAML.
+"""Compute a bag's summary from a reader, and format it as text or YAML as `rosbag info` does.
 
 Source: http://wiki.ros.org/rosbag/Commandline#info. The wording is ROS's own, because programs parse it.
 """

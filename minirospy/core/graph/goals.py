@@ -1,7 +1,8 @@
 """The states of an action goal, as tables: the server's transitions, and a client's transitions on received statuses.
 
-In: a state and an event. Out: the next state, or the sequence of states, or None if the transition is invalid.
-Source: http://wiki.ros.org/actionlib/DetailedDescription, and actionlib itself for details missing on that page.
+A table contains, for a state and an event, the next state or the sequence of next states; invalid transitions are
+missing. Source: http://wiki.ros.org/actionlib/DetailedDescription, and actionlib itself for details missing on that
+page.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The parameter server's tree, and the nodes to notify of a change.
 
-Pure: calls in, values and updates out. Keys are global names. Source:
+Pure: calls return values, and the updates to send. Keys are global names. Source:
 http://wiki.ros.org/ROS/Parameter%20Server%20API, and rosmaster for details missing there.
 """
 
@@ -335,7 +335,7 @@ def weigh_in_steps(key: str, value: object) -> Steps[int]:
     # Include the namespaces that contain the value, because they may not exist yet.
     weight = sum(sys.getsizeof(name) + 2 * _ENTRY_BYTES for name in _split(key)[:-1])
     left = _STEP_ITEMS
-    # The containers of the current item: the depth of their items, and the remaining items.
+    # One entry per container that encloses the current item: (depth of its items, iterator over its remaining items).
     around: list[tuple[int, Iterator[Any]]] = [(len(_split(key)), iter((value,)))]
     while around:
         depth, items = around[-1]

@@ -1,7 +1,7 @@
 """The master's registry: each node's publishers, subscribers and services.
 
-Pure: calls in, (response, actions) out. Names are global. Source: http://wiki.ros.org/ROS/Master_API, and
-rosmaster for details missing there.
+Pure: calls return a response and the actions to perform. Names are global. Source: http://wiki.ros.org/ROS/Master_API,
+and rosmaster for details missing there.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The connection plan for one subscribed topic: which publishers to connect or disconnect, and when to retry.
 
-Pure: events in, actions out.
+Pure: methods take events and return actions.
 """
 
 from __future__ import annotations

@@ -60,7 +60,8 @@ class Catalogue:
         self, packages: Mapping[str, Path], definitions: Mapping[str, Iterable[Path]] | None = None
     ) -> None:
         self.packages = packages
-        # Indexed by package and kind, because a package may have hundreds, and each is looked up by its name.
+        # Indexed by package and kind, because a package may have hundreds of definitions, and each is looked up by
+        # its name.
         self._definitions: dict[str, dict[str, dict[str, Path]]] = {}
         for package, files in (definitions or {}).items():
             kinds = self._definitions[package] = {"msg": {}, "srv": {}, "action": {}}
@@ -147,7 +148,7 @@ class Catalogue:
             return self._specs[full_name]
         if name in _OF_OTHER_LANGUAGES and name not in files:
             raise NotFoundError("message type", full_name, hint=f"did you mean {_OF_OTHER_LANGUAGES[name]}?")
-        import difflib  # needed only for the error
+        import difflib  # imported here, because only the error needs it
 
         near = difflib.get_close_matches(name, [*files, *PRIMITIVES], n=1, cutoff=0.7)
         if near and near[0] in PRIMITIVES:
@@ -379,7 +380,7 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
 
 
 def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> type[Message]:
-    """Execute the source of a class, whose fields use the classes that were created before."""
+    """Execute the source of a class, whose fields use the classes created before."""
     file = f"<generated {name}>"
     module = types.ModuleType(f"minirospy_generated.{name.replace('/', '.')}")
     for type_, alias in emitted.classes.items():

@@ -126,7 +126,7 @@ class Message:
     def _check_types(self, exc: Exception | None = None) -> None:
         """Raise SerializationError for the first field with an invalid value, or for ``exc`` if there is no such field.
 
-        A number that exceeds a float32 is an OverflowError, as in genpy, which does not convert struct's.
+        As in genpy, which does not convert struct's errors, a number that exceeds a float32 raises OverflowError.
         """
         # After an error, find the field that cannot be written; otherwise check everything that genpy checks.
         checks = _STRICT_CHECKS if exc is None else _CHECKS

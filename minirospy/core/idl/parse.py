@@ -32,7 +32,7 @@ _RANGES = {
 
 
 def parse_message(text: str, package: str, name: str, where: str = "") -> MessageSpec:
-    """Parse a .msg text. ``where`` is its name in errors (default: the type). Raise DefinitionError if it is invalid."""
+    """Parse a .msg text. ``where`` is the text's name in errors (default: the type). Raise DefinitionError if it is invalid."""
     return _parse(text, package, name, where or f"{package}/{name}", 1)
 
 
