@@ -281,7 +281,7 @@ class CallFailed(WireError):
 
 
 class SourceError(MinirospyError):
-    """An error in a text written by a person: ``file`` (its path or another name), ``line`` (from 1; 0 means the whole
+    """An error in text written by a person: ``file`` (its path or another name), ``line`` (from 1; 0 means the whole
     text).
     """
 
