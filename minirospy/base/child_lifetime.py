@@ -76,7 +76,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """A context manager. If ``is_guarded`` is true, child processes are terminated with this process until :meth:`close`."""
+    """A context manager. If ``is_guarded`` is set, child processes are terminated with this process until :meth:`close`."""
 
     def __init__(self, job: ProcessJob | None) -> None:
         self._job = job if job is not None and job.guard() else None

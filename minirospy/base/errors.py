@@ -281,9 +281,7 @@ class CallFailed(WireError):
 
 
 class SourceError(MinirospyError):
-    """An error in text written by a person: ``file`` (its path or another name), ``line`` (from 1; 0 means the whole
-    text).
-    """
+    """An error in text written by a person: ``file`` (its path or another name), ``line`` (from 1; 0 means the whole text)."""
 
     def __init__(self, file: str, line: int, text: str) -> None:
         super().__init__(file, line, text)
