@@ -218,7 +218,7 @@ def is_down() -> bool:
 def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None]:
     """Call ``interrupt``, in any thread, if the node shuts down during the block.
 
-    It must unblock the calls made in the block.
+    ``interrupt`` must unblock the calls made in the block.
     """
     return current_session().lifecycle.interrupting(interrupt)
 

@@ -75,7 +75,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
 
 
 def start(session: Session, *, rosout: bool) -> None:
-    """Offer the node's logger services, and publish to ``/rosout`` if ``rosout`` is set."""
+    """Offer the node's logger services and publish to ``/rosout`` if ``rosout`` is set."""
     _offer_logger_services()
     if rosout:
         _start_rosout(session)

@@ -389,7 +389,7 @@ def _is_listener(value: object) -> bool:
 
 
 def _not_a_listener(value: object) -> str:
-    """Return the warning about an argument that is not a listener; rospy would reject every subscriber because of it."""
+    """Return the warning about an argument that is not a listener; with it, rospy would reject every subscriber."""
     text = f"subscriber_listener {value!r} is ignored: it has no method peer_subscribe or peer_unsubscribe."
     if isinstance(value, int):
         return f"{text} The third argument of Publisher is not the queue size: write queue_size={value!r}"

@@ -253,7 +253,7 @@ class ServiceProxy(Generic[_S_co]):
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
         self._client_session: Session | None = None
-        # Number of calls that reached the service. It is the seq of requests whose first field is a header.
+        # Number of calls that reached the service, which is the seq of requests whose first field is a header.
         self._calls = 0
         self._transport: TCPROSTransport | None = (
             None  # a connection set by the program, or one that the program requested

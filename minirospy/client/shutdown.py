@@ -1,7 +1,7 @@
-"""The shutdown of a process that is a node, as a state machine; docs/shutdown.md contains its diagram.
+"""The shutdown of a process that is a node, as a state machine; docs/shutdown.md contains the diagram.
 
-Its inputs are events: a signal, a phase that the node has entered, a clock tick. Its outputs are actions. This module uses
-no threads, signals or clocks: :mod:`minirospy.client.signals` performs the actions.
+The machine's inputs are events: a signal, a phase that the node has entered, a clock tick. Its outputs are actions. This
+module uses no threads, signals or clocks: :mod:`minirospy.client.signals` performs the actions.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import enum
 
 __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 
-# seconds for the main thread to start the hooks, and again to see that is_shutdown() is true
+# seconds for the main thread to start the hooks, and again for it to detect that is_shutdown() is true
 _GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
 # Seconds for the main thread to exit by itself after a request from another process. No user is waiting at the
@@ -115,7 +115,7 @@ class ShutdownMachine:
     @property
     def main_ends_by_itself(self) -> bool:
         """Return whether the main thread will exit without an exception, because it has exited or has been notified."""
-        # Trust a main thread that polls to exit by itself. After a request from another process do not rely on this,
+        # Trust a main thread that polls to exit by itself. Do not rely on this after a request from another process,
         # because no user can press Ctrl-C again.
         trusted = Awareness.NOTIFIED if self.is_requested else Awareness.POLLS
         return self.main_has_ended or self.main.awareness >= trusted

@@ -42,7 +42,7 @@ class SignalWatchdog:
     def __init__(
         self, lifecycle: Lifecycle, stop_leaving: Callable[[], object], is_sending: Callable[[], bool]
     ) -> None:
-        """Create the watchdog. It calls ``stop_leaving()`` to let the node leave the graph without waiting for the master.
+        """Create the watchdog. ``stop_leaving()`` lets the node leave the graph without waiting for the master.
 
         ``is_sending()`` returns whether a link's lock is held; if it is, a hook that publishes could deadlock.
         """

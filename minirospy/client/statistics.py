@@ -107,7 +107,7 @@ class TopicStatisticsCounter:
         publisher = header.get("callerid", "")
         window = self._windows.get(publisher)
         if window is None or now < window.start:
-            # This is the first message, or simulated time jumped back.
+            # Start a window: this is the first message, or simulated time has jumped back.
             window = self._windows[publisher] = _Window(now)
 
         window.delivered += 1

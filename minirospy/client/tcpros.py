@@ -160,7 +160,7 @@ class Transport:
         self.endpoint_id = ""
         self.local_endpoint: Any = (0, 0)
         self.remote_endpoint: Any = (0, 0)
-        # The number of bytes and messages in both directions
+        # The total number of bytes and messages, received and sent
         self.stat_bytes = self.stat_num_msg = 0
 
     def fileno(self) -> int | None:
