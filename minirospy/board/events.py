@@ -1,4 +1,4 @@
-"""Edge detection: edges and the time in, callbacks out, one at a time in a single thread.
+"""Edge detection: calls a callback for each edge that counts, one at a time in a single thread.
 
 Debouncing is RPi.GPIO's: the first edge is reported, then the pin is ignored for the bounce time.
 """

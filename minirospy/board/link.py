@@ -1,7 +1,7 @@
-"""A process's connection to a board: operations in, mirrored pins and edges out.
+"""A process's connection to a board: sends operations, mirrors the pins, and reports edges.
 
-Blocking and thread-safe; one reader thread updates the mirror. If no server responds, one is started; if the server
-dies, another one is started, and unacknowledged requests are sent again, so that the caller sees no error.
+Blocking and thread-safe; one reader thread updates the mirror. If no server responds, the link starts one; if the server
+dies, the link starts another one, and unacknowledged requests are sent again, so that the caller sees no error.
 """
 
 from __future__ import annotations
@@ -328,7 +328,7 @@ def _connect(directory: BoardDirectory) -> _Connection | None:
 
 
 def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
-    """Start and return a server process in a new session. It outlives this process if the board still has clients."""
+    """Start and return a server process in a new session. The server outlives this process if the board still has clients."""
     import subprocess
 
     if not sys.executable:

@@ -133,7 +133,7 @@ class BoardModel:
         self.person = person
 
     def apply(self, operation: Operation) -> list[Change]:
-        """Perform one operation completely, and return the changed pins.
+        """Perform one operation completely and return the changed pins.
 
         If the operation is invalid, raise OperationError and change nothing.
         """

@@ -469,7 +469,7 @@ class PWM:
         self._running.set(frequency=frequency)
 
     def stop(self) -> None:
-        """Stop, and set the channel low."""
+        """Stop the wave and set the channel low."""
         self._running.stop()
 
     @property
