@@ -216,7 +216,7 @@ def to_endpoint(text: str, *, listens: bool = False) -> str:
 def unresolved(endpoints: Iterable[str]) -> list[str]:
     """Return the hosts in endpoints that do not resolve at present.
 
-    They may resolve later, for example once mDNS runs. Blocks.
+    The hosts may resolve later, for example once mDNS runs. Blocks.
     """
     found = []
     for endpoint in endpoints:
