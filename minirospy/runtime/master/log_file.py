@@ -81,7 +81,7 @@ class LogFile(LogFileHandler):
         self._write_out()
 
     def close(self) -> None:
-        """Write the pending lines, and close the file. Idempotent."""
+        """Write the pending lines and close the file. Idempotent."""
         self._write_out()
         if self._timer:
             self._timer.cancel()

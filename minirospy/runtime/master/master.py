@@ -163,7 +163,7 @@ class Master(MasterApi):
         self._sweeping = asyncio.ensure_future(self._sweep())
 
     async def close(self, *, keep_journal: bool = False) -> None:
-        """Stop, and remove the journal, so that the next master starts empty. Idempotent.
+        """Stop the master and remove the journal, so that the next master starts empty. Idempotent.
 
         With ``keep_journal`` the next master continues this session.
         """
@@ -200,11 +200,14 @@ class Master(MasterApi):
         return self.dispatch(method, args)
 
     def _write_state(self) -> Steps[Serialized]:
-        """Return the serialized system state. It is cached, because it is slow to serialize and tools request it often."""
+        """Return the serialized system state.
+
+        The state is cached, because serializing it is slow and tools request it often.
+        """
         if self.registry.is_large:
             yield ALONE
         if self._state[0] == self.registry.changes:
-            # Another client's request serialized the state while this one was queued.
+            # Another client's request serialized the state while this request was queued.
             return self._state[1]
 
         changes = self.registry.changes
@@ -285,7 +288,7 @@ class Master(MasterApi):
         return f"{self._journal.path} ({self._journal.size} bytes)"
 
     async def _open_journal(self) -> dict[str, str]:
-        """Recover the state from the journal, and start to write the journal; return the nodes to check, with their URIs."""
+        """Recover the state from the journal and start to write the journal; return the nodes to check, with their URIs."""
         from minirospy.runtime.master.journal import RETRY_SECONDS, Journal, JournalBusyError
 
         assert self._journal_path
@@ -298,7 +301,7 @@ class Master(MasterApi):
         try:
             await _lock(journal)
         except JournalBusyError as error:
-            # The journal belongs to another master.
+            # Another master has locked the journal.
             busy = error
         except OSError:
             # The journal may still be readable. :meth:`Journal.start` then determines whether it is writable.
@@ -384,7 +387,7 @@ class Master(MasterApi):
             await rpc.close()
 
     async def _check(self, nodes: Mapping[str, str]) -> None:
-        """Forget dead nodes; send the others the notifications that they may have missed."""
+        """Forget dead nodes; send the remaining nodes the notifications that they may have missed."""
         rpc, slots = AsyncRpcClient(same_host=self._same_host), asyncio.Semaphore(_MAX_CONCURRENT_CHECKS)
 
         async def check(name: str, uri: str) -> bool:

@@ -91,7 +91,7 @@ class Node:
         self.when_registered_again = self.registrations.when_registered_again
         """Functions that register further state.
 
-        They are called in workers when the node registers again with a master that had lost it.
+        The functions are called in workers when the node registers again with a master that had lost it.
         """
 
         self.server: RpcServer | None = None

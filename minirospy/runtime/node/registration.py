@@ -81,7 +81,7 @@ class Registrations:
         self.when_registered_again: list[Callable[[], object]] = []
         """Functions that register further state.
 
-        They are called in workers when the node registers again with a master that had lost it.
+        The functions are called in workers when the node registers again with a master that had lost it.
         """
 
         self._name = name

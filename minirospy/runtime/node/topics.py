@@ -61,7 +61,7 @@ _REFUSALS_LOGGED = 10
 
 # seconds within which a publisher's unreachable topics are combined in one log line
 TOGETHER_SECONDS = 0.25
-MAX_TOPICS_SHOWN = 5  # maximum number of topics named in such a log line
+MAX_TOPICS_SHOWN = 5  # maximum number of topics named in one log line about an unreachable publisher
 _LEAVE_SECONDS = 10.0
 # a link counts as working once it has received a message or has been open for this many seconds
 _WORKED_SECONDS = 5.0

@@ -1,4 +1,4 @@
-"""One client of the XML-RPC server: bytes in, requests out, and their responses in order.
+"""One client of the XML-RPC server: parses requests, and sends their responses in order.
 
 This module limits each client; the server (``runtime/rpc/server.py``) accepts clients and limits the memory of all
 clients together.
@@ -59,7 +59,7 @@ in one receive are parsed before the next client is served.
 
 _END_OF_HEAD = b"\r\n\r\n"
 
-# Number of requests processed immediately if several arrive together; the others are processed in steps
+# Number of requests processed immediately if several arrive together; the remaining ones are processed in steps
 _ANSWERS_AT_ONCE = 1
 
 
@@ -467,7 +467,7 @@ class Connection:
         self._count_unread(kept)
         self._set_deadline()
         if self._out.size > MAX_UNREAD:
-            # Send no more responses, and stop reading requests.
+            # Send no more responses and stop reading requests.
             self._enter(Event.UNREAD)
         self._server.limit_unread()
 

@@ -53,7 +53,7 @@ accepted per iteration, and the seconds that accepting may take.
 Thousands of clients may connect together; the server accepts all of them, 30 us each, before it serves a later one.
 """
 
-_ACCEPTS_BETWEEN = 64  # connections to accept before reading from others
+_ACCEPTS_BETWEEN = 64  # connections to accept before reading from accepted ones
 
 # Connections to read from before accepting new ones, which takes some 1 ms; thousands may be readable together
 _READS_AT_ONCE = 16
