@@ -36,7 +36,7 @@ def __getattr__(name: str) -> Any:
 
 
 def _main(command: Command, argv: Sequence[str] | None = None) -> int:
-    """Run a command. Its arguments may contain remappings, because launch files may start it as a node."""
+    """Run a command. The arguments may contain remappings, because launch files may start the command as a node."""
     words = list(sys.argv[1:] if argv is None else argv)
     remappings = [word for word in words if ":=" in word]
     body = partial(command.body, arguments=remappings)

@@ -47,7 +47,7 @@ class Cursor(NamedTuple):
 
 
 class Text(str):
-    """A candidate that the user will edit. It is quoted, instead of having a backslash before each blank."""
+    """A candidate that the user will edit. The shell code quotes it instead of putting a backslash before each blank."""
 
     __slots__ = ()
 
