@@ -195,7 +195,7 @@ def filter_bag(
     on_shown: Callable[[bool, object], object] = lambda kept, value: None,
     warn: Callable[[str], object] = lambda line: None,
 ) -> FilterResult:
-    """Write the messages for which ``keep`` is true to a new bag; call ``on_shown`` with each value of ``show``.
+    """Write the messages for which ``keep`` is truthy to a new bag; call ``on_shown`` with each value of ``show``.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails, ValueTextError if the expression raises, or
     MessageException if a message cannot be deserialized.

@@ -34,7 +34,7 @@ class Filter:
             raise UsageError(f"filter [{expression}] is not a Python expression: {error}") from error
 
     def __call__(self, message: Message, topic: str) -> bool:
-        """Return whether the expression is true. Raise UsageError if it cannot be evaluated."""
+        """Return whether the expression's value is truthy. Raise UsageError if the expression cannot be evaluated."""
         try:
             # eval is safe here: the code is the user's own, on the user's own machine, as in ROS.
             return bool(eval(self._code, {"m": message, "topic": topic}))

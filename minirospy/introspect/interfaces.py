@@ -41,7 +41,7 @@ class Interfaces:
         self._catalogue = Catalogue(packages.folders())
 
     def packages(self) -> list[str]:
-        """Return the sorted names of the packages that define such types."""
+        """Return the sorted names of the packages that define types of this kind."""
         return [package for package in sorted(self._catalogue.packages) if self._names(package)]
 
     def in_package(self, package: str) -> list[str]:

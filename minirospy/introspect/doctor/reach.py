@@ -173,7 +173,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_own_address(address: str) -> bool:
-    """Return whether an address belongs to this machine. It does if a socket can be bound to it."""
+    """Return whether an address belongs to this machine, that is, whether a socket can be bound to it."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
