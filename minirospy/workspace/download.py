@@ -57,7 +57,7 @@ def _is_right(wanted: Download) -> bool:
 
 
 def _fetch(wanted: Download) -> None:
-    """Download a file. It appears under its name only once it is complete."""
+    """Download a file. The file appears under its name only once it is complete."""
     # Imported here, because the import takes as long as a build without downloads.
     from urllib.request import Request, urlopen
 

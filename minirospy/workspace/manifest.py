@@ -114,7 +114,7 @@ class Manifest(NamedTuple):
     problems: tuple[Problem, ...]
 
     def depends(self, *kinds: Kind) -> tuple[str, ...]:
-        """Return the names of all dependencies, or of those of these kinds, without duplicates, in file order."""
+        """Return the names of all dependencies, or of those of the given kinds, without duplicates, in file order."""
         wanted = frozenset(kinds or Kind)
         return tuple(dict.fromkeys(each.name for each in self.dependencies if wanted & each.kinds))
 
@@ -234,7 +234,7 @@ _OLD_KINDS = {
 }
 _KINDS = {
     "depend": {Kind.BUILD, Kind.BUILD_EXPORT, Kind.EXEC},
-    # This tag is not part of formats 2 and 3, but packages use it there.
+    # Formats 2 and 3 do not contain this tag, but packages use it there.
     "run_depend": {Kind.BUILD_EXPORT, Kind.EXEC},
     **{kind.value: {kind} for kind in Kind},
 }

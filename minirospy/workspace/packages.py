@@ -62,7 +62,7 @@ class Packages:
 
     @classmethod
     def below(cls, *roots: Path) -> Packages:
-        """Return only the packages in these folders."""
+        """Return only the packages in the folders ``roots``."""
         packages = cls.__new__(cls)
         packages.roots = roots
         packages._crawls = {}
@@ -197,7 +197,7 @@ def crawl_times(root: Path) -> list[CrawlTime]:
 def built_in_roots() -> tuple[Path, ...]:
     """Return the folders that contain minirospy's own packages.
 
-    They are next to the Python package in a checkout, else in its ``share``.
+    In a checkout, the folders are next to the Python package, else in its ``share``.
     """
     share = _OURS / "share"
     base = share if share.is_dir() else _OURS.parent

@@ -162,7 +162,7 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
     """
     manifest = read_manifest(folder)
     if not PACKAGE_NAME.match(manifest.name):
-        # This is an error, because the package's name becomes part of folder and module names.
+        # Raise an error, because the package's name becomes part of folder and module names.
         problem = next(problem for problem in manifest.problems if "is not a package name" in problem.text)
         raise ManifestError(str(manifest.path), *problem)
 
