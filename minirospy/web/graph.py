@@ -147,7 +147,7 @@ class Publication:
     async def joined(self) -> None:
         """Wait until the subscribers that the master listed at the advertisement are connected, for at most a second.
 
-        They do not receive messages published before they connect.
+        Subscribers do not receive messages published before they connect.
         """
         if self._shared and self._shared.joining:
             await asyncio.wait([self._shared.joining])
@@ -361,7 +361,10 @@ class SharedGraph:
             del self.topics[shared.topic]
 
     def advertise(self, topic: str, type_: InterfaceType, *, latch: bool = False) -> Publication:
-        """Advertise a topic. Raise BridgeError if clients may not publish it, or it is published with another type."""
+        """Advertise a topic.
+
+        Raise BridgeError if clients may not publish it, or if it is already published with another type.
+        """
         if not self.filters.publishable(topic):
             raise BridgeError(f"topic [{topic}] may not be published by clients")
         shared = self.publishers.get(topic)

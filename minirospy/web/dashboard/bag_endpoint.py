@@ -141,7 +141,7 @@ class BagSession(JsonSession):
         return 0.0 if self._thumbnails else pause
 
     async def left(self) -> None:
-        """Stop the player, and close the bag."""
+        """Stop the player and close the bag."""
         await self._close_bag()
 
     # --- recording

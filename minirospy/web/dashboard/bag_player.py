@@ -58,7 +58,7 @@ class GraphOutput:
         return self._clock is not None
 
     def switch(self, timeline: Timeline, topics: Collection[str], *, clock: bool) -> list[str]:
-        """Enable exactly these topics; return one line for each topic that cannot be published."""
+        """Enable exactly the given topics; return one line for each topic that cannot be published."""
         refused = []
         for topic in [each for each in self._publications if each not in topics]:
             self._publications.pop(topic).close()
@@ -208,7 +208,7 @@ class OpenBag:
         ]
 
     def close(self) -> None:
-        """Stop the player, and close the file."""
+        """Stop the player and close the file."""
         self.player.end()
         if self._thread.ident is not None:
             self._thread.join()

@@ -258,7 +258,7 @@ class _Driven:
     def hold(self, held: Velocity | Joystick) -> None:
         """Publish a command, and a zero velocity if no further command arrives in time.
 
-        Raise BridgeError, and publish nothing, if a later stop cannot be guaranteed.
+        Raise BridgeError and publish nothing if a later stop cannot be guaranteed.
         """
         deadline = math.inf if held.is_zero else time.monotonic() + SILENT_SECONDS
         if held.is_zero:

@@ -109,7 +109,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.changed()
 
     async def close(self) -> None:
-        """End all sessions, and stop publishing. Idempotent."""
+        """End all sessions and stop publishing. Idempotent."""
         await super().close()
         working, self._working = self._working, None
         tasks = [*self._sources, *([working] if working else [])]
@@ -125,7 +125,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
     def start_work(self) -> None:
         """Start the task that follows the parameters and publishes.
 
-        It runs while there are clients or ``always_publishes``.
+        The task runs while there are clients, or always if ``always_publishes`` is set.
         """
         if self._working is None or self._working.done():
             self.is_publishing = self.is_publishing or self.always_publishes
@@ -208,7 +208,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return [topic for topic in sources if not why_illegal(topic)]
 
     def _follow(self, topics: Sequence[str]) -> None:
-        """Subscribe to exactly these topics of source_list."""
+        """Subscribe to exactly these topics from source_list."""
         from sensor_msgs.msg import JointState
 
         for task in self._sources:

@@ -231,7 +231,7 @@ class JsonSession:
                 self._next_look = min(self._next_look, now + pause)
 
     async def carry_out(self, name: str, fields: Fields) -> None:
-        """Execute an operation, and send its result or its error."""
+        """Execute an operation and send its result or its error."""
         try:
             answer = await self._handlers[name](fields)
         except (MinirospyError, OSError) as error:
@@ -311,7 +311,7 @@ class JsonEndpoint(Generic[_S]):
             _log.error("%s: %s", type(self).__name__, error, exc_info=error)
 
     async def close(self) -> None:
-        """End all sessions, and wait for their tasks. Idempotent."""
+        """End all sessions and wait for their tasks. Idempotent."""
         self.is_closed = True
         sessions = list(self.sessions)
         for session in sessions:

@@ -65,7 +65,7 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         self.changed()
 
     async def restart(self, run: LaunchRun) -> None:
-        """Stop a launch, and start its file again with the same arguments.
+        """Stop a launch and start its file again with the same arguments.
 
         Do nothing if another client is restarting the launch or has restarted it. Raise UsageError if the file cannot be
         started.
@@ -89,7 +89,7 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         super().changed()
 
     async def close(self) -> None:
-        """End all sessions and all launches, and wait until they have ended."""
+        """End all sessions and all launches and wait until they have ended."""
         self.is_closed = True
         runs = list(self.runs.values())
         for run in runs:
@@ -163,7 +163,7 @@ class LaunchSession(JsonSession):
 
     async def follow(self) -> float | None:
         """Send the launches, if one has changed, and new lines of the log."""
-        # Check this before sending, so that a change after the check triggers another call.
+        # Query this before sending, so that a change in the meantime triggers another call.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()
         is_growing = await self._send_log()

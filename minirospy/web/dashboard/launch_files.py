@@ -45,7 +45,7 @@ class LaunchFiles:
         return sorted(found)
 
     def path_of(self, file: LaunchFile) -> Path:
-        """Return the path of a launch file that was found.
+        """Return the path of a launch file.
 
         Raise NotFoundError if :meth:`scan` has not found it, because such files must not be started.
         """

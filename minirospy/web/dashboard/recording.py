@@ -21,11 +21,13 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""Timeouts in seconds for stopping. They are long, because after SIGINT the file is completed, possibly on a slow disk."""
+"""Timeouts in seconds for stopping. The timeouts are long, because after SIGINT the file is completed, possibly on a slow
+disk.
+"""
 
 TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
-"""Timeouts while no file is open. They are short, because a starting interpreter may lose a SIGINT that arrives in a
-callback of importlib.
+"""Timeouts while no file is open. The timeouts are short, because a starting interpreter may lose a SIGINT that arrives in
+a callback of importlib.
 """
 
 _MAX_LINES = 20
@@ -144,7 +146,7 @@ class Recording:
         return RecordingState(self._path.name, self._topics, seconds, size, status is not None, error)
 
     async def stop(self) -> None:
-        """Stop the recording, and wait until the file is complete. Idempotent."""
+        """Stop the recording and wait until the file is complete. Idempotent."""
         await asyncio.get_running_loop().run_in_executor(None, self._stop)
 
     def _stop(self) -> None:

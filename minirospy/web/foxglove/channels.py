@@ -14,7 +14,9 @@ from minirospy.web.graph import SharedGraph
 __all__ = ["Channels", "Services"]
 
 TYPE_SECONDS = 3.0
-"""Timeout in seconds for querying topic types that are not installed. It is short because all clients wait for the channels."""
+"""Timeout in seconds for querying topic types that are not installed. The timeout is short, because all clients wait for
+the channels.
+"""
 
 
 class Channels:

@@ -72,7 +72,7 @@ class Parameters:
         return failed
 
     def subscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
-        """Report changes to these parameters, or to all if ``names`` is empty, to a client."""
+        """Report changes of these parameters, or of all if ``names`` is empty, to ``listener``."""
         before = self._wanted.get(listener, set())
         self._wanted[listener] = None if not names or before is None else before | set(names)
         if not self._is_watching:

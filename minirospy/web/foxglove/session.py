@@ -72,7 +72,7 @@ class FoxgloveServer(Protocol):
         """Return a client's capabilities."""
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
-        """Replace a channel if its publisher's messages have another definition than the installed type."""
+        """Replace a channel if its publisher's definition differs from that of the installed type."""
 
     def playback_changed(self, state: PlaybackState) -> None:
         """Send a player's state to all clients."""

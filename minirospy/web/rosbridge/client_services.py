@@ -37,7 +37,7 @@ class ClientServices:
         self._reporter = ErrorReporter(_log, "a client's call of a service")
 
     def close(self) -> None:
-        """Stop offering the client's services. Its calls are tasks of the session, which cancels them."""
+        """Stop offering the client's services. The client's calls are tasks of the session, which cancels them itself."""
         shared = self._session.shared
         for name, service in list(shared.services.items()):
             if service.owner is self._session:

@@ -140,7 +140,10 @@ def fill(message: Message, found: object, now: Callable[[], Time]) -> None:
 
 
 def request_values(message: Message, arguments: object) -> Mapping[str, object]:
-    """Return the request's fields from the arguments of a call: a dictionary, or a list in order; otherwise no fields."""
+    """Return the request's fields from the arguments of a call: a dictionary, or a list in order.
+
+    For other arguments, return no fields.
+    """
     if isinstance(arguments, dict):
         return arguments
     if isinstance(arguments, list):

@@ -67,7 +67,7 @@ _SHOWN = 200
 
 
 class StatusLevel(IntEnum):
-    """The severity of a status message; a client receives those up to the level that it has set."""
+    """The severity of a status message; a client receives the messages up to the level that it has set."""
 
     NONE = 0
     ERROR = 1
@@ -151,7 +151,7 @@ class CallService(ServiceEvent):
 
 @dataclass(frozen=True)
 class ServiceResponse(ServiceEvent):
-    """Respond to a call; if ``result`` is false, ``values`` is an error message."""
+    """Respond to a call; if ``result`` is False, ``values`` is an error message."""
 
     values: object
     result: bool
@@ -519,7 +519,7 @@ def status(level: StatusLevel, text: str, id_: Id = None) -> dict[str, object]:
 
 
 def service_response(service: str, values: object, id_: Id, *, result: bool) -> dict[str, object]:
-    """Return the response to a call; if ``result`` is false, ``values`` is an error message."""
+    """Return the response to a call; if ``result`` is False, ``values`` is an error message."""
     fields: dict[str, object] = {
         "op": "service_response",
         "service": service,

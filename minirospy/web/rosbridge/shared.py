@@ -57,7 +57,7 @@ class _LargeWork:
         self._is_busy = asyncio.Lock()
 
     async def __call__(self, work: Callable[[], _T]) -> _T:
-        """Run ``work`` in the thread, and return its result."""
+        """Run ``work`` in the thread and return its result."""
         # Do not queue work in the executor: if a client leaves while its work waits here, the message is freed
         # immediately.
         async with self._is_busy:
@@ -134,7 +134,7 @@ class RosbridgeShared:
         return len(body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
 
     def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
-        """Return a message as clients receive it, encoded once for all of them. Raise BridgeError if that is not possible."""
+        """Return a message as clients receive it, encoded once for all clients. Raise BridgeError if it cannot be encoded."""
         found = self._encodings(topic, arrival)
         made = found.get(compression)
         if made is None:

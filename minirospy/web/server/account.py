@@ -57,7 +57,7 @@ class Share:
                 self._account.enforce()
 
     def hold(self, pieces: Sequence[Piece]) -> None:
-        """Count those of the pieces that are large."""
+        """Count the large pieces among ``pieces``."""
         self.large += self._account.hold(pieces)
 
     def release(self, pieces: Sequence[Piece]) -> None:
@@ -92,7 +92,7 @@ class Account:
         share.size = 0
 
     def hold(self, pieces: Sequence[Piece]) -> int:
-        """Count those of the pieces that are large; return their total bytes."""
+        """Count the large pieces among ``pieces``; return their total bytes."""
         found = 0
         for piece in pieces:
             size = len(piece)

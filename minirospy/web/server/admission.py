@@ -94,7 +94,7 @@ def displaced(peer: str, rank: Rank, occupants: Iterable[_O], now: float) -> _O 
 
 
 def _of_heaviest(occupants: list[_O]) -> list[_O]:
-    """Return the connections of the address that has the most of them."""
+    """Return the connections from the address that has the most connections."""
     counts = Counter(each.peer for each in occupants)
     heaviest = max(counts, key=counts.__getitem__)
     return [each for each in occupants if each.peer == heaviest]

@@ -41,7 +41,7 @@ PLAIN_HEADERS = {
 }
 """The headers of every response.
 
-They prevent caching, because the contents change constantly, and the path may contain a token.
+The headers prevent caching, because the contents change constantly, and the path may contain a token.
 """
 
 
@@ -220,7 +220,10 @@ class WebClient:
         self._connection.queue.discard(key)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
-        """Run ``work``, which takes long, in the client's turn. It uses ``message``, whose bytes are counted until then."""
+        """Run ``work``, which takes long, in the client's turn.
+
+        ``work`` uses ``message``, whose bytes are counted until then.
+        """
         self._connection.in_turn(work, message)
 
     def hold_work(self, *, is_held: bool) -> None:
@@ -266,7 +269,7 @@ class Exchange:
     def respond(
         self, status: int, body: bytes, content_type: str = "text/plain; charset=utf-8", **headers: str
     ) -> None:
-        """Send a complete response, and close the connection."""
+        """Send a complete response and close the connection."""
         head = response_head(status, {**PLAIN_HEADERS, "Content-Type": content_type,
                                        "Content-Length": str(len(body)), **_dashed(headers)})  # fmt: skip
         self._connection.answer((head, body))

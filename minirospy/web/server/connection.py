@@ -217,7 +217,7 @@ class Connection:
         """Send a message that must not be dropped."""
         if not self.is_open:
             return
-        # Check this first, because a single response, such as a mesh, may be larger than the limit.
+        # Check the limit before appending, because a single response, such as a mesh, may be larger than the limit.
         if self.queue.is_overrun:
             _log.warning("%s reads no answers: disconnected", self.peer)
             self._abort()
@@ -251,7 +251,7 @@ class Connection:
         self._timer = self.loop.call_later(self._limits.handshake_seconds, self._abort)
 
     def close_websocket(self, code: int, reason: str) -> None:
-        """Send a close frame, and close the connection when all queued data has been sent."""
+        """Send a close frame and close the connection when all queued data has been sent."""
         if not self.is_open or not self._websocket.is_open:
             return
         self._websocket.close(code, reason)

@@ -47,7 +47,7 @@ class FrameByFrame(ServerProtocol):
         yield from super().parse()
 
     def recv_frame(self, frame: Frame) -> None:
-        """Process a frame, and stop; the connection responds to pings."""
+        """Process a frame and then stop the parser; the connection responds to pings."""
         if frame.opcode is Opcode.PING:
             self.events.append(frame)
         else:

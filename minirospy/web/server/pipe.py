@@ -209,7 +209,7 @@ class TlsPipe(asyncio.Protocol):
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
         """Create a connection. ``connected(pipe, peer's address)`` returns the object that receives the events.
 
-        It may return None to refuse the connection, after writing a response.
+        ``connected`` may return None to refuse the connection, after writing a response.
         """
         self._connected = connected
         self.read_bytes = LARGE_READ  # the size that asyncio itself uses

@@ -91,7 +91,10 @@ class SendQueue:
         return self.answers > MAX_ANSWERS
 
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:
-        """Append a message. Drop older ones if the limit is exceeded, or with ``newest_only`` all others of its key."""
+        """Append a message.
+
+        Drop older messages if the limit is exceeded, or with ``newest_only`` all older messages of its key.
+        """
         size = sum(map(len, pieces)) + self._entry_bytes
         waiting = self._waiting.get(key)
         if waiting is None:
@@ -195,5 +198,5 @@ class SendQueue:
 
 
 def _large(pieces: tuple[Piece, ...]) -> int:
-    """Return the total bytes of those pieces that are large."""
+    """Return the total bytes of the large pieces among ``pieces``."""
     return sum(size for size in map(len, pieces) if size >= LARGE_PIECE)

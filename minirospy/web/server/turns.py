@@ -102,7 +102,7 @@ class _FairQueue:
         self.highest = 0.0  # highest tag of a client that was served
 
     def update(self) -> None:
-        """Reset the time that clients have used if none is queued: clients that start now have the same tag."""
+        """If no work is queued, set ``served`` to the highest tag, so that all clients that start now have the same tag."""
         if not self.entries:
             self.served = self.highest
 
@@ -199,7 +199,7 @@ class FairTurns:
         return burst <= INTERACTIVE_SLICES * self._slice
 
     def _push(self, share: Share, start: float) -> None:
-        # If clients would end at the same tag, the one that has used less is served first.
+        # If several clients would end at the same tag, serve the client that has used less time first.
         end = self._end_of(share, start)
         heapq.heappush(share.queue.entries, _Entry(end, share.tag, next(self._numbers), start, share))
 

@@ -18,7 +18,7 @@ _MAX_FRAMES = 1000
 
 
 class FramePair:
-    """A source frame seen from a target frame. Its transform is sent if it has changed by more than a threshold (m, rad)."""
+    """A source frame seen from a target frame. The transform is sent if it has changed by more than a threshold (m, rad)."""
 
     def __init__(self, source: str, target: str, angle: float, distance: float) -> None:
         self.source = source
