@@ -133,7 +133,7 @@ class ChunkStream:
             return None
 
     def prepare(self, positions: Iterable[int]) -> None:
-        """Start to decompress the chunks at these positions; cancel the decompression of others."""
+        """Start to decompress the chunks at these positions; cancel the decompression of all other chunks."""
         wanted = [
             position
             for position in positions

@@ -1,6 +1,6 @@
 """A bag's index: the times and locations of each connection's messages, 16 bytes per message.
 
-It is read on demand from the index records after the chunks; reading messages in time order does not need it.
+The index is read on demand from the index records after the chunks; reading messages in time order does not need it.
 """
 
 from __future__ import annotations

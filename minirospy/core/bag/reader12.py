@@ -25,7 +25,7 @@ _ENTRY = struct.Struct("<IIQ")
 class Reader12(ScannedReader):
     """A version 1.2 bag, with one connection per topic.
 
-    ``start``: the position of the first record. ``indexed`` is false until :meth:`read_index` or :meth:`scan` is called.
+    ``start``: the position of the first record. ``indexed`` is False until :meth:`read_index` or :meth:`scan` is called.
     """
 
     def __init__(self, stream: BinaryIO, version: int, start: int) -> None:

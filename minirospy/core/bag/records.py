@@ -1,4 +1,4 @@
-"""Parse bag records: bytes in, named tuples out.
+"""Parse bag records from bytes to named tuples.
 
 A record is a header (its length, then fields ``name=value``, each with a length prefix) and data (its length, then
 bytes). The field ``op`` specifies the kind of record. All numbers are little-endian; times are nanoseconds since 1970

@@ -226,8 +226,8 @@ def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
 def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -> bool:
     """Return whether a cancel request applies to a goal.
 
-    It applies to the goal with its id, to goals whose stamp is not later than its stamp, or, without id and stamp, to all
-    goals. Stamps are in nanoseconds; zero means none.
+    The request applies to the goal with the request's id, to goals whose stamp is not later than the request's, or,
+    without id and stamp, to all goals. Stamps are in nanoseconds; zero means none.
     """
     if not cancel_id and not cancel_stamp:
         return True

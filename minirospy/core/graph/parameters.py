@@ -75,8 +75,8 @@ class ParameterTree:
 
     def __init__(self, most: int = MAX_BYTES, reserve: int = RESERVE) -> None:
         self._root: dict[str, object] = {}
-        # The ids of the dictionaries that have not been returned to a caller since their creation: these may be
-        # changed.
+        # The ids of the dictionaries that have not been returned to a caller since their creation, so that they may
+        # be changed.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
         # The subscribed keys, sorted, so that the keys below a namespace are adjacent.

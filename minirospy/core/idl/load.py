@@ -215,7 +215,7 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
     if on_demand:
         sources = _on_demand(sources)
         for kind in ("msg", "srv"):
-            # These modules remain from an earlier build that compiled them in advance.
+            # Remove modules that remain from an earlier build, which compiled them in advance.
             for stale in (root / package / kind).glob("_[!_]*.py"):
                 stale.unlink()
     folder = root / package
@@ -245,7 +245,8 @@ def _on_demand(sources: dict[str, str]) -> dict[str, str]:
     kept = {name: text for name, text in sources.items() if not _is_module(name)}
     for name, text in kept.items():
         if name.endswith("__init__.py"):
-            # These lines replace the code that emit_package generates, which would be repeated in each such file.
+            # Call a function instead of the code that emit_package generates, which would be repeated in each such
+            # file.
             names = " ".join(sorted(_module_name(each) for each in sources if _is_in(each, name)))
             kept[name] = (
                 f"{text.partition('import importlib')[0]}from minirospy.core.idl.on_demand import load_package\n\n"

@@ -29,7 +29,7 @@ class NumpyMissingError(MinirospyError, ImportError):
 
 @lru_cache(maxsize=256)
 def numpy_class(message_class: type[_M]) -> type[_M]:
-    """Return a message class whose arrays are numpy arrays. For peers it is the same type.
+    """Return a message class whose arrays are numpy arrays. For peers, its type is the same as that of ``message_class``.
 
     Raise NumpyMissingError if numpy is not installed.
     """

@@ -71,7 +71,7 @@ class TimeCache:
         return self._stamps[self._first] if self._stamps else 0
 
     def insert(self, stamp: int, sample: Sample) -> Misfit | None:
-        """Insert a sample, and drop samples older than the span; if the sample is rejected, return the reason."""
+        """Insert a sample and drop samples older than the span; if the sample is rejected, return the reason."""
         stamps = self._stamps
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)

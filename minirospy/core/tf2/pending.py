@@ -82,7 +82,7 @@ class Layout:
         return [offsets.child for offsets in self._offsets]
 
     def keep(self, arrival: Arrival, span: int) -> list[str]:
-        """Store a message, and drop expired ones; return the frames that the caller must decode now."""
+        """Store a message and drop expired ones; return the frames that the caller must decode now."""
         self._arrivals.append(arrival)
         return [] if len(self._arrivals) % _BLOCK else self._drop_expired(span)
 
@@ -168,7 +168,7 @@ class Layouts:
         return None
 
     def add(self, data: bytes) -> Layout | None:
-        """Add a layout for a message, and return it; return None if there are no frames, a duplicate, or too many layouts."""
+        """Add a layout for a message and return it; return None if there are no frames, a duplicate, or too many layouts."""
         found = _find_transforms(data)
         children = {offsets.child for offsets in found}
         if not found or len(children) < len(found) or self._count >= _MAX_LAYOUTS:

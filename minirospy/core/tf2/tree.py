@@ -94,7 +94,7 @@ class FrameTree:
     # --- queries
 
     def frames(self) -> list[Frame]:
-        """Decode all messages, and return every frame in order of first appearance."""
+        """Decode all messages and return every frame in order of first appearance."""
         for layout in self._layouts:
             self._settle_all(layout)
         return list(self._frames.values())
@@ -130,7 +130,7 @@ class FrameTree:
         authority: str,
         is_static: bool,
     ) -> bool:
-        """Insert a transform; earlier ones for the same frame must have been inserted."""
+        """Insert a transform; earlier transforms of the same frame must have been inserted before."""
         if child in self._lazy:
             self._settle(self._frames[child])
         return self._take(parent, child, stamp, translation, rotation, authority, is_static)

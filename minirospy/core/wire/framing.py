@@ -195,7 +195,7 @@ class FrameReader:
         self._small[: self._end] = data
 
     def space(self) -> memoryview:
-        """Return the memory for the next bytes. It is never empty."""
+        """Return the memory for the next bytes, which is never empty."""
         if self._large is not None:
             if self._filled == len(self._large):
                 # Grow the buffer as bytes arrive, so that a length prefix alone cannot allocate all the memory in

@@ -41,7 +41,10 @@ A length in characters, shifted right by this number, is a sixteenth of the leng
 
 
 class DateTime(NamedTuple):
-    """A date, as received, that is not in XML-RPC's format. It may be any text, because other implementations accept it."""
+    """A date, as received, that is not in XML-RPC's format.
+
+    The date may be any text, because other implementations accept it.
+    """
 
     value: str
 

@@ -46,7 +46,7 @@ def _write_bool(value: bool, parts: list[str], depth: int) -> None:
 
 
 def _write_float(value: float, parts: list[str], depth: int) -> None:
-    # Call float's own repr, because a subclass, such as numpy's, may have another one.
+    # Call float's own repr, because a subclass, such as numpy's, may have a different repr.
     parts.append(f"<value><double>{float.__repr__(value)}</double></value>")
 
 
