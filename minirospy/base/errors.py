@@ -322,7 +322,7 @@ class UrdfError(SourceError):
 
 
 class BagError(MinirospyError):
-    """A bag cannot be read or written. ``str()`` does not contain the file name, because the caller has it."""
+    """A bag cannot be read or written. ``str()`` does not contain the file name, because the caller knows it."""
 
 
 class BagFormatError(BagError):

@@ -19,7 +19,7 @@ __all__ = ["find_packages_named_like_scripts"]
 def find_packages_named_like_scripts() -> None:
     """Let imports find packages that are hidden by files in the program's folder. Idempotent.
 
-    Without effect if Python does not search the program's folder.
+    No effect if Python does not search the program's folder.
     """
     main = sys.modules.get("__main__")
     file = getattr(main, "__file__", None)
