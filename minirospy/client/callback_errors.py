@@ -33,7 +33,7 @@ class _Repeated:
 class CallbackErrors:
     """Logs the errors that a node's callbacks raise.
 
-    Two errors are the same if they have the same type and the same callback, and were raised at the same line of code.
+    Two errors are the same if they have the same type and callback, and were raised at the same line of code.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:

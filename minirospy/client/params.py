@@ -161,7 +161,7 @@ class KeptParameters:
         current_session().parameter_listeners.append(self._dispatch)
 
     def get(self, key: str) -> Any:
-        """Return a parameter from the cache. Raise KeyError if get_param_cached has not read it before."""
+        """Return a parameter's value from the cache. Raise KeyError if get_param_cached has not read it before."""
         session = current_session()
         if session.node is None or session.resolve(key) not in session.node.parameters:
             raise KeyError(key)
@@ -226,7 +226,7 @@ def as_xmlrpc_client(value: object) -> object:
 
 
 def check_sendable(value: object) -> None:
-    """Raise the exception that rospy raises if XML-RPC has no type for a value."""
+    """If XML-RPC has no type for a value, raise the same exception as rospy."""
     if value is None:
         raise TypeError("cannot marshal None unless allow_none is enabled")
 

@@ -243,7 +243,7 @@ class TCPROSTransport(Transport):
         super().__init__(protocol.direction, name)
         self.protocol = protocol
         self.buff_size = protocol.buff_size
-        # The peer's connection header, None until it has been received, and the fields from it
+        # The peer's connection header (None until it has been received), and the fields copied from it
         self.header: Mapping[str, str] | None = header
         self.type: str | None = None
         self.md5sum: str | None = None

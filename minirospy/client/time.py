@@ -141,7 +141,7 @@ class Rate:
             return
         period = self.sleep_dur.to_nsec()
         started = self.last_time.to_nsec() + period
-        # If far behind, for example after a pause, skip the missed periods.
+        # If the loop is far behind, for example after a pause, skip the missed periods.
         now = current_session().clock.now()
         self.last_time = _time(now if now - started > 2 * period else started)
 
