@@ -244,8 +244,8 @@ def is_loopback_endpoint(endpoint: str) -> bool:
 def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False, needs_hash: bool = False) -> None:
     """Raise BridgeError, with installation advice, if Zenoh's library is missing or uses another protocol version.
 
-    ``who``: the feature that needs Zenoh, for the message. ``has_many_links``: many peers will connect. ``needs_hash``:
-    the feature also needs the library xxhash.
+    ``who``: the feature that needs Zenoh, named in the message. ``has_many_links``: many peers will connect.
+    ``needs_hash``: the feature also needs the library xxhash.
     """
     if has_many_links:
         # Set the variable before the import, because Zenoh reads it only once.
