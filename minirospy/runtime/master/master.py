@@ -96,7 +96,7 @@ class Master(MasterApi):
         self.calls = 0
         # The serialized response to getSystemState, and the registry's change count when it was serialized.
         self._state = (-1, Serialized(()))
-        # Messages for the user about the start: what was recovered, and what could not be recovered.
+        # Messages for the user about the startup: what was recovered, and what could not be recovered.
         self.news: list[str] = []
         self._started = time.monotonic()
         self._journal_path = journal

@@ -100,7 +100,7 @@ class Node:
         self.unix_listener = tcp.Listener(self._accept)
         # The value of :func:`local.this_host` if this node also uses Unix sockets, else ""
         self.this_host = ""
-        # Name of the Unix socket that serves topics to processes on this machine, or "".
+        # Name of the Unix socket that serves topics to processes on this machine, or "" if there is none.
         self.unix_name = ""
 
         self._closed = False

@@ -307,7 +307,7 @@ class Subscription:
     ) -> None:
         """Create the subscription; ``this_host`` is the value of :func:`local.this_host`, or "" to not use Unix sockets.
 
-        All subscriptions of the node share ``unreachable``, because several may lose the same publisher.
+        All subscriptions of the node share ``unreachable``, because several subscriptions may lose the same publisher.
         """
         self.topic = topic
         self.type = type_
