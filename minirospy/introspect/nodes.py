@@ -239,7 +239,7 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
 def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
     """Return whether no process listens at a node's address, or the process there is not the node.
 
-    Return False for a node that does not respond in time: it may be alive.
+    Return False for a node that does not respond in time, because it may be alive.
     """
     with contextlib.closing(_slave(graph, node, timeout)) as slave:
         try:

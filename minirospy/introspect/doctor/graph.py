@@ -366,7 +366,7 @@ def _probe_service(graph: Graph, name: str) -> str:
 
 
 def _names(names: Iterable[str]) -> str:
-    """Return the first few names and how many more there are."""
+    """Return a string with the first few names and the number of further names."""
     all_ = list(names)
     more = f" and {len(all_) - _SHOWN} more" if len(all_) > _SHOWN else ""
     return ", ".join(all_[:_SHOWN]) + more
