@@ -95,7 +95,7 @@ class Packages:
         return {name: folders[0] for name, folders in self.copies().items()}
 
     def copies(self) -> dict[str, list[Path]]:
-        """Return all packages, each with the folders that contain a package of that name; the first folder is used."""
+        """Return all packages, each with the folders that contain a package of that name; the first one is used."""
         found: dict[str, dict[Path, None]] = {}
         for root in self.roots:
             for folder in self._crawled(root):

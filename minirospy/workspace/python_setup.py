@@ -41,7 +41,7 @@ class PythonSetup(NamedTuple):
 
 
 def read_python_setup(folder: Path) -> PythonSetup:
-    """Return the packages and scripts that ``folder``/setup.py names. Raise BuildError, with the line, if it fails."""
+    """Return the packages and scripts that ``folder``/setup.py names. Raise BuildError, with the line, if the file fails."""
     file = folder / "setup.py"
     given = _run(file)
     roots = _given(file, given, "package_dir", dict, "{'': 'src'}")
