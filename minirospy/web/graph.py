@@ -280,7 +280,7 @@ class SharedGraph:
         self._refresh_soon.set()
 
     async def look(self) -> None:
-        """Refresh the graph, and report changes. Raise MasterUnreachableError or RpcError if the master's call fails."""
+        """Refresh the graph and report changes. Raise MasterUnreachableError or RpcError if the master's call fails."""
         # Run one refresh at a time, so that an earlier refresh does not replace a later snapshot.
         async with self._looking:
             found = await fetch(self.node.call_master)

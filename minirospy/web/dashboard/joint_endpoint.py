@@ -158,7 +158,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self._follow([])
 
     async def load(self, *, is_forced: bool = False) -> None:
-        """Read the parameters, and parse the description again if one has changed.
+        """Read the parameters. If one has changed, parse the description again.
 
         Raise MinirospyError if the master cannot be reached.
         """

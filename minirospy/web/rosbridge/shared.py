@@ -112,7 +112,7 @@ class RosbridgeShared:
         return task
 
     async def free_service(self, name: str, why: str) -> None:
-        """Close the service that a client offers with this name, and wait until the name is free."""
+        """Close the service that a client offers with this name and wait until the name is free."""
         while name in self.services or name in self._closing:
             if name in self.services:
                 self.close_service(self.services[name], why)

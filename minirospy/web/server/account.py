@@ -119,7 +119,7 @@ class Account:
     def enforce(self) -> None:
         """Make clients release memory until the total is within the limit."""
         if self._is_enforcing:
-            return  # releasing memory calls this method again
+            return  # releasing memory calls this method recursively
         self._is_enforcing = True
         try:
             while self.total > self.limit:

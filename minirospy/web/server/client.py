@@ -1,4 +1,4 @@
-"""The peers to which a protocol's sessions and pages' handlers send: a WebSocket client, and an HTTP request."""
+"""The objects through which sessions and page handlers send data: a WebSocket client, and an HTTP exchange."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ class FrameByFrame(ServerProtocol):
     reader: _GatedReader
 
     def feed(self, data: bytes) -> None:
-        """Add received bytes."""
+        """Add received bytes to the parser's buffer."""
         self.reader.feed_data(data)
 
     def next_request(self) -> Request | None:

@@ -288,9 +288,9 @@ class Relay:
         self.target.received(data)
 
     def writable(self) -> None:
-        """Tell the connection that more can be written."""
+        """Notify the connection that it can write more."""
         self.target.writable()
 
     def ended(self) -> None:
-        """Tell the connection that the pipe has closed."""
+        """Notify the connection that the pipe has closed."""
         self.target.ended()

@@ -81,7 +81,7 @@ class WebSocket:
     # --- receiving
 
     def feed(self, data: bytes) -> None:
-        """Add received bytes."""
+        """Add received bytes to the parser's buffer."""
         self._frames.feed(data)
 
     def next_request(self) -> Request | None:
@@ -99,7 +99,7 @@ class WebSocket:
         return frame
 
     def event_of(self, frame: Frame) -> Message | Ping | None:
-        """Return the ping in a frame, or the message that the frame completes, or None."""
+        """Return the ping in a frame, or the message that the frame completes, or None if there is neither."""
         if frame.opcode in (Opcode.TEXT, Opcode.BINARY):
             self._opcode = frame.opcode
         elif frame.opcode is Opcode.PING:

@@ -69,7 +69,7 @@ def request_of(query: Mapping[str, str], *, is_snapshot: bool = False) -> VideoR
         _number(query, "height", None, 1, _MAX_PIXELS),
         "invert" in query and query["invert"].lower() not in ("false", "0"),
     )
-    # web_video_server subscribes to the topic's "compressed" topic.
+    # As in web_video_server, subscribe to the "compressed" subtopic.
     return VideoRequest(f"{topic}/compressed" if type_ == "ros_compressed" else topic, picture)
 
 
