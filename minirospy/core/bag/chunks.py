@@ -64,7 +64,7 @@ class _Ahead:
         return self._future.result()
 
     def cancel(self) -> None:
-        """Tell the thread to stop soon."""
+        """Request the thread to stop soon."""
         self._is_cancelled = True
         self._future.cancel()
 

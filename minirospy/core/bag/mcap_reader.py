@@ -178,7 +178,7 @@ class McapReader(BagReader):
             yield Block(0, message.body, [(message.time, rank, 0, 0, len(message.body))])
 
     def message_at(self, position: Position) -> StoredMessage:
-        """Raise BagFormatError, because messages can only be read in order."""
+        """Raise BagFormatError, because messages in MCAP files can only be read in order."""
         raise BagFormatError("messages of MCAP files are read in order only")
 
     def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:

@@ -122,7 +122,7 @@ class HttpReader:
 
     @property
     def in_chunks(self) -> bool:
-        """Return whether the current message has a chunked body, because even a few bytes of it may contain many chunks."""
+        """Return whether the current message has a chunked body, of which even a few bytes may contain many chunks."""
         return self._chunked is not None
 
     @property
