@@ -42,7 +42,7 @@ class Handle:
         await self.close()
 
     async def wait_until_registered(self) -> None:
-        """Wait until the registration has ended. Does not raise if it failed or was cancelled, unlike ``await handle``."""
+        """Wait until the registration has finished. Does not raise if it failed or was cancelled, unlike ``await handle``."""
         await asyncio.wait([self._registration])
 
     async def close(self) -> None:

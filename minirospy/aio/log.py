@@ -1,4 +1,4 @@
-"""A node's log handlers in an event loop, for the terminal and /rosout; they use Python's ``logging``."""
+"""A node's log handlers in an event loop, for the terminal and /rosout. They use Python's ``logging``."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.D
 
 
 class _Unspecified:
-    """The type of ``default`` if the caller passes none. It is not None, because a caller may want None to be returned."""
+    """The type of the sentinel that means "no default given", because None is a valid default."""
 
 
 _UNSPECIFIED = _Unspecified()
@@ -453,7 +453,7 @@ class Node:
         """Return the names of all parameters."""
         return list(await self._node.master("getParamNames"))
 
-    # --- the master and the loop
+    # --- master and loop
 
     @property
     def master_uri(self) -> str:
@@ -481,7 +481,7 @@ class Node:
     # --- time
 
     def now(self) -> Time:
-        """Return the current time: simulated time with /use_sim_time (zero until the first /clock), otherwise the system time."""
+        """Return the current time: if /use_sim_time is set, simulated time (zero until the first /clock), else system time."""
         now = self._simulated.now if self._simulated else time.time_ns()
         return Time(*divmod(now, _BILLION))
 
@@ -543,7 +543,7 @@ class Node:
                     is_reported = True
                 await self.sleep(0.25)
             except RpcFault:
-                return  # the master does not support this call, for example that of @foxglove/ros1
+                return  # the master does not support this call; @foxglove/ros1's master is an example
             else:
                 return
 

@@ -18,8 +18,8 @@ __all__ = ["ParameterWatch"]
 class ParameterWatch:
     """The parameters that a node has subscribed to. ``listeners(name, value)`` are called on the loop when a value changes.
 
-    A deleted parameter has the value ``{}``, as the master sends it. After a restart of the master the parameters are
-    subscribed to again. Source: http://wiki.ros.org/ROS/Parameter%20Server%20API (subscribeParam).
+    A deleted parameter has the value ``{}``, as the master sends it. After a restart of the master, the subscriptions
+    are renewed. Source: http://wiki.ros.org/ROS/Parameter%20Server%20API (subscribeParam).
     """
 
     def __init__(self, node: Node, loop: asyncio.AbstractEventLoop) -> None:
@@ -47,7 +47,7 @@ class ParameterWatch:
         await runtime.master("unsubscribeParam", runtime.uri, name)
 
     def changed_in_worker(self, name: str, value: object) -> None:
-        """Pass a change that the master has sent to the node's server on to the listeners."""
+        """Notify the listeners of a change that the master has sent to the node's server."""
         with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._changed, name, value)
 

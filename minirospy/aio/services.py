@@ -94,7 +94,8 @@ class ServiceProxy(Generic[_Response_co]):
                 keeping = isinstance(error.__cause__, CallFailed)
                 raise
             finally:
-                # After a cancelled call, the next call on this connection would read the cancelled call's response.
+                # Close the connection after a cancelled call, because the next call on this connection would read the
+                # cancelled call's response.
                 if not keeping:
                     self._disconnect()
 

@@ -278,7 +278,7 @@ class SubscribedTopic:
             await self._node._node.unsubscribe(self.subscription)
 
     def _deliver(self, frame: Frame, header: Header) -> None:
-        # Copy a small frame: it is in a buffer that the next receive overwrites.
+        # Copy a small frame, because it is in a buffer that the next receive overwrites.
         kept = frame if len(frame) > CHUNK else bytes(frame)
         for handle in list(self._handles):
             handle._put(kept, header)

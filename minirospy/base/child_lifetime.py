@@ -25,7 +25,7 @@ _CREATE_BREAKAWAY_FROM_JOB = 0x01000000
 
 
 class JobSystem(Protocol):
-    """The system calls for job objects. Each raises OSError if it fails."""
+    """The system calls for job objects. Each method raises OSError if the call fails."""
 
     def create(self) -> int:
         """Create a job; return its handle."""
@@ -51,8 +51,8 @@ class ProcessJob:
         with self._lock:
             try:
                 if self._job is None:
-                    # The handle is never closed here: the system closes it when the process has exited, for whatever
-                    # reason.
+                    # The job's handle is never closed here: the system closes it when this process has exited, for
+                    # whatever reason.
                     job = self._system.create()
                     self._system.set_limits(job, _BREAKAWAY_OK)
                     self._system.add_this_process(job)
@@ -65,7 +65,7 @@ class ProcessJob:
             return True
 
     def release(self) -> None:
-        """Undo one :meth:`guard`. When all are undone, children may outlive this process again."""
+        """Undo one call of :meth:`guard`. After all calls are undone, children may outlive this process again."""
         with self._lock:
             self._guards -= 1
             if self._guards == 0 and self._job is not None:
@@ -76,7 +76,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """A context manager. If ``is_guarded`` is true, child processes are terminated with this process until :meth:`close`."""
+    """A context manager. If ``is_guarded`` is set, child processes are terminated with this process until :meth:`close`."""
 
     def __init__(self, job: ProcessJob | None) -> None:
         self._job = job if job is not None and job.guard() else None

@@ -34,7 +34,8 @@ other systems a Ctrl-C just before the start of a wait takes effect only after i
 """
 
 _POLL_SECONDS = 0.1
-_SILENT_SECONDS = 2.0  # seconds; a simulator's /clock normally arrives sooner after a node's start
+# seconds to wait for the first /clock message before warning; a simulator normally sends it sooner
+_SILENT_SECONDS = 2.0
 
 SILENT_CLOCK = (
     "/use_sim_time is set, and no time has arrived on /clock yet: sleep(), Rate and Timer wait for it. Start the simulator or "
@@ -75,7 +76,7 @@ class SignalSafeEvent(threading.Event):
         self._is_set = False
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Return whether the event is set, or becomes set within ``timeout`` seconds."""
+        """Wait until the event is set, at most ``timeout`` seconds; return whether it is set."""
         if self._is_set:
             return True
         lock = threading.Lock()
@@ -164,7 +165,8 @@ class SimulatedClock:
         self._now = now
         self._first = FirstTimeWait(on_silence)
         self._changed = changed or threading.Condition()
-        # Do not use the condition, because a signal handler may wait for a thread that sets the clock or sleeps.
+        # Sleepers do not wait on the condition, because a signal handler may wait for a thread that sets the clock or
+        # sleeps.
         self._sleepers: list[SignalSafeEvent] = []
 
     def now(self) -> int:
@@ -203,6 +205,6 @@ class SimulatedClock:
 
     @staticmethod
     def _wait(sleeper: SignalSafeEvent) -> None:
-        """Wait until the clock is set, or until it is time to poll the stop event, which does not end this wait."""
+        """Wait until the clock is set, or until it is time to poll the stop event, because that event does not end this wait."""
         sleeper.wait(_POLL_SECONDS)
         sleeper.clear()

@@ -26,7 +26,7 @@ def close_each(functions: Iterable[CloseFunction]) -> None:
 async def close_all(functions: Iterable[AsyncCloseFunction]) -> None:
     """Call each function in order as :func:`close_each` does, and await the results of coroutine functions.
 
-    A cancellation stops it.
+    If the calling task is cancelled, the remaining functions are not called.
     """
     for function in functions:
         try:

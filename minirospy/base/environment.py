@@ -55,10 +55,10 @@ class Environment(NamedTuple):
     """The master's URI, this process's address, and the folders for its files.
 
     ``host`` is the name advertised to peers; ``bind_host`` is the address that servers listen on (loopback if ``host``
-    is, else every interface; with ``ipv6`` the IPv6 addresses). ``ports`` are the ports that a node's servers may use
-    (None: any), such as those that a firewall or a container allows; ``allow`` are the networks that may connect ("":
-    all). ``transport`` "tcp" disables Unix sockets. ``local`` restricts the process to this machine, see
-    :meth:`on_this_machine`.
+    is loopback, else every interface; IPv6 addresses if ``ipv6`` is set). ``ports`` are the ports that a node's servers
+    may use (None: any), such as those that a firewall or a container allows; ``allow`` lists the networks that may
+    connect ("": all). If ``transport`` is "tcp", Unix sockets are disabled. ``local`` restricts the process to this
+    machine, see :meth:`on_this_machine`.
     """
 
     master_uri: str
@@ -139,7 +139,7 @@ class Environment(NamedTuple):
 def master_and_namespace(
     environ: Mapping[str, str], *, master_uri: str = "", namespace: str = "", **_: str
 ) -> tuple[str, str]:
-    """Return the master's URI and the namespace, which are enough for a tool's queries.
+    """Return the master's URI and the namespace, which a tool needs for its queries.
 
     Raise UsageError as Environment.read does, if a variable is invalid.
     """
@@ -175,7 +175,8 @@ def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
 
     This does not use urllib.parse, because importing it takes a twentieth of a command's run time.
     """
-    # Reject them, because the path is sent in the first line of a request, and the URI is written to log lines.
+    # Reject control characters and spaces, because the path is sent in the first line of a request, and the URI is
+    # written to log lines.
     if has_controls(uri) or " " in uri:
         raise ValueError(f"[{escaped(uri)}] is not of the form {scheme}://host:port")
     found, _, rest = uri.partition("://")
@@ -258,7 +259,7 @@ def _local_uri(uri: str) -> str:
 
 
 def _checked_host(host: str, variable: str) -> str:
-    # A single colon precedes a port; several are part of an IPv6 address.
+    # A host with a single colon contains a port; one with several colons is an IPv6 address.
     if "/" in host or host.count(":") == 1 or host != host.strip() or "[" in host:
         raise UsageError(f"{variable} [{host}] must be a name or an address alone, without http:// and port")
     return host

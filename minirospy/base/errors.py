@@ -281,7 +281,7 @@ class CallFailed(WireError):
 
 
 class SourceError(MinirospyError):
-    """A fault in a text written by a person: ``file`` (its path or another name), ``line`` (from 1; 0 means the whole text)."""
+    """An error in text written by a person: ``file`` (its path or another name), ``line`` (from 1; 0 means the whole text)."""
 
     def __init__(self, file: str, line: int, text: str) -> None:
         super().__init__(file, line, text)
@@ -322,7 +322,7 @@ class UrdfError(SourceError):
 
 
 class BagError(MinirospyError):
-    """A bag cannot be read or written. ``str()`` does not contain the file name, because the caller has it."""
+    """A bag cannot be read or written. ``str()`` does not contain the file name, because the caller knows it."""
 
 
 class BagFormatError(BagError):

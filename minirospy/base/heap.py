@@ -23,7 +23,7 @@ def return_large_blocks(least: int = _LARGE) -> None:
         return
     import ctypes
 
-    # musl does not have this function, and a Python without libffi has no ctypes.
+    # musl does not have mallopt(), and a Python without libffi has no ctypes.
     with contextlib.suppress(OSError, AttributeError):
         library = ctypes.CDLL(None)
         library.mallopt(_M_MMAP_THRESHOLD, least)

@@ -26,7 +26,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
 
     The command line works in sh, cmd.exe and PowerShell. ``upgrade``: replace an installed version that is too old.
     """
-    # Imported here, only to describe an error: if all libraries are installed, commands do not load these modules.
+    # Import these modules here, only to describe an error: if all libraries are installed, commands do not load them.
     import importlib.util
     import sysconfig
 
@@ -41,7 +41,8 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
     if importlib.util.find_spec("pip") is None:
         return f"uv pip install --python {_quoted_path(sys.executable)}{option} {words}"
 
-    # Under PEP 668 pip requires this option, which the user also needed to install minirospy.
+    # If the environment is externally managed (PEP 668), pip requires this option; the user also needed it to install
+    # minirospy.
     marker = Path(sysconfig.get_path("stdlib")) / "EXTERNALLY-MANAGED"
     if sys.prefix == sys.base_prefix and marker.is_file():
         option += " --break-system-packages"

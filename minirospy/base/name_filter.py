@@ -14,7 +14,7 @@ __all__ = ["NameFilter"]
 
 @dataclass(frozen=True)
 class NameFilter:
-    """Allows names that match a pattern in ``allow`` and one in ``whitelist``, but none in ``deny``.
+    """Allows names that match a pattern in ``allow`` and one in ``whitelist``, but no pattern in ``deny``.
 
     ``allow`` and ``deny`` are globs in which ``*`` matches slashes too; ``whitelist`` contains regular expressions for the
     whole name, as in foxglove_bridge.

@@ -113,7 +113,7 @@ class Arguments(NamedTuple):
     wrong: list[str]
 
     def resolved_remappings(self, node_name: str) -> dict[str, str]:
-        """Return the remappings with both names resolved to global names."""
+        """Return the remappings with both the old and the new name resolved to global names."""
         return {resolve(a, node_name): resolve(b, node_name) for a, b in self.remappings.items()}
 
 

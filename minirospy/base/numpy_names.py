@@ -1,4 +1,4 @@
-"""Array methods that numpy has removed, and that ROS 1 programs call."""
+"""Array methods that numpy has removed, but that ROS 1 programs still call."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _REMOVED = {
 
 
 def add_numpy_note(error: BaseException) -> None:
-    """If ``error`` is about an array method that numpy has removed, add a note with the replacement to it.
+    """If ``error`` is about an array method that numpy has removed, add a note that names the replacement.
 
-    There is no note on Python 3.10, which lacks them (PEP 678).
+    On Python 3.10 do nothing, because exceptions have no notes there (PEP 678).
     """
     numpy = sys.modules.get("numpy")
     if numpy is None or sys.version_info < (3, 11) or not isinstance(error, AttributeError):

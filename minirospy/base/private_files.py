@@ -1,7 +1,7 @@
 """Open files with predictable names, in folders that other users may write to, without following links.
 
 ROS_HOME is a shared folder on some robots, and TMPDIR is shared everywhere. Another user who creates the name first can
-make it a symbolic or hard link to one of the owner's files, so that this file is overwritten.
+make it a symbolic or hard link to one of the owner's files, so that the owner's program overwrites that file.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ REFUSES_OPEN_FILES = sys.platform == "win32"
 OPEN_FLAGS = (
     getattr(os, "O_BINARY", 0)
     | getattr(os, "O_NOFOLLOW", 0)
-    # Without this, opening a FIFO would block until another process opens its other end.
+    # Without O_NONBLOCK, opening a FIFO would block until another process opens its other end.
     | getattr(os, "O_NONBLOCK", 0)
 )
 
@@ -37,7 +37,8 @@ def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
     single hard link. With O_TRUNC the file is truncated only after these checks.
     """
     if os.path.islink(path):
-        # Check this because Windows has no O_NOFOLLOW; on other systems it only makes the error clearer.
+        # Check for a link explicitly, because Windows has no O_NOFOLLOW; on other systems this only makes the error
+        # clearer.
         raise _refusal(path, "it is a symbolic link, which is not followed")
 
     file = os.open(path, (flags & ~os.O_TRUNC) | OPEN_FLAGS, mode)
@@ -83,7 +84,8 @@ def read_file(path: Path) -> tuple[bytes, float]:
 def replace_file(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> None:
     """Rename ``source`` to ``target``, replacing any file with that name. Raise OSError if that fails.
 
-    Windows refuses this while another process has one of the files open, so on Windows it is retried for a second.
+    Windows refuses this while another process has one of the files open, so on Windows the rename is retried for a
+    second.
     """
     _until_closed(lambda: os.replace(source, target))
 
@@ -101,7 +103,7 @@ def _until_closed(action: Callable[[], None]) -> None:
             action()
             return
         except PermissionError:
-            # On other systems the cause is the folder's permissions, which waiting does not change.
+            # On other systems the folder's permissions cause the error, and waiting does not change them.
             if not REFUSES_OPEN_FILES or time.monotonic() >= end:
                 raise
         time.sleep(pause)

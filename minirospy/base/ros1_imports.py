@@ -36,7 +36,8 @@ _SUITABLE = frozenset(
     }
 )
 """Packages that need neither a client library nor messages, so that ROS 1 programs can use ROS 2's version of them."""
-_SUFFIXES = ("_msgs", "_srvs")  # suffixes of packages in workspaces, which are not in the overlay
+# suffixes of message packages, which may be in a workspace and not in the overlay
+_SUFFIXES = ("_msgs", "_srvs")
 _GENERATED = re.compile(rb"^from [\w.]+\.(?:msg|srv|action)\._\w+ import ", re.MULTILINE)
 """Matches msg/__init__.py as rosidl generates it; ROS 1 generates `from ._Name import *`."""
 _INDEX = os.path.join("share", "ament_index", "resource_index", "packages")

@@ -1,7 +1,7 @@
 """Let a program import a package with the same name as a file in its folder: `turtlebot.msg` in turtlebot.py.
 
-Python searches the program's folder first, so `from turtlebot.msg import Speed` in turtlebot.py would import turtlebot.py
-again. `import rospy` calls :func:`find_packages_named_like_scripts`.
+Python searches the program's folder first, so `from turtlebot.msg import Speed` in turtlebot.py would import
+turtlebot.py again instead of the package. `import rospy` calls :func:`find_packages_named_like_scripts`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["find_packages_named_like_scripts"]
 def find_packages_named_like_scripts() -> None:
     """Let imports find packages that are hidden by files in the program's folder. Idempotent.
 
-    Without effect if Python does not search the program's folder.
+    No effect if Python does not search the program's folder.
     """
     main = sys.modules.get("__main__")
     file = getattr(main, "__file__", None)
@@ -48,7 +48,8 @@ class _Finder:
     ) -> ModuleSpec | None:
         """Return the package's spec, or None if no file in the folder hides it.
 
-        The program itself is not imported again. Another file is, and the package's submodules are found in addition.
+        The program's own file is not imported again. Any other file is imported, and the package's submodules are found
+        in addition to it.
         """
         if path is not None:
             return None

@@ -30,7 +30,7 @@ def is_dispatching_signal() -> bool:
 def interrupt_signals() -> list[signal.Signals]:
     """Return the signals that Ctrl-C sends: SIGINT, and on Windows SIGBREAK.
 
-    Only SIGBREAK reaches a separate process group.
+    On Windows, only SIGBREAK reaches a process in a separate process group.
     """
     found = (getattr(signal, name, None) for name in ("SIGINT", "SIGBREAK"))
     return [number for number in found if number is not None]

@@ -28,8 +28,8 @@ Steps = Generator[Need | None, None, _T]  # work that yields between its steps a
 SMALL_ITEMS = 2000  # number of items; a value with this many takes a few milliseconds to serialize
 
 SHORT_ITEMS = 300
-"""Number of items; a value with this many takes some 0.1 ms to serialize, short even if a thousand clients request it
-together.
+"""Number of items; a value with this many takes about 0.1 ms to serialize, which is short even if a thousand clients request
+it at the same time.
 """
 
 _LETTERS_PER_ITEM = 16

@@ -14,7 +14,7 @@ __all__ = ["did_you_mean", "nearest"]
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return up to three of the ``known`` names that are similar to ``name``."""
     if not isinstance(name, str):
-        # A program passed a value that is not a string, to which no name is similar.
+        # Programs may pass a value that is not a string; no name is similar to it.
         return []
     names = sorted(set(known))
     # The most common mistake is to omit the package or namespace.
@@ -57,7 +57,7 @@ def _similar(word: str, known: Iterable[str], cutoff: float) -> list[str]:
         # Also suggest a name whose last part is the same, in another package or namespace.
         if ratios and (min(ratios) >= cutoff or (ratios[0] == 1 and cutoff < _SLIP)):
             found.append((-sum(ratios) / len(ratios), len(parts) != len(wanted), name))
-    # If the name exists in other letter case or without an extension, suggest only that.
+    # If the name exists in a different letter case or without an extension, suggest only that name.
     exact = [entry for entry in found if entry[0] == -1]
     return [name for *_, name in sorted(exact or found)]
 

@@ -46,7 +46,7 @@ class TVal:
         return not (self.secs or self.nsecs)
 
     def set(self, secs: int, nsecs: int) -> None:
-        """Set both parts without normalizing."""
+        """Set ``secs`` and ``nsecs`` without normalizing."""
         self.secs = secs
         self.nsecs = nsecs
 

@@ -1,4 +1,4 @@
-"""Draw a tree as SVG, for machines without graphviz: nodes and labelled edges in, SVG text out. Pure."""
+"""Draw a tree with labelled edges as SVG text, for machines without graphviz. Pure."""
 
 from __future__ import annotations
 

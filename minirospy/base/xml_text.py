@@ -22,7 +22,7 @@ _MAX_ELEMENTS = 1_000_000
 
 
 class XmlError(MinirospyError):
-    """The text is rejected; ``line`` is where the error is, or 0 if unknown, and ``why`` is the reason."""
+    """The text is rejected; ``line`` is the line of the error, or 0 if unknown, and ``why`` is the reason."""
 
     def __init__(self, line: int, why: str) -> None:
         super().__init__(line, why)

@@ -88,7 +88,10 @@ def fast_loader() -> type[yaml.SafeLoader]:
 
 @lru_cache(maxsize=32)
 def guarded(loader: Loader) -> Loader:
-    """Return a loader that rejects long numbers. It also uses constructors added to ``loader`` later."""
+    """Return a subclass of ``loader`` that rejects long numbers.
+
+    The subclass also uses constructors added to ``loader`` later.
+    """
     import yaml
 
     class Guarded(loader):  # type: ignore[valid-type,misc]

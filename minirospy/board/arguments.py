@@ -28,7 +28,7 @@ def level_of(value: object) -> int:
         return 1 if value else 0
     if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):
         raise TypeError("not a level")
-    # Accept numpy.bool_ and similar types.
+    # Accept numpy.bool_ and similar types, which are neither int nor bool.
     return 1 if value else 0
 
 

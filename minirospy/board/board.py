@@ -70,8 +70,8 @@ class Board:
     def press(self, pin: int) -> None:
         """Press the button at ``pin``, until :meth:`release`.
 
-        The pins of the wired buttons (11, 12) then read 1. Any other pin reads 1 too, unless its pull-up is enabled: then
-        the button connects the pin to ground, and it reads 0.
+        The pins of the wired buttons (11, 12) then read 1. Any other pin reads 1 too, unless its pull-up is enabled:
+        then the button connects the pin to ground, and the pin reads 0.
         """
         self._link.call(Press(pin))
 

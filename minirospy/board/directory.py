@@ -1,4 +1,4 @@
-"""A board's files: its name in, the paths of its socket, lock and saved pins out.
+"""A board's files: find the paths of its socket, lock and saved pins from the board's name.
 
 ``MINIROSPY_BOARD`` is the board's name (default "default"); ``MINIROSPY_RUNTIME_DIR`` is the folder for its files,
 by default one in the temporary folder that only this user may enter.
@@ -93,7 +93,7 @@ class BoardDirectory:
 
     @property
     def log_path(self) -> Path:
-        """The path of the log to which a failing server writes its error."""
+        """The path of the log file to which a server writes the error that ended it."""
         return self.folder / f"{self.name}.log"
 
 

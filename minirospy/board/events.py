@@ -1,4 +1,4 @@
-"""Edge detection: edges and the time in, callbacks out, one at a time in a single thread.
+"""Edge detection: calls callbacks for the edges to report, one at a time in a single thread.
 
 Debouncing is RPi.GPIO's: the first edge is reported, then the pin is ignored for the bounce time.
 """
@@ -41,7 +41,7 @@ class Detector:
         self._occurred = threading.Event()
 
     def see(self, level: int, now: float) -> bool:
-        """Return whether an edge to ``level`` at ``now`` (seconds on a monotonic clock) counts."""
+        """Return whether to report an edge to ``level`` at ``now`` (seconds on a monotonic clock); if so, record the edge."""
         if self.slope is not Slope.BOTH and (self.slope is Slope.RISING) != bool(level):
             return False
         if self._bouncetime is not None and self._last is not None and now - self._last <= self._bouncetime:
@@ -56,7 +56,7 @@ class Detector:
         return bool(self.callbacks) or (same and self._bouncetime not in (None, waiter._bouncetime))
 
     def take(self) -> bool:
-        """Return whether an edge has been counted since the last call."""
+        """Return whether an edge has been recorded since the last call."""
         occurred = self._occurred.is_set()
         self._occurred.clear()
         return occurred

@@ -1,7 +1,7 @@
-"""A process's connection to a board: operations in, mirrored pins and edges out.
+"""A process's connection to a board: sends operations, mirrors the pins, and reports edges.
 
-Blocking and thread-safe; one reader thread updates the mirror. If no server responds, one is started; if the server
-dies, another one is started, and unacknowledged requests are sent again, so that the caller sees no error.
+Blocking and thread-safe; one reader thread updates the mirror. If no server responds, the link starts one; if the server
+dies, the link starts another one, and unacknowledged requests are sent again, so that the caller sees no error.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ sys.path.append(sys.argv[1])
 from minirospy.board.server import main
 sys.exit(main(sys.argv[2:]))
 """
-"""Code that does the same as `python -m minirospy.board.server`, and also finds a package imported from the current folder."""
+"""Code that does the same as `python -m minirospy.board.server`, but also finds a package imported from the current folder."""
 
 
 class Edge(NamedTuple):
@@ -279,8 +279,9 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
         if (status or 0) > 0 or given_up() or time.monotonic() > deadline:
             raise BoardError(f"the virtual board [{directory.name}] does not start{_last_words(directory)}")
         if process is None or status is not None:
-            # Status 0 without a responding server: the new server found another one that was just exiting. Negative
-            # status: a Ctrl-C for this process killed the new server before it had detached from the terminal.
+            # Status 0 without a responding server: the new server exited because another one was still running, and
+            # that one has exited since. Negative status: a Ctrl-C for this process killed the new server before it
+            # had detached from the terminal.
             process = _start_server(directory)
         time.sleep(pause)
         pause = min(pause * 1.3, 0.05)
@@ -327,7 +328,7 @@ def _connect(directory: BoardDirectory) -> _Connection | None:
 
 
 def _start_server(directory: BoardDirectory) -> subprocess.Popen[bytes]:
-    """Start and return a server process in a new session. It outlives this process if the board still has clients."""
+    """Start and return a server process in a new session. The server outlives this process if the board still has clients."""
     import subprocess
 
     if not sys.executable:

@@ -1,4 +1,4 @@
-"""A board's behaviour: operations in, changed pins out. Pure.
+"""A board's behaviour: apply operations and return the changed pins. Pure.
 
 A pin is an input or an output. An output's level is its latch; an input's level is the one driven from outside (a
 pressed button, a jumper wire), else its pull resistor, else 0. As on a Raspberry Pi, the latch does not change if the
@@ -133,7 +133,7 @@ class BoardModel:
         self.person = person
 
     def apply(self, operation: Operation) -> list[Change]:
-        """Perform one operation completely, and return the changed pins.
+        """Perform one operation completely and return the changed pins.
 
         If the operation is invalid, raise OperationError and change nothing.
         """

@@ -135,7 +135,7 @@ def serialize(message: Message) -> bytes:
 
 
 class Stream:
-    """The decoder for one direction of a connection: bytes in, messages out."""
+    """A decoder that turns the bytes received in one direction of a connection into messages."""
 
     def __init__(self) -> None:
         self._unpacker = msgpack.Unpacker(use_list=False, max_buffer_size=_MAX_BUFFER)
@@ -212,4 +212,4 @@ _READERS: tuple[Callable[..., Message], ...] = (
     lambda number: Done(_natural(number)),
     lambda number, why: Refused(_natural(number), str(why)),
     lambda position: PersonMoved(_position(position)),
-)  # in the same order as _KINDS
+)  # message classes, in the same order as _KINDS

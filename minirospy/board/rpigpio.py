@@ -119,11 +119,12 @@ class Gpio:
         self._link: Link | None = None
         self._levels: list[int] = []
         self._directions: dict[int, int] = {}
-        # Dict from channel to BCM pin, for the channels that are set up; used by the two calls that must be fast.
+        # Dict from channel to BCM pin, for the channels that are set up; used by input() and output(), which must be
+        # fast.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
-        # The same for channels that cleanup() has released in a signal handler, so that the interrupted call still
-        # finds them.
+        # The channels that cleanup() has released in a signal handler, also with their BCM pins, so that the
+        # interrupted call still finds them.
         self._interrupted: dict[int, int] = {}
         self._detectors: dict[int, Detector] = {}
         self._waiting: dict[int, Detector] = {}
@@ -201,8 +202,8 @@ class Gpio:
             mine = wanted & set(self._directions)
             if is_dispatching_signal():
                 # If this runs in a shutdown hook, the interrupted program may already have checked its flag and be
-                # about to use a pin. That must not fail, because RPi.GPIO, which is written in C, would finish the
-                # program's call first.
+                # about to use a pin. That use must not fail, because RPi.GPIO, which is written in C, would finish
+                # the program's call first.
                 self._interrupted.update((one, pin) for one, pin in self._readable.items() if pin in mine)
 
             for pin in sorted(mine):
@@ -215,7 +216,7 @@ class Gpio:
                     del table[one]
 
             if everything and self._link is not None:
-                # Do this even if no channel was set up, because RPi.GPIO only checks whether any pin has been
+                # Reset the mode even if no channel was set up, because RPi.GPIO only checks whether any pin has been
                 # accessed.
                 self._mode = None
 
@@ -372,8 +373,8 @@ class Gpio:
         if pin in {2, 3} and pull != PUD_OFF:
             self._warn("A physical pull up resistor is fitted on this channel!", depth=3)
         with self._lock:
-            # Do this before calling the board: a Ctrl-C may interrupt that call, and cleanup() must then undo its
-            # effect.
+            # Record the pin before calling the board: a Ctrl-C may interrupt that call, and cleanup() must then undo
+            # its effect.
             self._directions[pin] = direction
 
         link.call(Setup(pin, direction, pull, level))
@@ -468,7 +469,7 @@ class PWM:
         self._running.set(frequency=frequency)
 
     def stop(self) -> None:
-        """Stop, and set the channel low."""
+        """Stop the wave and set the channel low."""
         self._running.stop()
 
     @property

@@ -1,4 +1,4 @@
-"""A simulated safety scanner: a room with walls and a person in, ranges and fields out. Pure.
+"""A simulated safety scanner: compute ranges and fields from a room's walls and a person. Pure.
 
 The geometry is that of SICK's nanoScan3 as its ROS 1 driver publishes it: 1651 beams over 275 degrees. Lengths are in
 metres, angles in radians; x is straight ahead of the scanner and y to its left.

@@ -1,7 +1,8 @@
 """A board's server process: `python -m minirospy.board.server FOLDER NAME`.
 
-The first client starts it, and it exits shortly after the last one has disconnected; a lock file ensures that only one
-runs. The board is saved to a file when it changes, so that the next server continues with the same state.
+The first client starts the server, and the server exits shortly after the last client has disconnected; a lock file
+ensures that only one server runs. The board is saved to a file when it changes, so that the next server continues with
+the same state.
 """
 
 from __future__ import annotations
@@ -54,8 +55,8 @@ def main(argv: list[str]) -> int:
     """Serve the board NAME in FOLDER until it has no clients; return 0, also if another server is running."""
     directory = BoardDirectory(argv[1], Path(argv[0]))
     if sys.platform == "win32":
-        # Do not keep a file open as on other systems, because Windows could then remove neither the file nor its
-        # folder.
+        # On Windows, do not keep the log file open as on other systems, because neither the file nor its folder could
+        # then be removed.
         sys.stderr = _LogOnDemand(directory.log_path)
     # A board that already has saved state is not temporary, even if another process starts it again.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not directory.state_path.exists()
@@ -106,7 +107,7 @@ class _Server:
             await self._abandoned.wait()
         finally:
             server.close()
-            # If a client has the file open, the next server replaces it.
+            # A client may have the address file open, so that it cannot be removed; the next server replaces it.
             with contextlib.suppress(OSError):
                 private_files.remove_file(address)
             for client in list(self._clients):

@@ -60,7 +60,7 @@ class Wave:
             self._thread.start()
 
     def stop(self) -> None:
-        """Stop, and set the pin low; another PWM may then use the pin."""
+        """Stop the wave and set the pin low; another PWM may then use the pin."""
         thread, self._thread = self._thread, None
         self._stopping = True
         self._changed.set()

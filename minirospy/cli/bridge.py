@@ -253,7 +253,7 @@ def _show_status(port: int | None, rosbridge_port: int | None, token: str, *, as
     ports = [each for each in (port, rosbridge_port) if each is not None]
     for each in ports:
         _check_range("port", each, 1, 65535)
-    # These are the default ports of Foxglove, rosbridge and web_video_server.
+    # Use the default ports of Foxglove, rosbridge and web_video_server.
     return show_status(ports or (8765, 9090, 8080), token, as_json=as_json)
 
 
@@ -292,7 +292,7 @@ def _announce(bridge: Bridge, options: BridgeOptions, tokens: Tokens) -> None:
     addresses = ["localhost"] if is_any or is_loopback(options.address) else [options.address]
     if options.access.requires_token and not listener.is_encrypted and addresses == ["localhost"]:
         # localhost may resolve to ::1, and another user's server at that address would receive the token. With a
-        # certificate this cannot happen, because it identifies the server.
+        # certificate this cannot happen, because the certificate identifies the server.
         addresses = ["::1" if options.address in ("::", "::1") else "127.0.0.1"]
     found = links(addresses, listener.port, encrypted=listener.is_encrypted)
     print(f"Foxglove protocol at {found.websocket[0]}", flush=True)

@@ -36,14 +36,14 @@ def __getattr__(name: str) -> Any:
 
 
 def _main(command: Command, argv: Sequence[str] | None = None) -> int:
-    """Run a command. Its arguments may contain remappings, because launch files may start it as a node."""
+    """Run a command. The arguments may contain remappings, because launch files may start the command as a node."""
     words = list(sys.argv[1:] if argv is None else argv)
     remappings = [word for word in words if ":=" in word]
     body = partial(command.body, arguments=remappings)
     return command._replace(body=body).main([word for word in words if ":=" not in word])
 
 
-# --- the command lines
+# --- command lines
 
 
 def _parser(name: str, what: str) -> Parser:
@@ -275,7 +275,7 @@ def _rviz(
     return _serve("3d", fields, port, no_browser, listen, address, read_only, arguments, file)
 
 
-# --- the page
+# --- page
 
 
 def _serve(
@@ -310,7 +310,7 @@ def _serve(
     from minirospy.web.dashboard.dashboard import PORT, Dashboard
     from minirospy.web.serve import run
 
-    # Bags on the command line may be in any folder, not only below the working folder.
+    # Allow bags named on the command line in any folder, not only below the working folder.
     given = fields.get("file", ()) if view == "bag" else ()
     bags = BagFolder(Path.cwd(), [Path(name) for name in given])
     address = address or ("0.0.0.0" if listen else "127.0.0.1")
@@ -443,7 +443,7 @@ def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
         codes.redeem(code)
         return False
     codes.when_ended(code, remove)
-    # Check after the code has expired according to the clock of Codes.
+    # Schedule the check a second late, so that the code has expired according to the clock of Codes.
     asyncio.get_running_loop().call_later(LIFETIME + 1, codes.forget_expired)
     return True
 

@@ -119,7 +119,7 @@ def _free_port() -> int:
 
 @contextlib.contextmanager
 def _launched(log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run roslaunch with the workshop's launch file; stop it and its nodes with SIGINT."""
+    """Run roslaunch with the workshop's launch file; at the end, stop roslaunch and its nodes with SIGINT."""
     command = [
         sys.executable,
         "-m",

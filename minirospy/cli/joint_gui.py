@@ -19,9 +19,9 @@ _NAME = "joint_state_publisher_gui"
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the node; return its exit status.
 
-    The sliders are shown on a web page if a browser can be opened. If there is neither a display nor a terminal, they are on a
-    page too, whose link is printed. In all other cases, and if the page's libraries are missing, they are in the terminal.
-    ``--page`` and ``--terminal`` override this.
+    The sliders are shown on a web page if a browser can be opened. If there is neither a display nor a terminal, they
+    are also on a page, whose link is printed. In all other cases, and if the page's libraries are missing, the sliders
+    are in the terminal. ``--page`` and ``--terminal`` override this choice.
     """
     words = list(sys.argv[1:] if argv is None else argv)
     if "--terminal" in words or not (_uses_page(words) and _has_libraries()):

@@ -25,7 +25,7 @@ class Entry(NamedTuple):
 
     ``script`` is the console script, ``verb`` the word after `minirospy`; either may be empty. The help does not show a
     verb without a summary. ``grammar`` is the name of the Command or Family in ``module``; a command that parses its
-    arguments itself has none, and names a function of minirospy.cli.completion.completers in ``completer`` instead.
+    arguments itself has no grammar; its ``completer`` is the name of a function in minirospy.cli.completion.completers.
     """
 
     module: str

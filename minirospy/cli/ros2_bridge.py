@@ -1,6 +1,6 @@
 """`minirospy ros2-bridge`: topics, services and actions between ROS 1 and ROS 2 (docs/ros2.md).
 
-It uses an installed ROS 2, or Zenoh if ROS 2 is not installed.
+The bridge uses an installed ROS 2, or Zenoh if ROS 2 is not installed.
 """
 
 from __future__ import annotations

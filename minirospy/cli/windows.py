@@ -76,7 +76,7 @@ WINDOWS = (
     Window("smach_viewer", "smach", "Shows state machines", "0.4.13", "State machines of smach, in a browser.",
            programs=("smach_viewer", "smach_viewer.py")),
 )  # fmt: skip
-"""The table. To add a window, add a line here, its arguments (if any) in dashboard.py, and run ``python tools/commands.py``."""
+"""The table. To add a window, add a row here, its arguments (if any) in dashboard.py, and run ``python tools/commands.py``."""
 
 
 def view_of_plugin(plugin: str) -> str:
@@ -88,7 +88,7 @@ def view_of_plugin(plugin: str) -> str:
     plugins = {each.command: each.view for each in WINDOWS if each.command.startswith("rqt_")}
     name = plugin.rpartition("/")[0] or plugin
     for known, view in plugins.items():
-        # rqt itself accepts a part of the plugin's name.
+        # rqt also accepts a part of the plugin's name.
         if name.lower().replace(".", "/").split("/")[0] == known:
             return view
     if name in VIEWS:

@@ -155,8 +155,8 @@ __all__ = [
     "wait_for_service",
 ]
 
-# Do this before the first message is imported: if ROS 2 is sourced, its packages with the same names are first on the
-# path.
+# Do this before the first message is imported: if ROS 2 is sourced, ROS 2's packages with the same names are first on
+# the path.
 prefer_ros1()
 find_packages_named_like_scripts()
 
@@ -218,7 +218,7 @@ def is_down() -> bool:
 def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None]:
     """Call ``interrupt``, in any thread, if the node shuts down during the block.
 
-    It must unblock the calls made in the block.
+    ``interrupt`` must unblock the calls made in the block.
     """
     return current_session().lifecycle.interrupting(interrupt)
 

@@ -33,14 +33,14 @@ class _Repeated:
 class CallbackErrors:
     """Logs the errors that a node's callbacks raise.
 
-    Two errors are the same if they have the same type and the same callback, and were raised at the same line of code.
+    Two errors are the same if they have the same type and callback, and were raised at the same line of code.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         """Create the log. ``clock()`` returns the time in seconds."""
         self._clock = clock
-        # Keys are the error's type, the callback's name, the file and the line. A program has few such places, so the
-        # table stays small.
+        # Keys are the error's type, the callback's name, the file and the line. A program raises errors at few
+        # locations, so the table stays small.
         self._known: dict[tuple[type[BaseException], str, str, int], _Repeated] = {}
         # Use a reentrant lock: :meth:`close` may run in a signal handler that interrupts :meth:`log` in the same
         # thread.

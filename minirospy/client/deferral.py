@@ -12,8 +12,8 @@ __all__ = ["Deferral", "is_main_thread"]
 class Deferral:
     """A critical section in the main thread: ``with deferral:`` delays the dispatch of signals until the end of the block.
 
-    A shutdown hook may publish, log or register, so it must not run while the main thread is in the middle of such a call.
-    Has no effect in other threads, because signals do not interrupt them.
+    A shutdown hook may publish, log or register, so it must not run while the main thread is in the middle of such an
+    operation. Has no effect in other threads, because signals do not interrupt them.
     """
 
     def __init__(self) -> None:

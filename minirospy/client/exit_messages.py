@@ -15,7 +15,10 @@ __all__ = ["report_interrupt", "report_waiting", "suppress_tracebacks"]
 
 
 def report_waiting(*, is_leaving: bool) -> None:
-    """Print what the process is still waiting for; ``is_leaving``: the node is waiting for the master to unregister it."""
+    """Print what the process is still waiting for.
+
+    ``is_leaving`` means that the node is waiting for the master to unregister it.
+    """
     what = "the master to unregister this node" if is_leaving else _what_runs()
     advice = "Press Ctrl-C again to interrupt it, and a third time to end the process"
     # The terminal may have been closed.
@@ -58,7 +61,8 @@ def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
     hooks = sys.excepthook, threading.excepthook, sys.unraisablehook
 
     def is_interrupt(error: BaseException | None) -> bool:
-        # An interrupted wait may raise RuntimeError because its lock is not acquired.
+        # An interrupted wait may raise RuntimeError, because its lock was not acquired; check the error that caused
+        # it.
         while isinstance(error, RuntimeError):
             error = error.__context__
         return error is not None and is_expected(error)
@@ -66,7 +70,7 @@ def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
     def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if is_interrupt(error):
             if sys.flags.inspect:
-                # After `python -i PROGRAM` an interactive session follows.
+                # An interactive session follows after `python -i PROGRAM`.
                 return
             raise SystemExit(0)
         hooks[0](kind, error, trace)

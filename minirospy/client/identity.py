@@ -25,13 +25,13 @@ _UNNAMED = "unnamed"
 class Identity:
     """A node's name, and name resolution relative to it.
 
-    Before :meth:`take_name` it is the identity of a program without a node.
+    Before :meth:`take_name` is called, this is the identity of a program without a node.
     """
 
     def __init__(self, previous: Identity | None = None) -> None:
         """Use the identity ``previous`` until :meth:`take_name` is called, except for topic names."""
-        # Dict from resolved names, and from __name and similar keys; empty before init_node. Programs change this and
-        # `mappings`
+        # Dict from resolved names, and from __name and similar keys, to their new values; empty before init_node.
+        # Programs may change this dict and `mappings`
         self.remappings: dict[str, str] = previous.remappings if previous else {}
         self._name: str | None = previous._name if previous else None
         # The namespace that the program has set, or None
@@ -67,7 +67,7 @@ class Identity:
         self._mappings = mappings
 
     def resolved_mappings(self, node_name: str) -> dict[str, str]:
-        """Return the remappings with both names resolved relative to the node ``node_name``; special keys stay unchanged."""
+        """Return the remappings with old and new names resolved relative to ``node_name``; special keys stay unchanged."""
         return {
             key if key.startswith("__") else names.resolve(key, node_name): value
             if key.startswith("__")

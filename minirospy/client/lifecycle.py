@@ -37,7 +37,7 @@ class _ThisThread(threading.local):
 class _Interrupting:
     """The context manager that :meth:`Lifecycle.interrupting` returns.
 
-    It is a class, because each service call uses it and a generator is slower.
+    This is a class, because every service call uses it and a generator-based context manager is slower.
     """
 
     __slots__ = ("_interrupt", "_lifecycle")
@@ -72,7 +72,7 @@ class Lifecycle:
         self.left = SignalSafeEvent()  # set when the node has left the graph
         self.reason: object = None  # the reason passed with the shutdown request
 
-        self.hooks: list[Callable[[], object]] = []  # called while is_shutdown() is false
+        self.hooks: list[Callable[[], object]] = []  # called while is_shutdown() still returns False
         # Called after ``hooks``, including those that a hook has added
         self.late_hooks: list[Callable[[], object]] = []
         self.interrupts: list[Callable[[], object]] = []
@@ -106,7 +106,7 @@ class Lifecycle:
         """
         with self.deferral:
             # Enter the deferral before claiming the shutdown. Otherwise a second signal right after the claim would
-            # leave the shutdown claimed but never done.
+            # leave the shutdown claimed but never performed.
             if not self._claim.acquire(blocking=False):
                 return False
             _log.debug("signal_shutdown [%s]", reason)
@@ -181,8 +181,9 @@ class Lifecycle:
     def check_interrupted_sleep(self) -> None:
         """Raise ROSInterruptException after a shutdown interrupted this thread's sleep, unless the thread polls is_shutdown().
 
-        In a loop that polls is_shutdown() the sleep just returns early, as in rospy: the loop polls next, and the code after
-        it still runs. The exception is raised in a thread that never polls, or that sleeps again without having polled.
+        In a loop that polls is_shutdown() the sleep just returns early, as in rospy: the loop polls next, and the code
+        after the loop still runs. The exception is raised in a thread that never polls, or that sleeps again without
+        having polled.
         """
         state = self._this_thread.state
         if state.awareness is not Awareness.POLLS:

@@ -123,7 +123,7 @@ def write(
     place = at.f_code.co_filename, at.f_lineno
     record = logger.makeRecord(logger.name, level, *place, msg, args, error, function, extra, stack)
     if args or not isinstance(msg, str):
-        # A faulty log line must not end the node, whichever handlers the program has added.
+        # An error in one log call must not end the node, whichever handlers the program has added.
         check_message(record)
     with current_session().lifecycle.deferral:
         logger.handle(record)
@@ -158,7 +158,7 @@ class _CallSites:
         return True
 
     def is_due(self, frame: FrameType, period: float | times.Duration) -> bool:
-        """Return whether the call site at ``frame`` was last due more than ``period`` seconds ago."""
+        """Return whether the call site at ``frame`` last logged more than ``period`` seconds ago."""
         place, now = _place(frame), current_session().clock.now()
         before = self._times.get(place)
         pause = period.to_nsec() if isinstance(period, times.Duration) else int(period * 1e9)

@@ -75,7 +75,7 @@ def configure(session: Session, log_level: int | None, log_file: str | None) -> 
 
 
 def start(session: Session, *, rosout: bool) -> None:
-    """Offer the node's logger services, and publish to ``/rosout`` if ``rosout`` is set."""
+    """Offer the node's logger services and publish to ``/rosout`` if ``rosout`` is set."""
     _offer_logger_services()
     if rosout:
         _start_rosout(session)
@@ -119,7 +119,7 @@ def _offer_logger_services() -> None:
 
 
 def configured_by_file(home: Path) -> bool:
-    """Apply the user's configuration file for ``logging``, of ROS_HOME ``home``, and return True; False if there is none."""
+    """Apply the user's configuration file for ``logging``, by default from ROS_HOME ``home``; return whether one was loaded."""
     named = os.environ.get("ROS_PYTHON_LOG_CONFIG_FILE")
     folder = home / "config"
     found = [folder / f"python_logging.{kind}" for kind in ("conf", "yaml", "yml")]
@@ -143,7 +143,7 @@ def configured_by_file(home: Path) -> bool:
 
 
 def _log_to_file(session: Session, path: Path) -> None:
-    """Write the output of all loggers to the node's file, like rospy, without printing anything twice on the terminal."""
+    """Write the output of all loggers to the node's log file, as rospy does. Prevent duplicate lines on the terminal."""
     from minirospy.runtime.master.log_file import LogFileHandler
 
     class RotatingFileHandler(DeferringHandler, LogFileHandler):

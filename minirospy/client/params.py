@@ -37,7 +37,7 @@ _T = TypeVar("_T")
 
 
 class Unspecified:
-    """The type of ``default`` if the caller passes none. It is not None, because a caller may want None to be returned."""
+    """The type of the sentinel that means "no default given", because None is a valid default."""
 
 
 UNSPECIFIED = Unspecified()
@@ -65,7 +65,7 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
 
 
 def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
-    """Return a parameter's value from a cache that the master keeps up to date; before init_node, from the master."""
+    """Return a parameter's value from a cache that the master keeps up to date. Before init_node, query the master instead."""
     name = current_session().resolve(param_name)
     cache, node = current_session().parameters, current_session().node
     if node is None or current_session().is_shutdown():
@@ -161,7 +161,7 @@ class KeptParameters:
         current_session().parameter_listeners.append(self._dispatch)
 
     def get(self, key: str) -> Any:
-        """Return a parameter from the cache. Raise KeyError if get_param_cached has not read it before."""
+        """Return a parameter's value from the cache. Raise KeyError if get_param_cached has not read it before."""
         session = current_session()
         if session.node is None or session.resolve(key) not in session.node.parameters:
             raise KeyError(key)
@@ -217,7 +217,8 @@ def as_xmlrpc_client(value: object) -> object:
     if isinstance(value, list):
         return [as_xmlrpc_client(item) for item in value]
     if isinstance(value, bytes) or _is_date(value):
-        # Imported here, because http.client and the modules that it imports cost more than the rest of this module.
+        # Imported here, because http.client and the modules that it imports take longer to load than the rest of this
+        # module.
         import xmlrpc.client
 
         return xmlrpc.client.Binary(value) if isinstance(value, bytes) else xmlrpc.client.DateTime(value)
@@ -225,7 +226,7 @@ def as_xmlrpc_client(value: object) -> object:
 
 
 def check_sendable(value: object) -> None:
-    """Raise the exception that rospy raises if XML-RPC has no type for a value."""
+    """If XML-RPC has no type for a value, raise the same exception as rospy."""
     if value is None:
         raise TypeError("cannot marshal None unless allow_none is enabled")
 

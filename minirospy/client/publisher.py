@@ -187,7 +187,7 @@ class PublishedTopic(SharedTopic):
             if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
             # Set this before registering, because a subscriber may connect immediately, and a publish() before the
-            # master's response counts too.
+            # master's response must work too.
             self._registered = True
             wait = self._session.start(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)
@@ -195,7 +195,8 @@ class PublishedTopic(SharedTopic):
     def leave(self, handle: Publisher[Message]) -> None:
         with self._session.lock:
             self._handles.discard(handle)
-            # After a fork, or after the process became another node, the topic is no longer in the table.
+            # After a fork, or after the process became another node, the session's table no longer contains this
+            # topic.
             if self._handles or self._session.published.get(self.resolved_name) is not self:
                 return
             del self._session.published[self.resolved_name]
@@ -309,7 +310,7 @@ class PublishedTopic(SharedTopic):
         return any(link.peer == endpoint_id for link in self.publication.links)
 
     def _log_unheard(self) -> None:
-        """Log that the first message had no subscriber.
+        """Log that the first message was published without a subscriber.
 
         Log a warning only if the master reports a subscriber that is still connecting: many topics have no subscriber at
         first, or never have one.
@@ -388,7 +389,7 @@ def _is_listener(value: object) -> bool:
 
 
 def _not_a_listener(value: object) -> str:
-    """Return the warning about an argument that is not a listener; rospy would reject every subscriber because of it."""
+    """Return the warning about an argument that is not a listener; with it, rospy would reject every subscriber."""
     text = f"subscriber_listener {value!r} is ignored: it has no method peer_subscribe or peer_unsubscribe."
     if isinstance(value, int):
         return f"{text} The third argument of Publisher is not the queue size: write queue_size={value!r}"

@@ -58,10 +58,10 @@ _NO_CONTACT = "failed to contact, will keep trying"
 class Service(Generic[_S_co]):
     """Offers a service: ``handler(request)`` returns the response.
 
-    The handler may return a response, a dictionary of some of its fields, a list or tuple of all its field
-    values, or the value of its only field. If the handler raises, the client's call fails with that error, and
-    ``error_handler(error, type, error, traceback)``, if given, is called instead of logging it. Each connection has
-    a separate thread, so a handler may run several times concurrently. ``buff_size`` is accepted for compatibility.
+    The handler may return a response, a dictionary of some of its fields, a list or tuple of all its field values, or
+    the value of its only field. If the handler raises, the client's call fails with that error, and
+    ``error_handler(error, type, error, traceback)``, if given, is called, and the error is not logged. Each connection
+    has a separate thread, so a handler may run several times concurrently. ``buff_size`` is accepted for compatibility.
     Raise ValueError if the name is empty, ServiceException if this node already offers the service.
     """
 
@@ -162,7 +162,7 @@ class Service(Generic[_S_co]):
             buffer = BytesIO()
             response.serialize(buffer)
             return buffer.getvalue()
-        except CallFailed as error:  # sent by a program's _handle_request
+        except CallFailed as error:  # the program's own _handle_request() sent an error response
             raise ServiceException(str(error)) from None
         except ServiceException as error:
             raise ServiceException(f"service cannot process request: {error}") from error
@@ -190,7 +190,7 @@ class Service(Generic[_S_co]):
     def _handle_request(self, transport: TCPROSTransport, request: Message) -> None:
         """Call the handler and send its response, or its error, through ``transport``.
 
-        It exists for programs that replace it, in a subclass or in the class itself; otherwise, it is not called.
+        This method exists for programs that replace it, in a subclass or in the class itself. Otherwise it is not called.
         """
         try:
             response = to_response(self.response_class, self.handler(request))
@@ -238,7 +238,7 @@ class ServiceProxy(Generic[_S_co]):
         persistent: bool = False,
         headers: Mapping[str, str] | None = None,
     ) -> None:
-        # If the name was never set (None), only a call raises an error.
+        # If the name was never set (None), only calls raise an error, not the constructor.
         self.resolved_name = current_session().resolve(str(name) if name else "")
         self.service_class = service_class
         self.request_class: type[Message] = service_class._request_class
@@ -253,10 +253,10 @@ class ServiceProxy(Generic[_S_co]):
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
         self._client_session: Session | None = None
-        # Number of calls that reached the service. It is the seq of requests whose first field is a header.
+        # Number of calls that reached the service, which is the seq of requests whose first field is a header.
         self._calls = 0
         self._transport: TCPROSTransport | None = (
-            None  # set by the program, or the connection that it asked for
+            None  # a connection set by the program, or one that the program requested
         )
         self._protocol: TCPROSServiceClient | None = None
         self._lock = threading.Lock()
@@ -294,7 +294,7 @@ class ServiceProxy(Generic[_S_co]):
 
     @property
     def protocol(self) -> TCPROSServiceClient:
-        """The connection header's fields and the class of the responses, for a TCPROSTransport that a program creates."""
+        """The connection header's fields and the class of the responses, for programs that create a TCPROSTransport."""
         if self._protocol is None:
             from minirospy.client.tcpros import TCPROSServiceClient
 
@@ -324,7 +324,7 @@ class ServiceProxy(Generic[_S_co]):
         self._transport, self._transport_is_own = transport, False
 
     def _get_service_uri(self, request: object) -> str:
-        """Return the service's URI; ``request`` has no effect here. Raise ServiceException if the master has none."""
+        """Return the service's URI; ``request`` has no effect here. Raise ServiceException if the service is not registered."""
         return self._find_uri()
 
     def wait_for_service(self, timeout: float | None = None) -> None:
@@ -335,8 +335,8 @@ class ServiceProxy(Generic[_S_co]):
         """Close a persistent connection; if another thread is calling through it, that call fails."""
         client = self._client
         if client and self._lock.locked():
-            # Shut the socket down, because closing it would not wake a thread that is reading from it. That thread
-            # then closes it.
+            # Shut the socket down instead of closing it, because closing would not wake a thread that is reading from
+            # it. That thread then closes the socket.
             client.hang_up()
         else:
             self._disconnect()
@@ -449,8 +449,8 @@ class ServiceProxy(Generic[_S_co]):
         uri = self._find_uri()
         try:
             if ahead and ahead.uri == uri:
-                # The server may have been about to exit, so connect again. Do not retry if the server does not
-                # respond, because it may have received the request.
+                # The server may have been about to exit when it accepted the connection, so connect again. Do not
+                # retry if the server does not respond, because it may have received the request.
                 with contextlib.suppress(ConnectionError, WireError):
                     ahead.finish(request)
                     return ahead

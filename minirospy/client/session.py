@@ -34,7 +34,7 @@ __all__ = ["Session", "current_session", "replace_session", "replace_session_in_
 
 _T = TypeVar("_T")
 _MASTER_SECONDS = 30.0
-"""Time limit for a call. It is long because many nodes that start together on a small computer delay each other."""
+"""Time limit for a call to the master. It is long because many nodes that start together on a small computer delay each other."""
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
 _log = logging.getLogger(__name__)
 
@@ -81,7 +81,7 @@ class Session:
         self._waiting_for_node: list[Callable[[], object]] = []
         self._installs_signals = is_fork and previous is not None and previous.signals.is_installed
 
-    # --- the node
+    # --- node
 
     @property
     def name(self) -> str:
@@ -196,7 +196,7 @@ class Session:
         with self.lock:
             self.parameters.changed(key)
 
-    # --- the shutdown
+    # --- shutdown
 
     def is_shutdown(self) -> bool:
         """Return whether the node has shut down."""
@@ -233,7 +233,7 @@ class Session:
     def _warn_of_missing_spin(self) -> None:
         """Log a warning if the program ends without an error right after it has subscribed, before any message has arrived."""
         waiting = {topic: state for topic, state in self.subscribed.items() if state.has_callback}
-        # A program that polls or has waited ends when it means to, and so does an interactive session.
+        # A program that polls or has waited ends intentionally, and so does an interactive session.
         is_meant = self.lifecycle.has_waited or self.lifecycle.main_polls or hasattr(sys, "ps1")
         topics = sorted(topic for topic in waiting if topic != "/clock")
         if (
@@ -309,7 +309,7 @@ class Session:
             listener(key, value)
 
     def _forget_parameters(self) -> None:
-        """Discard all cached parameters: the master has restarted, and the node is no longer subscribed to them."""
+        """Discard all cached parameters, because the master has restarted and the node is no longer subscribed to them."""
         if self.node:
             keys = list(self.node.parameters)
             self.node.parameters.clear()
@@ -327,7 +327,7 @@ def current_session() -> Session:
 
 
 def replace_session() -> None:
-    """Let init_node create another node once the node has left the graph; no effect before that, or after a signal.
+    """Let init_node create another node if the current node has left the graph. No effect before that, or after a signal.
 
     Objects that the program created for the old node, such as publishers, remain attached to it.
     """
@@ -338,7 +338,10 @@ def replace_session() -> None:
 
 
 def replace_session_in_fork() -> None:
-    """Replace the session in a fork: the name, the time and the logging remain; the node belongs to the parent."""
+    """Replace the session in a fork.
+
+    The new session keeps the name, the time and the logging, but not the node, which belongs to the parent.
+    """
     session = _Process.session
     _Process.session = Session(session, is_fork=True)
     if session.is_shutdown():

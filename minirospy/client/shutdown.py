@@ -1,7 +1,7 @@
-"""The shutdown of a process that is a node, as a state machine; docs/shutdown.md contains its diagram.
+"""The shutdown of a process that is a node, as a state machine; docs/shutdown.md contains the diagram.
 
-Its inputs are events: a signal, a phase that the node has entered, a clock tick. Its outputs are actions. This module uses
-no threads, signals or clocks: :mod:`minirospy.client.signals` performs the actions.
+The machine's inputs are events: a signal, a phase that the node has entered, a clock tick. Its outputs are actions. This
+module uses no threads, signals or clocks: :mod:`minirospy.client.signals` performs the actions.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import enum
 
 __all__ = ["Action", "Awareness", "Phase", "ShutdownMachine", "ThreadState"]
 
-# seconds for the main thread to start the hooks, and again to see that is_shutdown() is true
+# seconds for the main thread to start the hooks, and again for it to detect that is_shutdown() is true
 _GRACE_SECONDS = 0.5
 _REPORT_SECONDS = 2.0
 # Seconds for the main thread to exit by itself after a request from another process. No user is waiting at the
@@ -24,8 +24,8 @@ class Phase(enum.IntEnum):
     """The phase of the shutdown."""
 
     RUNNING = 0
-    HOOKS = 1  # is_shutdown() is still false
-    DOWN = 2  # is_shutdown() is true, blocking calls are interrupted
+    HOOKS = 1  # is_shutdown() still returns False
+    DOWN = 2  # is_shutdown() returns True, blocking calls are interrupted
     LEAVING = 3  # the node waits for the master to unregister it
     LEFT = 4  # the master has unregistered the node
 
@@ -89,7 +89,7 @@ class ShutdownMachine:
 
         is_leaving = self.phase is Phase.LEAVING
         if is_leaving and self.runs_in_main:
-            # The main thread is not running the program's code.
+            # The main thread is running the shutdown and not the program's code, so do not raise an exception in it.
             return [Action.STOP_LEAVING]
         self._done.add(Action.INTERRUPT)
         return [Action.STOP_LEAVING, Action.KEYBOARD_INTERRUPT] if is_leaving else [Action.KEYBOARD_INTERRUPT]
@@ -114,9 +114,9 @@ class ShutdownMachine:
 
     @property
     def main_ends_by_itself(self) -> bool:
-        """Return whether the main thread needs no exception, because it has exited or has been notified of the shutdown."""
-        # Trust a main thread that polls to exit, except after a request from another process, when no user can press
-        # Ctrl-C again.
+        """Return whether the main thread will exit without an exception, because it has exited or has been notified."""
+        # Trust a main thread that polls to exit by itself. Do not rely on this after a request from another process,
+        # because no user can press Ctrl-C again.
         trusted = Awareness.NOTIFIED if self.is_requested else Awareness.POLLS
         return self.main_has_ended or self.main.awareness >= trusted
 

@@ -27,7 +27,9 @@ _NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 _EXIT_STATUS = 130
 
 _DEFER_SECONDS = 0.05
-"""Seconds to wait for the main thread's next rospy call, where the hooks cannot interrupt a half-finished operation."""
+"""Seconds to wait for the main thread to reach its next rospy call, at which the hooks cannot interrupt a half-finished
+operation.
+"""
 
 _TICK_SECONDS = 0.01
 # Maximum seconds counted for one tick, so that time during which the process or the machine was suspended is excluded
@@ -40,9 +42,9 @@ class SignalWatchdog:
     def __init__(
         self, lifecycle: Lifecycle, stop_leaving: Callable[[], object], is_sending: Callable[[], bool]
     ) -> None:
-        """Create the watchdog. It calls ``stop_leaving()`` to let the node leave the graph without waiting for the master.
+        """Create the watchdog. ``stop_leaving()`` lets the node leave the graph without waiting for the master.
 
-        ``is_sending()`` returns whether a link's lock is held; a hook that publishes could then deadlock.
+        ``is_sending()`` returns whether a link's lock is held; if it is, a hook that publishes could deadlock.
         """
         self._lifecycle = lifecycle
         self._machine = lifecycle.machine
@@ -83,7 +85,7 @@ class SignalWatchdog:
             _start(self._watch, receiving, name="minirospy-signals")
         previous = signal.set_wakeup_fd(self._sending.fileno(), warn_on_full_buffer=False)
         if previous != -1:
-            # The previous file descriptor belongs to an event loop that was installed first.
+            # Restore the previous file descriptor, which belongs to an event loop that was installed first.
             signal.set_wakeup_fd(previous)
 
     def release(self) -> None:
@@ -118,7 +120,7 @@ class SignalWatchdog:
             with contextlib.suppress(OSError):
                 self._sending.send(b"\0")
 
-    # --- the main thread
+    # --- main thread
 
     def on_signal(self, number: int, _: FrameType | None) -> None:
         self._number = number
@@ -149,10 +151,10 @@ class SignalWatchdog:
         if action is Action.INTERRUPT and not self._machine.main_ends_by_itself:
             raise self._lifecycle.interrupted("the program was signalled to end")
 
-    # --- the watchdog thread
+    # --- watchdog thread
 
     def _watch(self, receiving: socket.socket) -> None:
-        """Feed the state machine with signals and time, and perform its actions, until :meth:`release`."""
+        """Pass signals and timeouts to the state machine and perform the actions it returns, until :meth:`release`."""
         machine, deferral = self._machine, self._deferral
         now = deferred_at = 0.0
         with receiving, contextlib.suppress(ConnectionError):
@@ -213,8 +215,8 @@ class SignalWatchdog:
         self._number = int(signal.SIGINT)
         handler = signal.getsignal(self._number)
         if hasattr(sys, "ps1") or not callable(handler):
-            # Do not interrupt an interactive session, which would lose its variables; do not send a signal that is
-            # ignored, or that would terminate the process.
+            # Do not interrupt an interactive session, because the user would lose its variables. Do not send a signal
+            # that is ignored, or that would terminate the process.
             return
 
         report_interrupt(str(self._lifecycle.reason))
@@ -222,15 +224,15 @@ class SignalWatchdog:
             self._interrupt = Action.INTERRUPT
             self._nudge()
         else:
-            # The program, or a library such as IPython, has replaced the handler, and decides about Ctrl-C itself.
+            # The program, or a library such as IPython, has replaced the handler, so let that handler decide what to
+            # do.
             _send_to_main(self._number)
 
     def _nudge(self) -> None:
         """Run the handler in the main thread, interrupting its system call, if any."""
         with self._nudging:
             if self._is_nudge or not self._is_handled(self._number):
-                # Send only one nudge at a time, because the system merges two undelivered signals, but they are
-                # counted.
+                # Send only one nudge at a time: the handler counts signals, but the system merges undelivered ones.
                 return
             self._nudges += 1
             self._is_nudge = True

@@ -28,9 +28,10 @@ _FIRST_WINDOW = 2.0
 
 
 class WindowLimits(NamedTuple):
-    """The limits of an adaptive window. Its length doubles below ``min_elements`` messages and halves above ``max_elements``.
+    """The limits of an adaptive window.
 
-    It stays between ``min_size`` and ``max_size`` seconds.
+    The window's length doubles if it has fewer than ``min_elements`` messages, and halves if it has more than
+    ``max_elements``. The length stays between ``min_size`` and ``max_size`` seconds.
     """
 
     min_elements: float = 10
@@ -40,7 +41,7 @@ class WindowLimits(NamedTuple):
 
     @classmethod
     def read(cls, get: Callable[[str, object], float]) -> WindowLimits:
-        """Return the limits set by the parameters /statistics_window_...; ``get(key, default)`` reads one."""
+        """Return the limits set by the parameters /statistics_window_...; ``get(key, default)`` reads one parameter."""
         return cls(
             *(get(f"/statistics_window_{name}", default) for name, default in cls._field_defaults.items())
         )
@@ -106,7 +107,7 @@ class TopicStatisticsCounter:
         publisher = header.get("callerid", "")
         window = self._windows.get(publisher)
         if window is None or now < window.start:
-            # This is the first message, or simulated time jumped back.
+            # Start a window: this is the first message, or simulated time has jumped back.
             window = self._windows[publisher] = _Window(now)
 
         window.delivered += 1
@@ -120,7 +121,7 @@ class TopicStatisticsCounter:
             if window.last_sequence is not None:
                 window.dropped += max(0, sequence - window.last_sequence - 1)
             window.last_sequence = sequence
-            # A zero stamp means that none is set.
+            # A zero stamp means that the publisher has not set the stamp.
             if stamp:
                 window.ages.append((now - stamp) / 1e9)
 

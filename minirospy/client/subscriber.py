@@ -373,7 +373,8 @@ def _call(callback: _Callback, message: Message, is_callers_thread: bool) -> Non
         # call.
         if is_callers_thread and not isinstance(error, Exception):
             raise
-        # Ignore the callback's errors while a shutdown hook releases resources that the callback uses.
+        # Ignore errors in the callback during a shutdown, because a shutdown hook may have released resources that
+        # the callback uses.
         session = current_session()
         if not session.lifecycle.is_shutdown_requested:
             session.callback_errors.log(callback.function, error)

@@ -1,7 +1,7 @@
 """A TCPROS connection that a program makes itself: the classes of rospy.impl.tcpros_base and tcpros_service.
 
-minirospy's own connections are in ``runtime/``; they use none of these. Source: http://wiki.ros.org/ROS/TCPROS, and the
-behaviour of rospy.impl.
+minirospy's own connections are in ``runtime/`` and do not use these classes. Source: http://wiki.ros.org/ROS/TCPROS, and
+the behaviour of rospy.impl.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def recv_buff(sock: socket.socket, b: BytesIO, buff_size: int) -> int:
 
 
 class TCPROSTransportProtocol:
-    """What a connection transfers: the fields of its header, and the class of the received messages."""
+    """The data that a connection transfers: the fields of its header, and the class of the received messages."""
 
     def __init__(
         self,
@@ -156,11 +156,11 @@ class Transport:
         self.id = next(_numbers)
         self.done = False  # set by close()
         self.cleanup_cb: Callable[[Any], object] | None = None
-        # Where the connection goes: the peer's URI, and the addresses of the socket
+        # The connection's other end: the peer's URI, and the addresses of the socket
         self.endpoint_id = ""
         self.local_endpoint: Any = (0, 0)
         self.remote_endpoint: Any = (0, 0)
-        # The number of bytes and messages in both directions
+        # The total number of bytes and messages, received and sent
         self.stat_bytes = self.stat_num_msg = 0
 
     def fileno(self) -> int | None:
@@ -243,7 +243,7 @@ class TCPROSTransport(Transport):
         super().__init__(protocol.direction, name)
         self.protocol = protocol
         self.buff_size = protocol.buff_size
-        # The peer's connection header, None until it has been received, and the fields from it
+        # The peer's connection header (None until it has been received), and the fields copied from it
         self.header: Mapping[str, str] | None = header
         self.type: str | None = None
         self.md5sum: str | None = None
@@ -335,7 +335,7 @@ class TCPROSTransport(Transport):
         self.use_header(header)
 
     def use_header(self, header: Mapping[str, str]) -> None:
-        """Take the peer's name and type from its connection header. Raise TransportInitError if it lacks the type."""
+        """Set the peer's name and type from its connection header. Raise TransportInitError if the header has no type."""
         for field in ("md5sum", "type"):
             if field not in header:
                 raise TransportInitError(f"header missing required field [{field}]")

@@ -141,7 +141,7 @@ class Rate:
             return
         period = self.sleep_dur.to_nsec()
         started = self.last_time.to_nsec() + period
-        # If far behind, for example after a pause, skip the missed periods.
+        # If the loop is far behind, for example after a pause, skip the missed periods.
         now = current_session().clock.now()
         self.last_time = _time(now if now - started > 2 * period else started)
 
@@ -251,8 +251,8 @@ class Timer(threading.Thread):
                     _log.error("Timer ends: its callback %s called sys.exit(%s)", self._callback, error)
                     return
                 except BaseException as error:
-                    # If the callback is not a function, it cannot be called again. After a shutdown the callback's
-                    # errors mean nothing.
+                    # If the callback is not a function, it cannot be called again, so stop. During a shutdown, errors
+                    # in the callback are irrelevant.
                     if not callable(self._callback) or session.lifecycle.is_shutdown_requested:
                         raise
                     session.callback_errors.log(self._callback, error)
@@ -268,7 +268,7 @@ class Timer(threading.Thread):
 
 
 def _sleep(nanoseconds: int, stop: threading.Event | None = None) -> None:
-    """Sleep; return early if ``stop`` is set. Without ``stop``, a shutdown interrupts it as in :func:`sleep`."""
+    """Sleep; return early if ``stop`` is set. Without ``stop``, a shutdown interrupts the sleep as in :func:`sleep`."""
     if nanoseconds <= 0:
         return
     session = current_session()

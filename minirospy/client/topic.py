@@ -158,7 +158,7 @@ def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> N
 def unregister_from_master(wait: Callable[[], object]) -> None:
     """Wait for an unregistration to finish.
 
-    If the master does not respond, it is notified later, or has lost the registration.
+    If the master does not respond, the unregistration is sent later, unless the master has lost the registration.
     """
     try:
         wait()

@@ -1,4 +1,4 @@
-"""Run a command's verb for a program that calls a function such as ROS's `_rostopic_cmd_list(argv)`: raise its errors."""
+"""Run a command's verb for a program that calls a ROS function such as `_rostopic_cmd_list(argv)`, and raise its errors."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Raised(NamedTuple):
 def call_verb(family: Family, words: Sequence[str], raised: Raised) -> int | None:
     """Run a command line without the command's name; return the status of its verb.
 
-    Raise one of the exceptions in ``raised`` if the verb fails, but ConnectionRefusedError where ROS's function does not
+    Raise one of the exceptions in ``raised`` if the verb fails, or ConnectionRefusedError if ROS's function does not
     catch the socket error. Exit after a usage error, and after an error that ROS's function prints itself.
     """
     try:

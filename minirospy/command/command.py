@@ -82,7 +82,7 @@ class RosText(NamedTuple):
 
 
 class WordedError(MinirospyError):
-    """An error whose ROS message depends on the command as well as on the error. ``ros``, that message, is printed first."""
+    """An error whose ROS message depends on the command as well as on the error; ``ros``, printed first, is that message."""
 
     def __init__(self, error: Exception, ros: RosText) -> None:
         super().__init__(str(error))
@@ -129,8 +129,8 @@ def run(
 ) -> int:
     """Run ``body`` and return the exit status, which is ``interrupted`` after Ctrl-C.
 
-    A named error is printed as ``name: ERROR: text`` on stderr, after ROS's message for it. ``heeds_interrupts``: exit on
-    SIGINT even if the signal was ignored at the start, unless ``interrupted`` is nonzero.
+    An expected error is printed as ``name: ERROR: text`` on stderr, after ROS's message for it. ``heeds_interrupts``:
+    exit on SIGINT even if the signal was ignored at the start, unless ``interrupted`` is nonzero.
     """
     _open_streams()
     if not os.path.isdir(_PACKAGE):
@@ -157,7 +157,7 @@ def run(
         _flush()
         return 0
     except OSError as error:
-        # This is, for example, a full disk or a missing permission: print the file's name and the system's message.
+        # The cause may be a full disk or a missing permission: print the file's name and the system's message.
         why = error.strerror or str(error)
         return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:
@@ -193,8 +193,8 @@ def _heed_break() -> None:
 def _heed_interrupts() -> None:
     """Exit on SIGINT even if a script started the command with `&`, for which the shell sets the signal to be ignored.
 
-    ROS's commands exit then too, because they are nodes and install their own handlers. A build does not call this, and keeps
-    the shell's setting.
+    ROS's commands exit in this case too, because they are nodes and install their own handlers. Build commands do not
+    call this function; they keep the shell's setting.
     """
     import signal
     import threading

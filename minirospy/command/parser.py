@@ -151,7 +151,7 @@ class Parser(argparse.ArgumentParser):
         return group
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, ready to be passed to the command's function.
+        """Return the arguments by name, to pass to the command's function.
 
         Raise CommandLineError if they are invalid.
         """

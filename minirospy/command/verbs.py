@@ -1,7 +1,7 @@
 """Commands and verbs, each a parser and a typed function, and families of verbs under one command name.
 
-The parser's arguments have the names of the function's parameters: `Command.run` passes them by name. Thus the parser is
-available without running the command, and the function can be called without a command line. A function with many
+The parser's arguments have the names of the function's parameters: `Command.run` passes them by name. Thus the parser
+can be inspected without running the command, and the function can be called without a command line. A function with many
 arguments takes one record that contains them: see :func:`with_options`.
 """
 
@@ -104,9 +104,10 @@ class HelpStatus(NamedTuple):
 class Family(NamedTuple):
     """A command and its verbs. ``headline`` describes the command, ``footer`` refers to further help.
 
-    A verb may be a family itself. ``is_node``: launch files start it as a node (`<node pkg="rostopic" type="rostopic"
-    args="pub ..."/>`), with `__name:=` and remappings among its arguments. ``interrupted``: the exit status after Ctrl-C.
-    ``wording``: ROS's messages for errors. ``shows_help_on_error``: an unknown verb also prints the help on stdout.
+    A verb may be a family itself. ``is_node``: launch files start the command as a node (`<node pkg="rostopic"
+    type="rostopic" args="pub ..."/>`), with `__name:=` and remappings among its arguments. ``interrupted``: the exit
+    status after Ctrl-C. ``wording``: ROS's messages for errors. ``shows_help_on_error``: an unknown verb also prints the
+    help on stdout.
     """
 
     name: str

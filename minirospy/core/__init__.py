@@ -1,1 +1,1 @@
-"""The pure packages: bytes, specs and tables as input, values and actions as output; no sockets, event loops or threads."""
+"""The pure packages: they compute values and actions from bytes, specs and tables, without sockets, event loops or threads."""

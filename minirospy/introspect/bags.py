@@ -1,6 +1,6 @@
 """Bag files by path: open, copy, filter, compress and reindex them, and create their message classes.
 
-This is what the rosbag commands do, without their output.
+The rosbag commands call these functions and add their output.
 """
 
 from __future__ import annotations
@@ -151,7 +151,10 @@ def copy_bag(
 
 
 class Expression:
-    """A Python expression of `rosbag filter` over topic, m and t. Raise ValueTextError if its syntax is invalid."""
+    """A Python expression for `rosbag filter`, with the variables topic, m and t.
+
+    Raise ValueTextError if its syntax is invalid.
+    """
 
     def __init__(self, text: str) -> None:
         try:
@@ -192,7 +195,7 @@ def filter_bag(
     on_shown: Callable[[bool, object], object] = lambda kept, value: None,
     warn: Callable[[str], object] = lambda line: None,
 ) -> FilterResult:
-    """Write the messages for which ``keep`` is true to a new bag; call ``on_shown`` with each value of ``show``.
+    """Write the messages for which ``keep`` is truthy to a new bag; call ``on_shown`` with each value of ``show``.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails, ValueTextError if the expression raises, or
     MessageException if a message cannot be deserialized.

@@ -34,7 +34,7 @@ class Filter:
             raise UsageError(f"filter [{expression}] is not a Python expression: {error}") from error
 
     def __call__(self, message: Message, topic: str) -> bool:
-        """Return whether the expression is true. Raise UsageError if it cannot be evaluated."""
+        """Return whether the expression's value is truthy. Raise UsageError if the expression cannot be evaluated."""
         try:
             # eval is safe here: the code is the user's own, on the user's own machine, as in ROS.
             return bool(eval(self._code, {"m": message, "topic": topic}))
@@ -100,7 +100,7 @@ class Echo:
         return message
 
     def text(self, message: Message, received: Received) -> str:
-        """Return the output for a message. Raise IndexError if the path's index exceeds the array."""
+        """Return the output for a message. Raise IndexError if the path's index is beyond the end of the array."""
         value = field_value(message, self._steps, self._report)
         return self._row(value, received) if self._plot else self._block(value)
 

@@ -24,7 +24,7 @@ _TIMES = {
     "time": {"secs": "uint32", "nsecs": "uint32"},
     "duration": {"secs": "int32", "nsecs": "int32"},
 }
-"""The primitive types that nevertheless have fields."""
+"""The primitive types that have fields, each with its fields and their types."""
 
 
 class Step(NamedTuple):

@@ -28,7 +28,7 @@ class Kind(Enum):
 
     @property
     def word(self) -> str:
-        """The kind as a word."""
+        """The kind's name, for messages to the user."""
         return "message" if self is Kind.MESSAGE else "service"
 
 
@@ -41,7 +41,7 @@ class Interfaces:
         self._catalogue = Catalogue(packages.folders())
 
     def packages(self) -> list[str]:
-        """Return the sorted names of the packages that define such types."""
+        """Return the sorted names of the packages that define types of this kind."""
         return [package for package in sorted(self._catalogue.packages) if self._names(package)]
 
     def in_package(self, package: str) -> list[str]:
@@ -60,7 +60,7 @@ class Interfaces:
     def find(self, name: str) -> list[str]:
         """Return the types that match ``name``: ``name`` itself if it includes a package, else all types with that name.
 
-        Raise NotFoundError with similar names if there is none.
+        Raise NotFoundError with similar names if no type matches.
         """
         everything = self.all()
         by_itself = "/" not in name

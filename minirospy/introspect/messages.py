@@ -24,7 +24,7 @@ _M = TypeVar("_M", bound="Message")
 
 
 _HINTS = {
-    # YAML parses such values as a different type than they appear to have.
+    # YAML may parse such values as another type: an unquoted 5 as a number, 1e-3 as a string.
     "an ascii string": ", a text that could be a number, a date or a list needs its own quotes: \"'5'\"",
     "must be float type": ", numbers like 1.0e-3, .inf and .nan with their dot",
 }
@@ -44,21 +44,21 @@ class Received(NamedTuple):
 
 
 class MessageClasses:
-    """Message classes for what publishers send; each class is looked up or generated once."""
+    """Message classes for received messages; each class is looked up or generated once."""
 
     def __init__(self) -> None:
         self._classes: dict[tuple[str, str], type[Message]] = {}
 
     def for_header(self, header: Mapping[str, str]) -> type[Message]:
-        """Return the class for a publisher's connection header. If the md5sums agree, this is the installed one.
+        """Return the class for a publisher's connection header. If the md5sums agree, this is the installed class.
 
-        Raise NotFoundError if it is not installed and the publisher sent no definition, or DefinitionError if the
+        Raise NotFoundError if the type is not installed and the publisher sent no definition, or DefinitionError if the
         definition cannot be parsed.
         """
         key = (header.get("type", "*"), header.get("md5sum", "*"))
         if key not in self._classes:
             if len(self._classes) >= _MAX_CLASSES:
-                # Normal use never needs this many types, so a publisher is inventing them.
+                # Normal use never needs this many types, so a publisher is sending made-up type names.
                 self._classes.clear()
             self._classes[key] = self._find(*key, header.get("message_definition", ""))
         return self._classes[key]

@@ -18,7 +18,7 @@ MAX_CONCURRENT = 64
 _MAX_CONCURRENT_RETRIES = 32
 """Maximum number of concurrent retries; limited separately, so that retries do not delay first queries."""
 QUERY_SECONDS = 5.0
-AGAIN_SECONDS = 10.0  # before a node that did not respond is queried again
+AGAIN_SECONDS = 10.0  # seconds before a node that did not respond is queried again
 REFUSED_SECONDS, _REFUSED_EACH = 0.5, 0.02
 """Seconds to pause after a refused query: base, and increment per failed query.
 

@@ -222,7 +222,7 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
     master = MasterProxy(graph.master.uri, node.name)
     try:
         # Topics are unregistered by the node's URI, services by their own URI. If the node's name is still registered
-        # with this URI after the services were looked up, none of them can belong to a newer node.
+        # with this URI after the services were looked up, none of the services can belong to a newer node.
         services = {service: _service_uri(master, service) for service in _held_by(state.services, node.name)}
         with contextlib.suppress(RpcRefused):
             if master.lookup_node(node.name) == uri:
@@ -237,15 +237,15 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
 
 
 def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
-    """Return whether no process listens at a node's address, or one that is not the node.
+    """Return whether no process listens at a node's address, or the process there is not the node.
 
-    Return False for a node that does not respond in time: it may be alive.
+    Return False for a node that does not respond in time, because it may be alive.
     """
     with contextlib.closing(_slave(graph, node, timeout)) as slave:
         try:
             return bool(slave.call("getName") != node.name)
         except RpcUnreachable as error:
-            # EOFError means that another server, which now uses the port, such as a TCPROS server, closed the
+            # EOFError means that a different server, such as a TCPROS server, now uses the port and closed the
             # connection.
             return isinstance(error.__cause__, ConnectionError | EOFError)
         except RpcProtocolError:

@@ -108,7 +108,7 @@ def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFil
 
 
 def dump_parameters(values: object) -> str:
-    """Return the YAML of a parameter file with these values."""
+    """Return ``values`` as the YAML text of a parameter file."""
     text = format_value(values)
     return text if text.endswith("\n") else text + "\n"
 

@@ -58,7 +58,7 @@ class _Defaults(NamedTuple):
 class _Yaml:
     """A YAML writer.
 
-    Once it has met a wide value, it writes innermost lists and dictionaries on one line, as `rosmsg-proto` does.
+    After the first wide value, it writes innermost lists and dictionaries on one line, as `rosmsg-proto` does.
     """
 
     def __init__(self) -> None:
@@ -98,7 +98,7 @@ def _wrapped(line: str) -> str:
     """Wrap a line that is too wide as YAML libraries do: before the first word that starts after the last column."""
     if len(line) <= _COLUMNS:
         return line
-    # A dash before a key counts as indentation, one before a brace does not.
+    # A dash before a key counts as indentation; a dash before a brace does not.
     start = re.match(r" *(?:- (?=\w))?", line)
     indent = start.end() if start else 0
     column, depth, text = 0, 0, []

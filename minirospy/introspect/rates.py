@@ -55,7 +55,7 @@ class Bandwidth(NamedTuple):
 
 
 class RateWindow:
-    """Measures the periods between the latest messages (at most ``size``; 0 for no limit)."""
+    """Measures the periods between the newest messages (at most ``size`` of them; 0 for no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._pauses: deque[float] = deque(maxlen=max(1, (size or UNBOUNDED) - 1))
@@ -82,7 +82,7 @@ class RateWindow:
 
 
 class BandwidthWindow:
-    """Measures the sizes of the latest messages (at most ``size``)."""
+    """Measures the sizes of the newest messages (at most ``size`` of them)."""
 
     def __init__(self, size: int = 0) -> None:
         self._messages: deque[tuple[float, int]] = deque(maxlen=size or 100)
@@ -103,7 +103,7 @@ class BandwidthWindow:
 
 
 class DelayWindow:
-    """Measures the delays between the latest messages' stamps and arrivals (at most ``size``; 0 for no limit)."""
+    """Measures the delays between the newest messages' stamps and arrivals (at most ``size`` of them; 0 for no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._delays: deque[float] = deque(maxlen=size or UNBOUNDED)

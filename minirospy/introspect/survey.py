@@ -40,7 +40,10 @@ class Counts(NamedTuple):
 
 @dataclass(frozen=True)
 class Survey:
-    """The graph at one time (monotonic seconds). ``counts``: by process, connection and edge; ``loads``: by node."""
+    """The graph at one time (monotonic seconds).
+
+    ``counts`` is a dict by process, connection and edge; ``loads`` is a dict by node.
+    """
 
     seconds: float
     state: SystemState
@@ -78,7 +81,7 @@ def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, flo
     found: dict[Edge, tuple[float, float]] = {}
     for key, now in after.counts.items():
         then = before.counts.get(key)
-        # roscpp's counters are 32-bit numbers: skip those that have wrapped around.
+        # roscpp's counters are 32-bit numbers: skip counters that have wrapped around.
         if then is None or now.messages < then.messages or now.bytes < then.bytes:
             continue
         hz, size = found.get(key[2], (0.0, 0.0))

@@ -96,7 +96,7 @@ class TypeTexts:
             with contextlib.suppress(MinirospyError, OSError, asyncio.TimeoutError, ValueError):
                 header = await self.header_of(topic, publisher)
                 text = header.get("message_definition", "")
-                # an empty definition is valid for a message without fields
+                # An empty definition is valid only for a message without fields, whose md5sum this is.
                 if text or header["md5sum"] == "d41d8cd98f00b204e9800998ecf8427e":
                     return InterfaceType(header["type"], header["md5sum"], text)
         return None

@@ -40,7 +40,7 @@ _TRUTH = {"true": True, "True": True, "false": False, "False": False}
 _DOCUMENT_END = "\n...\n"
 _INT32 = 2**31
 _MAX_ANGLE_LENGTH = 200
-_MAX_SHOWN_DIGITS = 40  # maximum number of digits that an error message shows of an integer
+_MAX_SHOWN_DIGITS = 40  # maximum number of digits of an integer that an error message shows
 
 
 def parse_value(text: str) -> object:
@@ -82,7 +82,7 @@ def parse_documents(text: str, where: str) -> Iterator[object]:
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
     """Yield values as :func:`parse_documents` does, but each one as soon as its document is complete.
 
-    For example, `rostopic echo /a | rostopic pub /b TYPE` needs this.
+    An example that needs this is `rostopic echo /a | rostopic pub /b TYPE`.
     """
     text: list[str] = []
     for line in lines:
@@ -100,7 +100,7 @@ def parse_arguments(words: Sequence[str]) -> list[object]:
 
 
 def message_values(documents: Iterable[object]) -> Iterator[list[object]]:
-    """Yield each document's values for a message: a list with one value per field."""
+    """For each YAML document, yield the list of values to assign to the message's fields."""
     for document in documents:
         if document is not None:
             yield document if isinstance(document, list) else [document]
@@ -164,7 +164,7 @@ def _is_digits(text: str) -> bool:
 
 
 def _is_plain_text(word: str) -> bool:
-    """Return whether YAML parses a string as itself, because it has only letters, digits, / and _, and no special meaning."""
+    """Return whether YAML parses a word as a string: it has only letters, digits, / and _, and no special meaning."""
     return (
         len(word) > 1
         and word.isascii()

@@ -17,7 +17,7 @@ __all__ = ["StopGuard"]
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
-"""Stops an actuator; called in the guard's thread. It must check whether a command has arrived in the meantime."""
+"""Stops an actuator; called in the guard's thread. The function must check whether a command has arrived in the meantime."""
 
 
 class StopGuard:

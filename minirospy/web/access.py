@@ -88,10 +88,9 @@ class Credentials(NamedTuple):
 class Access:
     """The access rules for one listener.
 
-    ``hosts``: names of this machine in addition to addresses and localhost. ``origins``: patterns for additional pages
-    that may connect, besides those from this machine and the front ends. A token is "" if there is none.
-    ``requires_token`` is set for a listener that is not on loopback. ``default_is_read``: clients that need no token have
-    read-only access.
+    ``hosts``: names of this machine in addition to addresses and localhost. ``origins``: patterns for pages that may
+    connect in addition to those from this machine and the front ends. A token is "" if there is none. ``requires_token``
+    is set for a listener that is not on loopback. ``default_is_read``: clients that need no token have read-only access.
     """
 
     hosts: tuple[str, ...] = ()
@@ -140,7 +139,7 @@ class Access:
 
     def _grant_of(self, token: str) -> Grant | None:
         given = token.encode()
-        # Compare with both tokens, so that the response time reveals nothing.
+        # Compare with both tokens, so that the response time does not reveal which one matches.
         is_write = bool(self.write_token) and hmac.compare_digest(given, self.write_token.encode())
         is_read = bool(self.read_token) and hmac.compare_digest(given, self.read_token.encode())
         return Grant.OWN if is_write else Grant.READ if is_read else None

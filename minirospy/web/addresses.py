@@ -36,7 +36,7 @@ def own_addresses() -> list[str]:
 
     found: dict[str, None] = {}
     with contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        # connect() on a UDP socket sends no packet: it only selects the source address.
+        # connect() on a UDP socket sends no packet; it only selects the source address.
         probe.connect(("192.0.2.1", 9))
         found[str(probe.getsockname()[0])] = None
     for addresses in psutil.net_if_addrs().values():

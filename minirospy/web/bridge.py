@@ -75,7 +75,7 @@ class BridgeOptions:
     retry_delay: float | None = None
     rosapi: bool = False
     transforms: bool = False
-    """``rosapi`` and ``transforms``: for rosbridge clients, also run rosapi's services and tf2_web_republisher, respectively."""
+    """Options for rosbridge clients: ``rosapi`` also runs rosapi's services, ``transforms`` also runs tf2_web_republisher."""
     name: str = "minirospy bridge"  # the Foxglove server's name
 
 
@@ -250,7 +250,7 @@ class Bridge:
             return None
         try:
             return tls_context(self.options.certificate, self.options.key)
-        except OSError as error:  # ssl.SSLError is a subclass
+        except OSError as error:  # covers ssl.SSLError, which is a subclass
             name = error.filename or f"{self.options.certificate} {self.options.key}".strip()
             raise BridgeError(f"the certificate cannot be used: {name}: {error.strerror or error}") from error
 

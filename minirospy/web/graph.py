@@ -75,7 +75,8 @@ class SharedTopic:
         self.received_bytes = 0
         self._graph = graph
         self._listeners: list[TopicListener] = []
-        # The key is the id of the header, which is a single object for each connection.
+        # Dict from the id of a publisher's connection header, which is a single object per connection, to its last
+        # message.
         self._latched: dict[int, Arrival] = {}
         self._subscription: RawSubscription | None = None
 
@@ -93,7 +94,8 @@ class SharedTopic:
         """Call ``listener`` with the last message of each latched publisher, then with each new message."""
         if self._subscription is None:
             self._subscription = self._graph.node.subscribe_raw(self.topic, self._deliver)
-        # If the topic is just being unsubscribed, existing connections do not deliver latched messages again.
+        # If the topic is just being unsubscribed, its connections still exist and do not deliver latched messages
+        # again.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
             listener(Arrival(arrival.body, arrival.header, self._graph.now()))
@@ -143,9 +145,9 @@ class Publication:
         return self._shared is None or self._shared.joining is None or self._shared.joining.done()
 
     async def joined(self) -> None:
-        """Wait for those subscribers, for at most a second.
+        """Wait until the subscribers that the master listed at the advertisement are connected, for at most a second.
 
-        They do not receive messages published before they connect.
+        Subscribers do not receive messages published before they connect.
         """
         if self._shared and self._shared.joining:
             await asyncio.wait([self._shared.joining])
@@ -157,7 +159,7 @@ class Publication:
             shared.publisher.publish_raw(body)
 
     def publish_when_joined(self, body: bytes) -> None:
-        """Publish once the current subscribers are connected, in order.
+        """Publish after all current subscribers have connected. Messages keep their order.
 
         Does not block; a full queue drops its oldest message.
         """
@@ -254,7 +256,7 @@ class SharedGraph:
         await self._service_types.close()
         await self.texts.close()
 
-    # --- the graph
+    # --- graph
 
     def watch(self, listener: GraphListener) -> None:
         """Call ``listener`` with each graph change. The first change that the first listener receives is the whole graph."""
@@ -278,7 +280,7 @@ class SharedGraph:
         self._refresh_soon.set()
 
     async def look(self) -> None:
-        """Refresh the graph, and report changes. Raise MasterUnreachableError or RpcError if the master's call fails."""
+        """Refresh the graph and report changes. Raise MasterUnreachableError or RpcError if the master's call fails."""
         # Run one refresh at a time, so that an earlier refresh does not replace a later snapshot.
         async with self._looking:
             found = await fetch(self.node.call_master)
@@ -359,7 +361,10 @@ class SharedGraph:
             del self.topics[shared.topic]
 
     def advertise(self, topic: str, type_: InterfaceType, *, latch: bool = False) -> Publication:
-        """Advertise a topic. Raise BridgeError if clients may not publish it, or it is published with another type."""
+        """Advertise a topic.
+
+        Raise BridgeError if clients may not publish it, or if it is already published with another type.
+        """
         if not self.filters.publishable(topic):
             raise BridgeError(f"topic [{topic}] may not be published by clients")
         shared = self.publishers.get(topic)

@@ -71,7 +71,7 @@ def width_of(text: str) -> int:
     if len(text) == 1:
         # Do not use the size of a single-character string, because Python 3.12 and later also store its UTF-8 copy.
         return 1 if ord(text) <= 0xFF else 2 if ord(text) <= 0xFFFF else 4
-    # In other strings, such a copy can only make this value too large.
+    # In longer strings, such a UTF-8 copy can only make this value too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
     return found if found <= 2 else 4
 
@@ -80,7 +80,7 @@ def is_quick_text(text: str) -> bool:
     """Return whether a string can be parsed in a few milliseconds."""
     if len(text) <= MAX_QUICK_CHARACTERS:
         return True
-    # Brackets and commas in strings are counted as well, which is harmless: a large base64 string contains none.
+    # Brackets and commas in strings are counted too. This is harmless, because a large base64 string contains none.
     return len(text) <= MAX_QUICK_STRINGS and sum(map(text.count, ",[{")) <= MAX_QUICK_VALUES
 
 
@@ -172,7 +172,7 @@ def _numbers(text: str, start: int, end: int) -> list[object]:
     return found
 
 
-# --- values -> texts
+# --- encoding
 
 
 def dump_json(value: object) -> str:
@@ -199,7 +199,7 @@ def _pieces(value: object) -> Iterator[str]:
         yield "}" if value else "{}"
     elif isinstance(value, list):
         yield "["
-        # All elements of a message's array have the same type.
+        # Check only the first element, because all elements of a message's array have the same type.
         is_nested = bool(value) and isinstance(value[0], dict | list | str)
         yield from _nested_elements(value) if is_nested else _numbers_of(value)
         yield "]"

@@ -113,9 +113,9 @@ def run(
 ) -> int:
     """Run a bridge on a node of this name until it is shut down; return the exit status.
 
-    ``argv``: remappings, as a launch file passes them (None: the process's own). ``start`` creates the bridge,
-    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time,
-    for which it would import message classes. ``registration_fault_lines`` is passed to the node. ``connect`` opens
+    ``argv``: remappings, as a launch file passes them (None: the process's own arguments). ``start`` creates the bridge,
+    ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for
+    which it would import message classes. ``registration_fault_lines`` is passed to the node. ``connect`` opens
     resources that may fail, before the node registers its name, because the master ends a running node with the same
     name.
     """
@@ -184,7 +184,7 @@ async def _run(
             raise
     finally:
         if bridge is not None:
-            await bridge.close()  # needed if the node has not been started
+            await bridge.close()  # necessary if the node has not been started
         ticking.cancel()
         for number, handler in before.items():
             signal.signal(number, handler)

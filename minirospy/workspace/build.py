@@ -102,14 +102,15 @@ class Workspace(NamedTuple):
 def find_workspace(start: Path) -> Path:
     """Return the workspace that contains ``start``.
 
-    It was built before, or its ``src`` contains ``start``. Raise BuildError if there is no such folder.
+    This is the nearest folder that was built before, else the nearest whose ``src`` contains ``start``. Raise BuildError if
+    there is no such folder.
     """
     start = start.resolve()
     for folder in (start, *start.parents):
         if (folder / ".catkin_workspace").is_file() or (folder / ".catkin_tools").is_dir():
             return folder
     for folder in (start, *start.parents):
-        # A folder such as ~ may have an unrelated src, and is not the workspace of all other folders in it.
+        # A folder such as ~ may have an unrelated src; it is then not the workspace of its other subfolders.
         is_inside = start == folder or start.is_relative_to(folder / "src")
         if is_inside and (folder / "src").is_dir() and not (folder / "package.xml").is_file():
             return folder
@@ -204,9 +205,9 @@ def write_set_up(
 ) -> None:
     """Write the setup files. The workspaces that are sourced in the environment become this workspace's parents.
 
-    If none is sourced, the parents of the previous build remain.
+    If no workspace is sourced, the parents of the previous build remain.
     """
-    # If the workspace's own setup file is sourced, it must not extend itself.
+    # If the workspace's own setup file is sourced, leave the workspace out of its own parents.
     own = {
         prefix,
         *(prefix.parent / name for name in ("devel", "install", "devel_isolated", "install_isolated")),
@@ -336,7 +337,7 @@ class _Builder:
             path = Path(name)
             path.unlink(missing_ok=True)
             for folder in path.parents:
-                # Also remove a folder that then contains only Python's cache.
+                # Also remove a folder in which only Python's cache remains.
                 if folder == self._modules or not folder.is_dir() or any(folder.glob("*.py")):
                     break
                 for cached in folder.glob("__pycache__/*.pyc"):
@@ -468,7 +469,7 @@ def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, 
 
 
 def _program(path: Path) -> str:
-    """Return the text of a program that runs another one."""
+    """Return the text of a stub program that runs the program ``path``."""
     head = _PROGRAM.format(python=_SHEBANG, name=path.name, folder=str(path.parent))
     return head + _RELAY_RUN.format(file=str(path))
 

@@ -24,9 +24,9 @@ def build_order(
 ) -> list[str]:
     """Return the names of packages, each after its build dependencies.
 
-    Among those that may be next, the first by name comes next. A package's build dependencies are those that it needs to
-    build and test, their run dependencies, and the packages that ``also`` lists for its name. Message generators and
-    their dependencies come first. Raise CircularDependencyError if dependencies form a cycle.
+    Among the packages whose dependencies are done, the alphabetically first one is next. A package's build dependencies
+    are those that it needs to build and test, their run dependencies, and the packages that ``also`` lists for its name.
+    Message generators and their dependencies come first. Raise CircularDependencyError if dependencies form a cycle.
     """
     routes = {name: _routes(name, manifests, (also or {}).get(name, ())) for name in manifests}
     early = _generators(manifests, routes)
@@ -84,7 +84,7 @@ def _circle(nodes: list[str], routes: Mapping[str, Mapping[str, str]]) -> tuple[
     backwards: list[str] = []
     for needed, name in pairwise(nodes):
         backwards.append(needed)
-        # Add the packages between these two, which are only run dependencies.
+        # Add the packages between these two names, which are only run dependencies.
         between = routes[name][needed]
         while between != name:
             backwards.append(between)

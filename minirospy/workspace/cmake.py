@@ -53,7 +53,7 @@ class Statement(NamedTuple):
 
 
 def parse_cmake(text: str, where: str) -> tuple[Statement, ...]:
-    """Parse a CMakeLists.txt; ``where`` is the file's name for errors.
+    """Parse a CMakeLists.txt; ``where`` is the file name to use in error messages.
 
     Raise BuildError if a quote, a bracket, an ``if`` or a loop is not closed.
     """

@@ -23,14 +23,15 @@ _VARIABLE = re.compile(r"(?<!\\)\$(ENV)?\{([^${}]*)\}")
 _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
-"""Optional packages that Python packages search for, reported as found."""
+"""Optional packages that Python packages search for and that are reported as found."""
 _ROS_2 = re.compile(
     r"(ament|rcl|rosidl)"
-)  # packages of ROS 2, for which a file for both ROS 1 and ROS 2 searches
+)  # packages of ROS 2, which a file for both ROS 1 and ROS 2 searches for
 _CHECKS = ("check_include_file", "check_include_files", "check_include_file_cxx")
 _FINDERS = ("find_package_handle_standard_args", "pkg_check_modules", "pkg_search_module")
-_MAX_LOOPS = 100_000  # iterations of a foreach() with RANGE
-_MAX_DEPTH = 40  # nested files and macros; a file nested deeper must include itself
+_MAX_LOOPS = 100_000  # maximum iterations of a foreach() with RANGE
+# maximum depth of nested files and macros; deeper nesting means that a file includes itself
+_MAX_DEPTH = 40
 
 
 class Command(NamedTuple):
@@ -96,7 +97,7 @@ class _Run:
     """Runs the commands of one folder.
 
     ``_known``: the variables of the current scope; ``_raised``: those that ``PARENT_SCOPE`` sets in the enclosing scope;
-    ``_macros``: the defined macros and functions; ``_own``: names that these cannot take.
+    ``_macros``: the defined macros and functions; ``_own``: names that macros and functions cannot redefine.
     """
 
     def __init__(
@@ -200,7 +201,7 @@ class _Run:
             text, count = _VARIABLE.subn(value, text)
         return re.sub(r"\\(.)", r"\1", text, flags=re.DOTALL)
 
-    # --- what decides which commands run
+    # --- control flow
 
     def _if(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
         holds = self._holds(statement, file)
@@ -321,7 +322,7 @@ class _Run:
             yield from below.file(folder / "CMakeLists.txt")
             self._known.update(below._raised)
 
-    # --- what sets variables
+    # --- variable assignment
 
     def _project(self, arguments: list[str]) -> None:
         for name in arguments[:1]:
@@ -399,8 +400,9 @@ class _Run:
         self._known[arguments[1]] = ";".join(sorted(name.as_posix() for name in names))
 
     def _find_package(self, arguments: list[str]) -> None:
-        """Report packages as found, because the build reports missing ones; but not optional ones (QUIET) or those of ROS 2.
+        """Report packages as found, because the build itself reports missing packages.
 
+        Optional packages (QUIET) and those of ROS 2 are not found.
         If a library is reported as missing, a file often ends with return(), before the commands that matter to Python.
         """
         name = "".join(arguments[:1])
@@ -486,7 +488,10 @@ _OPERATORS = {Word(text) for text in (*_COMPARE, "IN_LIST", "AND", "OR", ")")}
 
 
 class _Condition:
-    """The grammar: ``any := one {AND one | OR one}``, ``one := NOT one | ( any ) | TEST word | word [COMPARE word]``."""
+    """Parses and evaluates a condition.
+
+    The grammar is ``any := one {AND one | OR one}``, ``one := NOT one | ( any ) | TEST word | word [COMPARE word]``.
+    """
 
     def __init__(self, words: Sequence[Word], known: Mapping[str, str], folder: Path) -> None:
         self._words = words

@@ -62,7 +62,7 @@ class Dependencies:
 
     @cached_property
     def copies(self) -> dict[str, list[Path]]:
-        """Return all packages, sorted, each with the folders that contain a package of that name; the first folder is used."""
+        """Return all packages, sorted, each with the folders that contain a package of that name; the first one is used."""
         return {
             name: folders
             for name, folders in sorted(self._packages.copies().items())

@@ -20,7 +20,7 @@ _TIMEOUT = 30.0  # maximum number of seconds for which a download may receive no
 
 
 def download(plan: Plan, wanted: Iterable[Download]) -> None:
-    """Download the files that do not exist or have the wrong MD5 sum, and print a line for each.
+    """Download the files that do not exist or have the wrong MD5 sum, and print one line per download.
 
     Raise BuildError if a REQUIRED file cannot be downloaded, or if a downloaded file has the wrong MD5 sum.
     """
@@ -57,7 +57,7 @@ def _is_right(wanted: Download) -> bool:
 
 
 def _fetch(wanted: Download) -> None:
-    """Download a file. It appears under its name only once it is complete."""
+    """Download a file. The file appears under its name only once it is complete."""
     # Imported here, because the import takes as long as a build without downloads.
     from urllib.request import Request, urlopen
 

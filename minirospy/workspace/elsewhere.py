@@ -134,7 +134,7 @@ INSTEAD = {
     "rosserial_server": "`rosrun rosserial_python serial_node.py` serves the same devices",
     "ps3joy": "pair the pad with the system's Bluetooth settings, then `rosrun joy joy_node`",
 }
-"""minirospy's replacements for some of these packages and for other packages."""
+"""minirospy's replacements for some of the packages in CPP, and for other packages."""
 
 _QT_REPOSITORIES = (
     "ros-visualization's python_qt_binding, qt_gui_core (branch melodic-devel of both), rqt (kinetic-devel) and {plugin} "

@@ -81,7 +81,7 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
         target = place if name.endswith("/") else place / source.name
         for path in _files(source):
             below = path.relative_to(source)
-            # A pattern may exclude a parent folder of the file.
+            # A pattern may exclude not only the file itself but also one of its parent folders.
             parents = [f"/{each.as_posix()}" for each in (below, *below.parents)]
             left_out = any(re.search(pattern, parent) for pattern in rule.excluded for parent in parents)
             if not left_out and (not rule.chosen or any(re.search(each, parents[0]) for each in rule.chosen)):

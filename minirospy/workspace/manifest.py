@@ -114,7 +114,7 @@ class Manifest(NamedTuple):
     problems: tuple[Problem, ...]
 
     def depends(self, *kinds: Kind) -> tuple[str, ...]:
-        """Return the names of all dependencies, or of those of these kinds, without duplicates, in file order."""
+        """Return the names of all dependencies, or of those of the given kinds, without duplicates, in file order."""
         wanted = frozenset(kinds or Kind)
         return tuple(dict.fromkeys(each.name for each in self.dependencies if wanted & each.kinds))
 
@@ -124,7 +124,7 @@ class Manifest(NamedTuple):
 
     @property
     def build_type(self) -> str:
-        """Return the package's build tool; catkin by default."""
+        """Return the name of the package's build tool; catkin by default."""
         return next((export.text for export in self.exports if export.tag == "build_type"), "") or "catkin"
 
 
@@ -234,7 +234,7 @@ _OLD_KINDS = {
 }
 _KINDS = {
     "depend": {Kind.BUILD, Kind.BUILD_EXPORT, Kind.EXEC},
-    # This tag is not part of formats 2 and 3, but packages use it there.
+    # Formats 2 and 3 do not contain this tag, but packages use it there.
     "run_depend": {Kind.BUILD_EXPORT, Kind.EXEC},
     **{kind.value: {kind} for kind in Kind},
 }
@@ -402,7 +402,10 @@ _COMPARE = {
 
 
 class _Condition:
-    """The grammar: ``any := all {"or" all}``, ``all := one {"and" one}``, ``one := "(" any ")" | value operator value``."""
+    """Parses and evaluates a condition.
+
+    The grammar is ``any := all {"or" all}``, ``all := one {"and" one}``, ``one := "(" any ")" | value operator value``.
+    """
 
     def __init__(self, text: str, variables: Mapping[str, str]) -> None:
         self._variables = variables

@@ -1,4 +1,4 @@
-"""Run .cfg files, programs that describe a node's parameters and generate package.cfg.NAMEConfig and documents.
+"""Run a package's .cfg files: programs that describe a node's parameters and generate package.cfg.NAMEConfig and documents.
 
 Source: http://wiki.ros.org/dynamic_reconfigure/Tutorials/HowToWriteYourFirstCfgFile.
 """

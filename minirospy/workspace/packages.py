@@ -37,7 +37,7 @@ _PYTHON_LINE = re.compile(rb"^#!.*\bpython[\d.]*\b")
 _RUNS_PYTHON = re.compile(r"(i?python|pypy)[0-9.]*|coverage[0-9.]*|kernprof|i?pdb3?|pudb3?")
 _ANY_MASTER = f"http://localhost:{DEFAULT_MASTER_PORT}"
 _OURS = Path(__file__).parents[1]
-_SHOWN = 12  # maximum number of programs listed in an error: about one line
+_SHOWN = 12  # maximum number of programs listed in an error, which fill about one line
 
 
 class NotExecutableError(MinirospyError):
@@ -62,7 +62,7 @@ class Packages:
 
     @classmethod
     def below(cls, *roots: Path) -> Packages:
-        """Return only the packages in these folders."""
+        """Return only the packages in the folders ``roots``."""
         packages = cls.__new__(cls)
         packages.roots = roots
         packages._crawls = {}
@@ -95,7 +95,7 @@ class Packages:
         return {name: folders[0] for name, folders in self.copies().items()}
 
     def copies(self) -> dict[str, list[Path]]:
-        """Return all packages, each with the folders that contain a package of that name; the first folder is used."""
+        """Return all packages, each with the folders that contain a package of that name; the first one is used."""
         found: dict[str, dict[Path, None]] = {}
         for root in self.roots:
             for folder in self._crawled(root):
@@ -108,7 +108,7 @@ class Packages:
         return sorted({path.name for path in _files(folder) if _is_program(path)})
 
     def find_executable(self, package: str, name: str) -> list[str]:
-        """Return the command that runs a package's program; if several have this name, that of the first.
+        """Return the command that runs a package's program; if several programs have this name, use the first.
 
         Python programs run in this interpreter, not in the one that ``env`` finds. Raise NotFoundError, with similar
         names, if there is none, or NotExecutableError if the file cannot be run.
@@ -197,7 +197,7 @@ def crawl_times(root: Path) -> list[CrawlTime]:
 def built_in_roots() -> tuple[Path, ...]:
     """Return the folders that contain minirospy's own packages.
 
-    They are next to the Python package in a checkout, else in its ``share``.
+    In a checkout, the folders are next to the Python package, else in its ``share``.
     """
     share = _OURS / "share"
     base = share if share.is_dir() else _OURS.parent
@@ -265,7 +265,7 @@ def _files(folder: Path) -> Iterator[Path]:
         Path(prefix) for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if prefix
     ]
     if folder.parent.name == "share":
-        # Programs of a package in /usr/share/PKG are in /usr/lib/PKG, whichever workspace is sourced.
+        # Programs of a package in /usr/share/PKG are in /usr/lib/PKG, regardless of the sourced workspace.
         prefixes.append(folder.parents[1])
     for prefix in dict.fromkeys(prefixes):
         programs = prefix / "lib" / (package_name(folder) or folder.name)
@@ -295,7 +295,7 @@ def is_python(path: Path) -> bool:
 
 
 def why_ros_refuses(program: Path) -> str | None:
-    """Return why ROS 1 would not run a Python program that minirospy runs, with a remedy, or None if it would.
+    """Return the reason why ROS 1 would not run a Python program that minirospy runs, with a remedy, or None if ROS 1 would.
 
     ROS 1 lets the system choose the interpreter, which requires execute permission and a shebang line.
     """
@@ -315,7 +315,7 @@ def why_ros_refuses(program: Path) -> str | None:
 def with_prefix(prefix: list[str], command: list[str]) -> list[str]:
     """Return a program's command with a prefix such as ``gdb --args`` or ``python3 -m pdb``.
 
-    If the prefix is a Python command, only the file follows it, as in ROS 1.
+    If the prefix is a Python command, it is followed by only the program's file, as in ROS 1.
     """
     if any(_RUNS_PYTHON.fullmatch(Path(word).stem) for word in prefix):
         command = command[-1:]

@@ -112,7 +112,8 @@ class Test(NamedTuple):
 class Download(NamedTuple):
     """A file to download.
 
-    ``md5`` is "" if any content is right. ``required``: a failed download is an error. ``for_tests``: only tests need the file.
+    ``md5`` is "" if the content is not checked. ``required``: a failed download is an error. ``for_tests``: only tests
+    need the file.
     """
 
     url: str
@@ -161,7 +162,7 @@ def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
     """
     manifest = read_manifest(folder)
     if not PACKAGE_NAME.match(manifest.name):
-        # This is an error, because the package's name becomes part of folder and module names.
+        # Raise an error, because the package's name becomes part of folder and module names.
         problem = next(problem for problem in manifest.problems if "is not a package name" in problem.text)
         raise ManifestError(str(manifest.path), *problem)
 
@@ -306,7 +307,7 @@ class _Collector:
         return f"{path}/" if name.endswith("/") else path
 
     def _project(self, command: Command) -> None:
-        # A subfolder may belong to another project.
+        # Skip commands in a subfolder, which may belong to another project.
         if command.folder == self._folder and command.arguments[:1] != (self._manifest.name,):
             raise _error(
                 command,

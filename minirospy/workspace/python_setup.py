@@ -1,7 +1,7 @@
 """Read the contents of a package's setup.py: Python packages, modules and scripts.
 
-The file is executed, so that it may compute these, with a ``setup()`` that only records its arguments. Neither setuptools
-nor catkin_pkg is needed. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
+The file is executed, because it may compute its lists; the ``setup()`` that it calls only records its arguments. Neither
+setuptools nor catkin_pkg is needed. Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class PythonSetup(NamedTuple):
 
 
 def read_python_setup(folder: Path) -> PythonSetup:
-    """Return the packages and scripts that ``folder``/setup.py names. Raise BuildError, with the line, if it fails."""
+    """Return the packages and scripts that ``folder``/setup.py names. Raise BuildError, with the line, if the file fails."""
     file = folder / "setup.py"
     given = _run(file)
     roots = _given(file, given, "package_dir", dict, "{'': 'src'}")

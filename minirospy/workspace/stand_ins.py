@@ -49,7 +49,8 @@ def _programs(plan: Plan) -> Iterator[tuple[str, Path]]:
     for name in plan.compiled:
         if name in there:
             *_, program = packages.find_executable(plan.name, name)
-            # A sourced workspace contains the file from the previous build, so check the folder.
+            # Use only files in minirospy's folder, because a sourced workspace contains the stub from the previous
+            # build.
             if Path(program).is_relative_to(folder):
                 yield name, Path(program)
 

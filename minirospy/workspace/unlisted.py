@@ -1,4 +1,4 @@
-"""Add messages to plans that no add_message_files() lists, but that other definitions use as fields.
+"""Add messages to the plans: those that no add_message_files() lists, but that other definitions use as fields.
 
 Real catkin builds such a package, because it finds the file when it computes the md5sum of the containing type. However,
 it generates no class for the message, so Python programs cannot create the message. Here the class is generated, with a
@@ -27,7 +27,8 @@ def with_unlisted(plans: Mapping[str, Plan]) -> dict[str, Plan]:
 
     Raise DefinitionError if a definition is invalid.
     """
-    # Check first whether there are any: most workspaces have none, and then no definition need be read for them.
+    # Check first whether there are unlisted messages: most workspaces have none, and then no definition needs to be
+    # read.
     unlisted = {
         f"{plan.name}/{path.stem}": path
         for plan in plans.values()

@@ -75,11 +75,11 @@ def candidates(
         fitting = (text for text in fitting if not has_controls(text.translate(_SPACES)))
         return [shell.write(text, word) for text in dict.fromkeys(fitting) if text.startswith(word.text)]
     except MinirospyError:
-        # The package or type is unknown, which the command itself will report.
+        # The package or type is unknown; the command itself will report that.
         return []
 
 
-# --- which command, which of its words
+# --- finding the command and the word
 
 
 def _of_command(command: str, before: list[str], word: str) -> Iterable[str]:
@@ -157,7 +157,7 @@ def _completer(name: str) -> Completer:
     return completer
 
 
-# --- words as shells write them
+# --- quoting
 
 
 def _at_home(text: str) -> str:

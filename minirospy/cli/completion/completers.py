@@ -47,7 +47,7 @@ class Cursor(NamedTuple):
 
 
 class Text(str):
-    """A candidate that the user will edit. It is quoted, instead of having a backslash before each blank."""
+    """A candidate that the user will edit. The shell code quotes it instead of putting a backslash before each blank."""
 
     __slots__ = ()
 
@@ -82,7 +82,7 @@ def build_targets(cursor: Cursor) -> Iterable[str]:
 
 
 def package_folders(cursor: Cursor) -> Iterable[str]:
-    """Return ``pkg/``, then ``pkg/folder/``; for roscd, also the folders of logs and test results."""
+    """Return ``pkg/`` first, then ``pkg/folder/``; for roscd, also the folders of logs and test results."""
     if any(not word.startswith("-") for word in cursor.given):
         return []
     package, slash, _ = cursor.word.partition("/")
@@ -108,7 +108,7 @@ _OWN_FOLDERS = {"log": _logs, "test_results": _results}
 
 
 def package_file(cursor: Cursor) -> Iterable[str]:
-    """Return packages, then the names and paths of files in the chosen package."""
+    """Complete the package first, then the names and paths of files in that package."""
     if not cursor.given:
         return _packages().names()
     if len(cursor.given) > 1:
@@ -123,7 +123,7 @@ def package_path(cursor: Cursor) -> Iterable[str]:
 
 
 def package_file_and_target(cursor: Cursor) -> Iterable[str]:
-    """Return packages, then files in the chosen package, then destinations."""
+    """Complete the package first, then files in that package, then destinations."""
     return files(cursor) if len(cursor.given) > 1 else package_file(cursor)
 
 
@@ -171,7 +171,7 @@ def _entries(folder: Path, *, hidden: bool) -> list[str]:
 
 
 def rosrun_words(cursor: Cursor) -> Iterable[str]:
-    """Return rosrun's options and packages, then the chosen package's programs.
+    """Complete rosrun's options and packages, then the chosen package's programs.
 
     For the program's arguments, return files and remappings.
     """
@@ -226,7 +226,7 @@ def _pack_words(cursor: Cursor, verbs: Mapping[str, PackVerb]) -> Iterable[str]:
 
 
 def launch_words(cursor: Cursor) -> Iterable[str]:
-    """Yield packages, launch files in the chosen package, or paths.
+    """Complete packages and launch-file paths, then launch files in the chosen package.
 
     After the launch file, yield ``arg:=`` for each argument that it declares.
     """
@@ -279,7 +279,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
     return _as_typed((node.name for node in spec.named_runnables()), cursor.word)
 
 
-# --- the graph
+# --- graph
 
 
 def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
@@ -385,7 +385,7 @@ def loggers(cursor: Cursor) -> Iterable[str]:
     return _live(ask)
 
 
-# --- types, and texts of messages
+# --- types and message text
 
 
 def _catalogue() -> Catalogue:
@@ -395,7 +395,7 @@ def _catalogue() -> Catalogue:
 
 
 def _types(cursor: Cursor, kind: str, inside: tuple[str, ...]) -> Iterable[str]:
-    """Return ``pkg/``, then ``pkg/Type``, because a list of all types would be too long.
+    """Return ``pkg/`` first, then ``pkg/Type``, because a list of all types would be too long.
 
     For `rosmsg show`, also return type names without the package.
     """
@@ -511,7 +511,7 @@ def on_one_line(text: str) -> str:
     )
 
 
-# --- what there is to choose from
+# --- fixed choices
 
 
 def pins(cursor: Cursor) -> Iterable[str]:

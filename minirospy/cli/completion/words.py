@@ -28,7 +28,7 @@ class Word(NamedTuple):
 
 
 class Shell(NamedTuple):
-    """A shell's syntax: a function that reads a word, and one that writes a candidate for a word."""
+    """A shell's syntax: a function that parses a word, and one that writes a candidate in place of a word."""
 
     read: Callable[[str], Word]
     write: Callable[[str, Word], str]
@@ -87,7 +87,7 @@ def _escaped(text: str) -> str:
     return re.sub(r"([^\w@%+=:,./~-])", r"\\\1", text)
 
 
-# --- PowerShell: the backtick escapes, a quote inside its own quotes is doubled
+# --- PowerShell (backtick escapes, doubled quotes inside quotes)
 
 
 def _read_powershell(word: str) -> Word:

@@ -29,8 +29,9 @@ class StoredMessage(NamedTuple):
 class Block(NamedTuple):
     """Consecutive messages from one chunk, in time order.
 
-    ``found`` contains a tuple for each message: time, rank (the index of its connection among the requested ones), record
-    offset, and start and end of the body in ``data``. ``chunk`` is the chunk's position, or None in bags of version 1.2.
+    ``found`` contains a tuple for each message: time, rank (the index of its connection among the requested ones),
+    record offset, and start and end of the body in ``data``. ``chunk`` is the chunk's position, or None in version 1.2
+    bags.
     """
 
     chunk: int | None
@@ -41,11 +42,11 @@ class Block(NamedTuple):
 class BagReader(ABC):
     """The common interface of the readers for all versions."""
 
-    version: int  # 200 means 2.0
+    version: int  # the format version times 100: 200 means 2.0
     indexed = True  # False if the bag has no index and none was rebuilt
     stream: BinaryIO
     connections: dict[int, Connection]
-    chunks: Sequence[ChunkInfo]  # the chunks in file order; empty in bags of version 1.2
+    chunks: Sequence[ChunkInfo]  # the chunks in file order; empty in version 1.2 bags
 
     @property
     def version_name(self) -> str:
@@ -70,8 +71,8 @@ class BagReader(ABC):
     ) -> Iterator[StoredMessage]:
         """Yield the messages on these connections (None: all) from ``start`` to ``end`` in nanoseconds, both included.
 
-        They are in time order; messages with equal times are in the order of the connections. If the bag is damaged, raise
-        BagFormatError after yielding the messages before the damage.
+        The messages are in time order; messages with equal times are in the order of the connections. If the bag is
+        damaged, raise BagFormatError after yielding the messages before the damage.
         """
         self.prepare()
         wanted = list(self.connections if connections is None else connections)
@@ -83,11 +84,14 @@ class BagReader(ABC):
 
     @abstractmethod
     def message_at(self, position: Position) -> StoredMessage:
-        """Return the message at a position from an entry or another message. Raise BagFormatError if there is none."""
+        """Return the message at the position given by an index entry or another message.
+
+        Raise BagFormatError if there is none.
+        """
 
     @abstractmethod
     def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
-        """Return the indexes of these connections; read from the file those that are not in memory yet.
+        """Return the indexes of these connections; read those that are not in memory yet from the file.
 
         Raise BagFormatError if the bag is damaged.
         """
@@ -113,7 +117,7 @@ class BagReader(ABC):
 
 
 class ScannedReader(BagReader):
-    """A reader for bags that may lack an index, and are then scanned."""
+    """A reader for bags that may lack an index; bags without one are scanned."""
 
     @abstractmethod
     def scan(self) -> Iterator[int]:

@@ -1,7 +1,7 @@
 """A bag's chunks: headers, decompressed data, and the messages in that data.
 
-Messages are found by scanning a chunk's data, not by its index records: that costs no more, and a damaged index cannot
-lead to a wrong message. Threads decompress the next chunks in advance, because bz2 and lz4 release the GIL.
+Messages are found by scanning a chunk's data, not by its index records: scanning costs no more, and a damaged index
+cannot lead to a wrong message. Threads decompress the next chunks in advance, because bz2 and lz4 release the GIL.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class _Ahead:
         return self._future.result()
 
     def cancel(self) -> None:
-        """Tell the thread to stop soon."""
+        """Request the thread to stop soon."""
         self._is_cancelled = True
         self._future.cancel()
 
@@ -103,7 +103,7 @@ class ChunkStream:
             try:
                 return ahead.result()
             finally:
-                # After Ctrl-C the threads' results are no longer needed.
+                # Cancel the thread, because after Ctrl-C its result is no longer needed.
                 ahead.cancel()
         chunk = self.header(position).chunk
         try:
@@ -133,7 +133,7 @@ class ChunkStream:
             return None
 
     def prepare(self, positions: Iterable[int]) -> None:
-        """Start to decompress the chunks at these positions; cancel the decompression of others."""
+        """Start to decompress the chunks at these positions; cancel the decompression of all other chunks."""
         wanted = [
             position
             for position in positions

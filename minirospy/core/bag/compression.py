@@ -1,4 +1,4 @@
-"""Chunk compression by the name in a chunk's header (none, bz2 or lz4; in MCAP files also zstd): bytes in, bytes out.
+"""Compress and decompress chunks with none, bz2 or lz4 (in MCAP files also zstd), the names in chunk headers.
 
 An LZ4 frame is written as ROS's own reader (roslz4) requires: independent blocks of at most 1 MiB, a content
 checksum, neither block checksums nor the content size. Every standard frame can be read. lz4 is imported when a chunk
@@ -205,7 +205,7 @@ def _decompress_bz2(data: bytes, output: _Output) -> bytes:
 
 def _decompress_lz4(data: bytes, output: _Output) -> bytes:
     if output.size > len(data) * _MAX_LZ4:
-        # Check this first, because the library allocates the expected size before it reads the data.
+        # Check the size first, because the library allocates it before it reads the data.
         raise BagFormatError(f"a chunk's {output.size} bytes cannot be in {len(data)} bytes of LZ4")
     stream = _lz4_frame().LZ4FrameDecompressor()
     # Pass the data in parts, because the library copies the remaining data each time.

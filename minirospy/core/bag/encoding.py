@@ -1,4 +1,4 @@
-"""Serialize bag records: named tuples in, bytes out.
+"""Serialize bag records from named tuples to bytes.
 
 Fields are written in the same order as rosbag's Python writer does. Source: http://wiki.ros.org/Bags/Format/2.0.
 """

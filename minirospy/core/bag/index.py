@@ -1,6 +1,6 @@
 """A bag's index: the times and locations of each connection's messages, 16 bytes per message.
 
-It is read on demand from the index records after the chunks; reading messages in time order does not need it.
+The index is read on demand from the index records after the chunks; reading messages in time order does not need it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _ENTRY_SIZE = 12
 class Entry(NamedTuple):
     """A message's time and location: its chunk's position, and its record's offset in the chunk's data.
 
-    In bags of version 1.2, which have no chunks, ``chunk`` is None and ``offset`` is the position in the file.
+    In version 1.2 bags, which have no chunks, ``chunk`` is None and ``offset`` is the position in the file.
     """
 
     time: int
@@ -103,7 +103,7 @@ class ConnectionIndex:
 
 
 def read_entries(stream: BinaryIO, record: Record) -> tuple[array[int], array[int]]:
-    """Read the data of an index record in version 2.0: times and offsets. Leaves the stream at the end of the record.
+    """Read the data of a version 2.0 index record: times and offsets. Leaves the stream at the end of the record.
 
     The data's size is computed from the number of entries, because ROS C Turtle wrote a wrong length. Raise BagFormatError
     if the record is damaged.

@@ -1,4 +1,4 @@
-"""A bag's summary, as `rosbag info` prints it: a reader in, a summary out, as text or YAML.
+"""Compute a bag's summary from a reader, and format it as text or YAML as `rosbag info` does.
 
 Source: http://wiki.ros.org/rosbag/Commandline#info. The wording is ROS's own, because programs parse it.
 """
@@ -31,9 +31,9 @@ __all__ = [
 ]
 
 NUMPY_PAYS = 100_000
-"""Number of times above which numpy computes the median faster than Python, including the import of numpy."""
+"""Number of timestamps above which numpy computes the median faster than Python, even including the import of numpy."""
 
-BLOCK = 1 << 16  # number of times that numpy processes together
+BLOCK = 1 << 16  # number of timestamps that numpy processes together
 
 
 class Topic(NamedTuple):

@@ -48,7 +48,7 @@ def open_bag_or_mcap(stream: BinaryIO) -> BagReader:
 
 
 class McapReader(BagReader):
-    """An MCAP file with the profile ``ros1``; its channels are the connections.
+    """An MCAP file with the profile ``ros1``. Presents its channels as bag connections.
 
     Channels with other encodings are not read; ``foreign`` contains their topics. Raise BagFormatError if the file is
     damaged, McapUnindexedError if its summary is missing or damaged, BagError if the extra is missing.
@@ -178,7 +178,7 @@ class McapReader(BagReader):
             yield Block(0, message.body, [(message.time, rank, 0, 0, len(message.body))])
 
     def message_at(self, position: Position) -> StoredMessage:
-        """Raise BagFormatError, because messages can only be read in order."""
+        """Raise BagFormatError, because messages in MCAP files can only be read in order."""
         raise BagFormatError("messages of MCAP files are read in order only")
 
     def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
@@ -319,7 +319,7 @@ def _read_summary(stream: BinaryIO, size: int) -> Summary | None:
     stream.seek(start)
     found = Summary()
     summary = _Bounded(stream.read(size - start))
-    # A summary contains no chunks, so do not decompress any.
+    # Do not decompress any chunks, because a summary contains none.
     for record in StreamReader(summary, skip_magic=True, emit_chunks=True).records:  # type: ignore[arg-type]
         match record:
             case records.Statistics():

@@ -51,8 +51,8 @@ def mcap_faults() -> Iterator[None]:
     except (McapError, ZstdError, struct.error, LookupError, StopIteration, UnicodeDecodeError) as error:
         raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
     except (EOFError, OSError, ValueError, RuntimeError, ArithmeticError, MemoryError, TypeError) as error:
-        # Decompressors raise these for lengths that exceed the memory; a seek before the start of a short file raises
-        # them too.
+        # Decompressors raise these errors for lengths that exceed the memory; a seek before the start of a short file
+        # raises them too.
         raise BagFormatError(f"not a whole MCAP file: {error}") from error
 
 
@@ -78,8 +78,8 @@ class _Recovered(NamedTuple):
 class McapRepair:
     """Rebuilds an MCAP file's summary, in place. The library must be installed.
 
-    ``limit``: number of bytes in the stream that are known to be written, if that is not the whole stream. After
-    :meth:`run`, ``problems`` contains lines about data that could not be recovered.
+    ``limit``: number of bytes at the start of the stream that are known to be written; by default, the whole stream.
+    After :meth:`run`, ``problems`` contains lines about data that could not be recovered.
     """
 
     def __init__(self, stream: BinaryIO, limit: int | None = None) -> None:
@@ -163,7 +163,8 @@ class McapRepair:
             self._add_message_index(records.MessageIndex.read(stream), position, length)
             return
         if self._entries:
-            # The last chunk's message indexes are incomplete: discard them, because a chunk must have all or none.
+            # The last chunk's message indexes are incomplete: discard them, because a chunk must have all of its
+            # message indexes or none.
             self._chunks[-1].info.message_index_offsets.clear()
             self._chunks[-1].info.message_index_length = 0
             self._entries = {}

@@ -147,7 +147,7 @@ class McapWriter:
 
 
 class _Whole:
-    """A stream whose write() writes all data, even to an unbuffered file; the library does its own buffering."""
+    """A stream whose write() writes all data, even to an unbuffered file. The mcap library does its own buffering."""
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream

@@ -1,4 +1,4 @@
-"""Bags of versions before 2.0: the only module that names their reader, which is imported when such a bag is opened."""
+"""Opens bags of versions before 2.0. Only this module names their readers, which are imported when such a bag is opened."""
 
 from __future__ import annotations
 

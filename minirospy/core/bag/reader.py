@@ -1,7 +1,7 @@
-"""Read bags: a seekable binary stream in, connections and messages in time order out.
+"""Read bags from a seekable binary stream: connections, and messages in time order.
 
-Opening a bag of version 2.0 reads its first record, and its connections and chunk infos at the end. Messages are read
-chunk by chunk; chunks that overlap in time are merged. Memory use: the chunk infos, and a few chunks. Source:
+Opening a version 2.0 bag reads its first record, and its connections and chunk infos at the end. Messages are read chunk
+by chunk; chunks that overlap in time are merged. Memory use: the chunk infos, and a few chunks. Source:
 http://wiki.ros.org/Bags/Format/2.0; for version 1.2: `minirospy.core.bag.old_formats`.
 """
 
@@ -48,7 +48,7 @@ def open_bag(stream: BinaryIO) -> BagReader:
 
 
 class ChunkedReader(BagReader):
-    """A bag of version 2.0. ``connections`` and ``chunks`` may grow, because a bag can be read while it is written.
+    """A version 2.0 bag. ``connections`` and ``chunks`` may grow, because a bag can be read while it is written.
 
     ``headers``: a dict from chunk position to header, for chunks whose header in the file is incomplete.
     """
@@ -307,7 +307,7 @@ def _start_time(chunk: ChunkInfo) -> int:
 def _check_index(
     stream: BinaryIO, limit: int, connections: Mapping[int, Connection], chunks: Sequence[ChunkInfo]
 ) -> None:
-    """Raise BagFormatError if the index does not match the bag header. Otherwise messages would be missing silently."""
+    """Raise BagFormatError if the index does not match the bag header, because messages would then be missing."""
     positions: set[int] = set()
     for chunk in chunks:
         if chunk.position in positions:

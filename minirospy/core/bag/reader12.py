@@ -1,6 +1,6 @@
-"""Read bags of version 1.2, which have no chunks: definitions and messages alternate in the file.
+"""Read version 1.2 bags, which have no chunks: definitions and messages alternate in the file.
 
-Such a bag has an index at its end, or none if it has no bag header. The results are the same as those of
+Such a bag has an index at its end if it has a bag header. The results are the same as those of
 `minirospy.core.bag.reader`. Source: http://wiki.ros.org/Bags/Format/1.2.
 """
 
@@ -23,9 +23,9 @@ _ENTRY = struct.Struct("<IIQ")
 
 
 class Reader12(ScannedReader):
-    """A bag of version 1.2, with one connection per topic.
+    """A version 1.2 bag, with one connection per topic.
 
-    ``start``: the position of the first record. ``indexed`` is false until :meth:`read_index` or :meth:`scan` is called.
+    ``start``: the position of the first record. ``indexed`` is False until :meth:`read_index` or :meth:`scan` is called.
     """
 
     def __init__(self, stream: BinaryIO, version: int, start: int) -> None:

@@ -1,4 +1,4 @@
-"""Parse bag records: bytes in, named tuples out.
+"""Parse bag records from bytes to named tuples.
 
 A record is a header (its length, then fields ``name=value``, each with a length prefix) and data (its length, then
 bytes). The field ``op`` specifies the kind of record. All numbers are little-endian; times are nanoseconds since 1970
@@ -51,9 +51,9 @@ __all__ = [
 ]
 
 MAGIC = b"#ROSBAG V2.0\n"
-"""The first line of a bag of version 2.0."""
+"""The first line of a version 2.0 bag."""
 
-OP_MESSAGE_DEFINITION = 1  # only in bags of version 1.2
+OP_MESSAGE_DEFINITION = 1  # only in version 1.2 bags
 OP_MESSAGE_DATA = 2
 OP_BAG_HEADER = 3
 OP_INDEX_DATA = 4
@@ -66,7 +66,7 @@ BAG_HEADER_SIZE = 4096
 closed.
 """
 
-# maximum bytes in a record's header, which contains definitions in bags of version 1.2
+# maximum bytes in a record's header, which contains definitions in version 1.2 bags
 MAX_HEADER = 16 * 1024 * 1024
 
 MAX_UINT32 = 0xFFFFFFFF
@@ -94,7 +94,7 @@ Fields = dict[str, bytes]
 
 
 class BagHeader(NamedTuple):
-    """The first record: the position of the index (0: the bag was not closed), and the numbers of records in it."""
+    """The first record: the index's position (0: the bag was not closed), and its numbers of connections and chunks."""
 
     index_pos: int
     connection_count: int
@@ -352,7 +352,7 @@ def parse_message_data(record: Record, body: bytes) -> MessageData:
 
 
 def parse_index_data(record: Record, data: bytes) -> IndexData:
-    """Return the entries in a record of version 2.0. Raise BagFormatError if the record is invalid."""
+    """Return the entries in a version 2.0 index record. Raise BagFormatError if the record is invalid."""
     record.expect(OP_INDEX_DATA)
     version, count = record.uint32("ver"), record.uint32("count")
     if version != 1:

@@ -113,7 +113,7 @@ class _Rewriting:
 
 
 class Repair:
-    """Rebuilds the index of a bag of version 2.0, in place if the stream is writable.
+    """Rebuilds the index of a version 2.0 bag, in place if the stream is writable.
 
     :meth:`run` sets ``connections``, ``chunks``, ``end`` (the position for the index), ``headers`` (of chunks whose header in
     the file is incomplete), and ``problems`` (lines about data that could not be recovered). :meth:`apply` removes the damaged
@@ -209,7 +209,8 @@ class Repair:
         if record.op != records.OP_CHUNK:
             return record.end
         if not record.data_size:
-            # A chunk's header is completed together with the chunk, so its writer was killed before that.
+            # A chunk's header is completed together with the chunk, so the writer was killed before it completed this
+            # chunk.
             raise BagFormatError("unterminated chunk")
 
         chunk = records.parse_chunk_header(record)
@@ -246,7 +247,7 @@ class Repair:
                 )
 
     def _add_connections(self, content: _Content) -> None:
-        # Add them in file order, which is the order in which ROS writes them to the index.
+        # Add the connections in file order, which is the order in which ROS writes them to the index.
         for number, connection in content.connections.items():
             self.connections.setdefault(number, connection)
 
@@ -311,7 +312,7 @@ class Repair:
         data_end = record.data_position + content.end
         _, entries = _read_index(self._stream, data_end, limit)
         if end < limit and _times(entries) != _times(content.entries):
-            # if only the offsets are wrong, accept the entries, because the index is rewritten
+            # Only the times are compared: wrong offsets are acceptable, because the index is rewritten.
             return False
         self._add_connections(content)
         self.chunks.append(content.info(position))

@@ -1,4 +1,4 @@
-"""Find the next chunk in a damaged bag of version 2.0: a stream in, the chunk's position out."""
+"""Find the next chunk in a damaged version 2.0 bag, and return its position."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def is_record(stream: BinaryIO, position: int, limit: int) -> bool:
 
 
 def next_chunk(stream: BinaryIO, start: int, limit: int) -> int | None:
-    """Return the position of the first complete chunk from ``start`` that is followed by its index records, or None.
+    """Return the position of the first complete chunk at or after ``start`` that is followed by its index records, or None.
 
     A chunk inside a message, for example in a bag that was sent as bytes, cannot be distinguished from the bag's own chunks.
     """

@@ -1,4 +1,4 @@
-"""Write bags: messages with their times in, a bag's bytes out.
+"""Write bags: serialize messages with their times to a bag's bytes.
 
 A chunk is collected in memory and then written in one piece, followed by its index: if the writer is killed, at most the
 last chunk is incomplete, and :mod:`minirospy.core.bag.repair` recovers all chunks before it. A small message is copied
@@ -111,12 +111,12 @@ class Continued(NamedTuple):
 
 
 class BagWriter:
-    """Writes a bag of version 2.0 to a binary stream, which it does not close. Use it in one thread at a time.
+    """Writes a version 2.0 bag to a binary stream, which it does not close. Use it in one thread at a time.
 
-    ``chunk_threshold``, in bytes, may be changed at any time. ``executor`` compresses chunks in parallel; without one,
-    the calling thread compresses them. If more than ``most_waiting`` chunks are queued for compression, :meth:`write`
-    blocks. ``continued``: append to the bag in the stream, overwriting its index. Raise BagCompressionError if the
-    compression is unknown or its library is missing.
+    ``chunk_threshold``, in bytes, may be changed at any time. ``executor`` compresses chunks in parallel; without an
+    executor, the calling thread compresses them. If more than ``most_waiting`` chunks are queued for compression,
+    :meth:`write` blocks. ``continued``: append to the bag in the stream, overwriting its index. Raise
+    BagCompressionError if the compression is unknown or its library is missing.
 
     After the stream has raised OSError, for example on a full disk, :meth:`salvage` turns the written part into a readable
     bag; this requires an unbuffered stream. Buffering gains nothing here, because each chunk is written in one piece.

@@ -1,1 +1,1 @@
-"""Pure tables of the computation graph: calls in, (response, actions) out."""
+"""Pure tables of the computation graph: methods take a call and return its response and actions."""

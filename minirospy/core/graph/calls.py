@@ -1,6 +1,6 @@
 """Calls to the Master API and the Slave API: tables of methods and their parameters, and the dispatcher that checks them.
 
-Pure: a method's name and arguments in, ``[status code, message, value]`` out. Source:
+Pure: calls a method by name with its arguments, and returns ``[status code, message, value]``. Source:
 http://wiki.ros.org/ROS/Master_API, http://wiki.ros.org/ROS/Slave_API; the error messages for invalid arguments are
 rosmaster's.
 """
@@ -158,7 +158,7 @@ def _fault(text: str) -> dict[str, object]:
     return {"faultCode": 1, "faultString": text}
 
 
-# --- the types of parameters
+# --- parameter types
 
 
 def anything(value: object, name: str, caller_id: str) -> object:
@@ -225,7 +225,7 @@ def api_uri(value: object, name: str, caller_id: str) -> str:
     if not found.startswith(("http://", "rosrpc://")):
         raise CallRefused(f"ERROR: parameter [{name}] is not an RPC URI")
     if " " in found or has_controls(found):
-        # Reject them, because the URI is used in requests to the node, and in log lines.
+        # Reject control characters, because the URI is used in requests to the node, and in log lines.
         raise CallRefused(f"ERROR: parameter [{name}] contains illegal chars")
     return found
 

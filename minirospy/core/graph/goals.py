@@ -1,7 +1,8 @@
 """The states of an action goal, as tables: the server's transitions, and a client's transitions on received statuses.
 
-In: a state and an event. Out: the next state, or the sequence of states, or None if the transition is invalid.
-Source: http://wiki.ros.org/actionlib/DetailedDescription, and actionlib itself for details missing on that page.
+A table contains, for a state and an event, the next state or the sequence of next states; invalid transitions are
+missing. Source: http://wiki.ros.org/actionlib/DetailedDescription, and actionlib itself for details missing on that
+page.
 """
 
 from __future__ import annotations
@@ -225,8 +226,8 @@ def client_steps(state: int, status: int) -> tuple[ClientState, ...] | None:
 def is_meant(cancel_id: str, cancel_stamp: int, goal_id: str, goal_stamp: int) -> bool:
     """Return whether a cancel request applies to a goal.
 
-    It applies to the goal with its id, to goals whose stamp is not later than its stamp, or, without id and stamp, to all
-    goals. Stamps are in nanoseconds; zero means none.
+    The request applies to the goal with the request's id, to goals whose stamp is not later than the request's, or,
+    without id and stamp, to all goals. Stamps are in nanoseconds; zero means none.
     """
     if not cancel_id and not cancel_stamp:
         return True

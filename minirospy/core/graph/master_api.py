@@ -143,7 +143,7 @@ class MasterApi(ABC):
         """Return the response to one call, or the steps that compute it. Raise RpcFault if the method is unknown."""
         return self.dispatcher.dispatch(method, args)
 
-    # --- about the master
+    # --- master
 
     def get_pid(self, caller_id: str) -> Answer:
         """Return the master's process id."""
@@ -159,7 +159,7 @@ class MasterApi(ABC):
         self.stop()
         return [SUCCESS, "shutdown", 0]
 
-    # --- the graph
+    # --- graph
 
     def lookup_node(self, caller_id: str, node: str) -> Answer:
         """Return the URI of a node's Slave API."""
@@ -275,7 +275,7 @@ class MasterApi(ABC):
         def get() -> Steps[Answer]:
             # Count the items in a separate step, because this takes time.
             if not self.parameters.is_small_at(name):
-                # Send one value at a time, because a value that is being sent must be copied whenever another client
+                # Send one value at a time: while a value is being sent, it must be copied whenever another client
                 # changes it.
                 yield ALONE
             return self._get(name)
@@ -391,7 +391,7 @@ class MasterApi(ABC):
         return finish(steps) if actions <= _FEW else steps
 
     def _act_first(self, actions: Iterable[Notice]) -> Iterator[Notice]:
-        """Perform the first action, and return the others.
+        """Perform the first action and return the others.
 
         The first one may stop a node whose name was taken over; that node's parameters must be dropped before the change is
         recorded.

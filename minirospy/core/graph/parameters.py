@@ -1,6 +1,6 @@
 """The parameter server's tree, and the nodes to notify of a change.
 
-Pure: calls in, values and updates out. Keys are global names. Source:
+Pure: calls return values, and the updates to send. Keys are global names. Source:
 http://wiki.ros.org/ROS/Parameter%20Server%20API, and rosmaster for details missing there.
 """
 
@@ -75,8 +75,8 @@ class ParameterTree:
 
     def __init__(self, most: int = MAX_BYTES, reserve: int = RESERVE) -> None:
         self._root: dict[str, object] = {}
-        # The ids of the dictionaries that have not been returned to a caller since their creation: these may be
-        # changed.
+        # The ids of the dictionaries that have not been returned to a caller since their creation, so that they may
+        # be changed.
         self._own: set[int] = {id(self._root)}
         self._subscribers: dict[str, dict[_Subscriber, None]] = {}
         # The subscribed keys, sorted, so that the keys below a namespace are adjacent.
@@ -335,7 +335,7 @@ def weigh_in_steps(key: str, value: object) -> Steps[int]:
     # Include the namespaces that contain the value, because they may not exist yet.
     weight = sum(sys.getsizeof(name) + 2 * _ENTRY_BYTES for name in _split(key)[:-1])
     left = _STEP_ITEMS
-    # The containers of the current item: the depth of their items, and the remaining items.
+    # One entry per container that encloses the current item: (depth of its items, iterator over its remaining items).
     around: list[tuple[int, Iterator[Any]]] = [(len(_split(key)), iter((value,)))]
     while around:
         depth, items = around[-1]

@@ -1,7 +1,7 @@
 """The master's registry: each node's publishers, subscribers and services.
 
-Pure: calls in, (response, actions) out. Names are global. Source: http://wiki.ros.org/ROS/Master_API, and
-rosmaster for details missing there.
+Pure: calls return a response and the actions to perform. Names are global. Source: http://wiki.ros.org/ROS/Master_API,
+and rosmaster for details missing there.
 """
 
 from __future__ import annotations
@@ -334,7 +334,7 @@ class Registry:
         return chain((shutdown,), self._updates(*published))
 
     def _cost_of_text(self, name: str, kind: int, text: str) -> int:
-        """Return the bytes for a type or service URI, minus those of the one that it replaces."""
+        """Return the bytes for a type or service URI, minus the bytes of the one that it replaces."""
         if kind == SERVES:
             service = self._services.get(name)
             return text_cost(text) - (text_cost(service.uri) if service else 0)
@@ -417,6 +417,6 @@ def _remove(table: dict[str, dict[str, str]], topic: str, node: str) -> None:
 
 
 def _pairs(table: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
-    # This is the fastest way to copy many small tables; every rewrite of a journal starts with such a copy.
+    # This is the fastest way to copy many small tables, which every rewrite of a journal does first.
     rows = list(zip(table, map(tuple, table.values()), strict=True))
     return ((node, topic) for topic, nodes in rows for node in nodes)

@@ -29,7 +29,7 @@ MAX_BYTES = 64 * _MIB
 MAX_OF_ONE = 32 * _MIB  # maximum bytes in memory of the registrations from one host and port
 
 RESERVE = 16 * _MIB
-"""Part of MAX_BYTES that is reserved for hosts and ports that use at most FEW_OF_ONE, some 300 topics and services."""
+"""Part of MAX_BYTES that is reserved for hosts and ports that use at most FEW_OF_ONE, about 300 topics and services."""
 
 FEW_OF_ONE = _MIB // 4
 

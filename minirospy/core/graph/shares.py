@@ -22,8 +22,8 @@ class Excess(Enum):
 class Shares:
     """Each holder's share in a limited resource, such as bytes or entries.
 
-    One holder gets at most ``largest`` out of ``most``. The last ``reserve`` of it is only for holders that have at most
-    ``small``, so that they can always get more.
+    One holder gets at most ``largest`` out of ``most``. The last ``reserve`` of the resource is only for holders that
+    have at most ``small``, so that these holders can always get more.
     """
 
     def __init__(self, most: int, largest: int, reserve: int, small: int) -> None:

@@ -14,7 +14,7 @@ from minirospy.core.graph.registry_limits import text_cost
 __all__ = ["TopicTypes"]
 
 MAX_OLD = 10_000  # maximum unregistered topics whose types are stored
-_MAX_OLD_BYTES = 4 * 1024 * 1024  # maximum total bytes of these types in memory
+_MAX_OLD_BYTES = 4 * 1024 * 1024  # maximum total bytes of unregistered topics' types in memory
 
 _TYPE_BYTES = 100  # approximate bytes for a type without its string
 

@@ -1,9 +1,9 @@
 """Convert between CDR, the serialization of ROS 2, and that of ROS 1, without creating message objects.
 
-The specs of a message in ROS 1 and in ROS 2 are merged into a layout: their common fields, in order. Two functions are
-generated from it, straight-line Python code that moves bytes. A message of ROS 1 has no padding; in CDR each number is
-aligned to its own size, a string's length includes a trailing NUL, and a struct without members takes a byte. The
-alignment of most positions is known when the code is generated; otherwise, as after strings, it is computed.
+The specs of a message in ROS 1 and in ROS 2 are merged into a layout: their common fields, in order. From the layout,
+two functions are generated as straight-line Python code that moves bytes. A message of ROS 1 has no padding; in CDR each
+number is aligned to its own size, a string's length includes a trailing NUL, and a struct without members takes a byte.
+The alignment of most positions is known when the code is generated; otherwise, as after strings, it is computed.
 
 Output is plain CDR version 1, little-endian; input may have either byte order.
 Source: OMG DDS-XTypes 1.3, 7.4.1 (XCDR version 1), and http://wiki.ros.org/msg.
@@ -41,7 +41,10 @@ _SPARE = 10_000  # number of zero-size elements allowed, in addition to one elem
 
 
 class Side(Enum):
-    """The messages that contain an item: both, or only one. In the other direction the item is skipped, or written as zeros."""
+    """Whether an item exists in both message types, or in only one.
+
+    An item that exists only in the source is skipped; one that exists only in the target is written as zeros.
+    """
 
     BOTH = 0
     ROS1 = 1
@@ -102,7 +105,7 @@ def make_transcoder(name: str, layout: Layout) -> Transcoder:
                 f"{name}: these bytes are not plain CDR version 1: they start with {bytes(data[:4]).hex()}"
             )
         if not big:
-            # Generate this on first use, because messages from a machine with the other byte order are rare.
+            # Generate this function on first use, because messages from a machine with the other byte order are rare.
             generated = _Generator(is_cdr_source=True, swaps=True).function(layout)
             big.append(_compiled(f"{name} from big-endian CDR", generated))
         return big[0](data)
@@ -135,7 +138,7 @@ class _Position(NamedTuple):
         return -self.remainder % width if width <= self.modulus else None
 
     def or_(self, other: _Position) -> _Position:
-        """Return a position that describes both."""
+        """Return a position that describes both ``self`` and ``other``."""
         modulus = min(self.modulus, other.modulus)
         while (self.remainder - other.remainder) % modulus:
             modulus //= 2
@@ -211,7 +214,7 @@ def block_of(layout: Layout) -> Block | None:
 
 
 def _least_size(layout: Layout, absent: Side) -> int:
-    """Return the minimum size of a layout in the message that lacks the items of ``absent``, without padding."""
+    """Return the minimum size of a layout, without padding, in the message that lacks the items of side ``absent``."""
     size = 0
     for item in layout:
         if item.side is absent:
@@ -225,7 +228,7 @@ def _least_size(layout: Layout, absent: Side) -> int:
     return size
 
 
-# --- the generated functions
+# --- generated functions
 
 
 class _Copy(NamedTuple):

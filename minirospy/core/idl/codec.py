@@ -1,9 +1,9 @@
 """Generate a message's ``serialize`` and ``deserialize`` as straight-line Python code.
 
 The fields are in byte order, with nested messages expanded. Consecutive fixed-size values, and the length of the
-following field, share one compiled ``struct``; an array of fixed-size messages is one ``iter_unpack``. Reading never
-goes beyond the data: ``struct`` raises, a slice that is too short is detected at the end, and the number of elements is
-checked before the loop if they consist of slices or have no bytes.
+following field, share one compiled ``struct``; an array of fixed-size messages is read by one ``iter_unpack``. Reading
+never goes beyond the data: ``struct`` raises, a slice that is too short is detected at the end, and the number of
+elements is checked before the loop if they consist of slices or have no bytes.
 """
 
 from __future__ import annotations
@@ -406,7 +406,10 @@ class _Reader:
         return f"{names.get(owner, owner)}{dot}{name}"
 
     def _run(self, chunk: _Chunk, names: dict[str, str], arguments: str) -> str:
-        """Generate code that reads a run and the length that follows; return the length's local name, or the length itself."""
+        """Generate code that reads consecutive fixed-size fields and the length that follows.
+
+        Return the length's local name, or the length itself if it is constant.
+        """
         letters = "".join(leaf.letters for leaf in chunk.run)
         targets = []
 

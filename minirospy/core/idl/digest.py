@@ -12,7 +12,7 @@ from minirospy.core.idl.spec import MessageSpec, ServiceSpec
 from minirospy.core.idl.validate import MAX_LEVELS
 
 try:
-    # Use the same module as hashlib without OpenSSL, because loading OpenSSL takes 2 ms, and it refuses MD5 in FIPS
+    # Use the module that hashlib uses without OpenSSL, because loading OpenSSL takes 2 ms, and it refuses MD5 in FIPS
     # mode.
     from _md5 import md5  # type: ignore[import-not-found]
 except ImportError:

@@ -159,7 +159,7 @@ def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[
         "import importlib",
         "from typing import Any",
         "",
-        # Use a compact format, because a wheel has hundreds of these.
+        # Use a compact format, because a wheel contains hundreds of these files.
         f"_NAMES = {' '.join(names)!r}.split()",
         f'_MODULES = {{name + part: "_" + name for name in _NAMES for part in {tuple(parts)!r}}}',
         "__all__ = sorted(_MODULES)",

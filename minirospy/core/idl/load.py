@@ -60,7 +60,8 @@ class Catalogue:
         self, packages: Mapping[str, Path], definitions: Mapping[str, Iterable[Path]] | None = None
     ) -> None:
         self.packages = packages
-        # Indexed by package and kind, because a package may have hundreds, and each is looked up by its name.
+        # Indexed by package and kind, because a package may have hundreds of definitions, and each is looked up by
+        # its name.
         self._definitions: dict[str, dict[str, dict[str, Path]]] = {}
         for package, files in (definitions or {}).items():
             kinds = self._definitions[package] = {"msg": {}, "srv": {}, "action": {}}
@@ -147,7 +148,7 @@ class Catalogue:
             return self._specs[full_name]
         if name in _OF_OTHER_LANGUAGES and name not in files:
             raise NotFoundError("message type", full_name, hint=f"did you mean {_OF_OTHER_LANGUAGES[name]}?")
-        import difflib  # needed only for the error
+        import difflib  # imported here, because only the error needs it
 
         near = difflib.get_close_matches(name, [*files, *PRIMITIVES], n=1, cutoff=0.7)
         if near and near[0] in PRIMITIVES:
@@ -214,7 +215,7 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
     if on_demand:
         sources = _on_demand(sources)
         for kind in ("msg", "srv"):
-            # These modules remain from an earlier build that compiled them in advance.
+            # Remove modules that remain from an earlier build, which compiled them in advance.
             for stale in (root / package / kind).glob("_[!_]*.py"):
                 stale.unlink()
     folder = root / package
@@ -244,7 +245,8 @@ def _on_demand(sources: dict[str, str]) -> dict[str, str]:
     kept = {name: text for name, text in sources.items() if not _is_module(name)}
     for name, text in kept.items():
         if name.endswith("__init__.py"):
-            # These lines replace the code that emit_package generates, which would be repeated in each such file.
+            # Call a function instead of the code that emit_package generates, which would be repeated in each such
+            # file.
             names = " ".join(sorted(_module_name(each) for each in sources if _is_in(each, name)))
             kept[name] = (
                 f"{text.partition('import importlib')[0]}from minirospy.core.idl.on_demand import load_package\n\n"
@@ -379,7 +381,7 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
 
 
 def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> type[Message]:
-    """Execute the source of a class, whose fields use the classes that were created before."""
+    """Execute the source of a class, whose fields use the classes created before."""
     file = f"<generated {name}>"
     module = types.ModuleType(f"minirospy_generated.{name.replace('/', '.')}")
     for type_, alias in emitted.classes.items():

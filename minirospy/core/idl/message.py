@@ -126,7 +126,7 @@ class Message:
     def _check_types(self, exc: Exception | None = None) -> None:
         """Raise SerializationError for the first field with an invalid value, or for ``exc`` if there is no such field.
 
-        A number that exceeds a float32 is an OverflowError, as in genpy, which does not convert struct's.
+        As in genpy, which does not convert struct's errors, a number that exceeds a float32 raises OverflowError.
         """
         # After an error, find the field that cannot be written; otherwise check everything that genpy checks.
         checks = _STRICT_CHECKS if exc is None else _CHECKS
@@ -191,7 +191,7 @@ def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Map
     if len(args) == 1:
         only = args[0]
         if isinstance(only, data_class) or getattr(only, "_md5sum", None) == data_class._md5sum:
-            # The class comes from another generator or another text, but its serialized bytes are the same.
+            # Accept a class from another generator or from another text, because its serialized bytes are the same.
             return cast("_M", only)
         if isinstance(only, Message) and len(data_class.__slots__) >= 1 and not _takes(data_class, only):
             raise TypeError(f"expected [{', '.join(data_class._slot_types)}] but got [{only._type}]")

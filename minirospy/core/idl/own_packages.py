@@ -1,4 +1,4 @@
-"""The message packages included in minirospy: their folder, and which of them the wheel contains in compiled form."""
+"""The message packages included in minirospy: their folder, and which of them are precompiled in the wheel."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ _RANGES = {
 
 
 def parse_message(text: str, package: str, name: str, where: str = "") -> MessageSpec:
-    """Parse a .msg text. ``where`` is its name in errors (default: the type). Raise DefinitionError if it is invalid."""
+    """Parse a .msg text. ``where`` is the text's name in errors (default: the type). Raise DefinitionError if it is invalid."""
     return _parse(text, package, name, where or f"{package}/{name}", 1)
 
 
@@ -77,7 +77,7 @@ def parse_action(text: str, package: str, name: str, where: str = "") -> ActionS
 
     lines = {"Goal": parts[0][1], "Result": parts[1][1], "Feedback": parts[2][1]}
     messages = tuple(
-        # Add this line at the start, as genaction.py does, so that full texts equal those in real ROS.
+        # Add the line _GENERATED at the start, as genaction.py does, so that full texts equal those in real ROS.
         _parse(_GENERATED + body, package, name + suffix, where, lines.get(suffix, 1) - 1)
         for suffix, body in texts.items()
     )

@@ -56,7 +56,7 @@ class Message(Protocol):
         """Write the message. Raise genpy.SerializationError if a field's value is invalid."""
 
     def deserialize(self, data: Buffer, /) -> Message:
-        """Read the message from bytes, and return it. Raise genpy.DeserializationError if the bytes are invalid."""
+        """Read the message from bytes and return it. Raise genpy.DeserializationError if the bytes are invalid."""
 
 
 class GoalID(Message, Protocol):

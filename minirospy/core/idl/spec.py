@@ -24,7 +24,7 @@ PRIMITIVES = {
     "duration": "ii",
     "string": "",
 }
-"""Dict from primitive type to its format characters for ``struct``; a string has none."""
+"""Dict from primitive type to its format characters for ``struct``; a string has no format characters."""
 
 
 class FieldType(NamedTuple):

@@ -34,7 +34,7 @@ def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
         whole = _whole(name)
         if whole in known:
             return
-        known[whole] = None  # detects a type that contains itself
+        known[whole] = None  # marks the type as being computed, to detect a type that contains itself
         found = []
         for field, text in (fields(name) or _EMPTY).items():
             id, capacity, nested = _described(text)

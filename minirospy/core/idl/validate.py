@@ -1,10 +1,10 @@
 """Check all text that becomes Python source (names of types and fields, and sizes) before anything is generated.
 
-A definition may come from a file or from any publisher's connection header, and its names are written into source that is
-executed. Therefore they must match ROS's grammar (http://wiki.ros.org/Names, http://wiki.ros.org/msg), which allows no
-character that could end a name or a string in Python. Also, a short text may expand to a very large message: a type with
-two fields of a type with two fields of ..., or an array of a billion numbers. Therefore the expanded size is computed
-first.
+A definition may come from a file or from any publisher's connection header, and its names are written into source that
+is executed. Therefore they must match ROS's grammar (http://wiki.ros.org/Names, http://wiki.ros.org/msg), which allows
+no character that could end a name or a string in Python. Also, a short text may expand to a very large message, for
+example by types that each have two fields of the next type, or by an array of a billion numbers. Therefore the expanded
+size is computed first.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ __all__ = ["pixels"]
 def pixels(message: Image) -> Pixels:
     """Return a message's image: (height, width) or (height, width, channels), in the message's encoding.
 
-    It is a read-only view unless the byte order must be changed. Padding after the rows (``step``) is removed. Raise
-    ValueError if the encoding is unknown, or there is less data than the size requires.
+    The result is a read-only view unless the byte order must be changed. Padding after the rows (``step``) is removed.
+    Raise ValueError if the encoding is unknown, or there is less data than the size requires.
     """
     import numpy as np
 
@@ -27,7 +27,7 @@ def pixels(message: Image) -> Pixels:
     channels = number // 8 + 1
     dtype = np.dtype(list(DEPTHS.values())[number % 8]).newbyteorder(">" if message.is_bigendian else "<")
     row = message.width * channels * dtype.itemsize
-    # Some drivers do not set ``step``.
+    # Compute the row length if ``step`` is too small, because some drivers do not set it.
     step = message.step if message.step >= row else row
     needed = max(message.height - 1, 0) * step + (row if message.height else 0)
     data = message.data

@@ -1,8 +1,8 @@
-"""tf2's transform buffer: transforms in, lookups between any two frames in the tree out.
+"""tf2's transform buffer: stores transforms, and looks up the transform between any two frames in the tree.
 
-Results, exceptions and their messages are the same as those of tf2's BufferCore. Stamps are nanoseconds since the epoch,
-and exact; tf2_py rounds them to a float of seconds. Not thread-safe.
-Source: http://wiki.ros.org/tf2/Design, http://docs.ros.org/en/noetic/api/tf2/html/classtf2_1_1BufferCore.html.
+Results, exceptions and their messages are the same as those of tf2's BufferCore. Stamps are exact, in nanoseconds since
+the epoch; tf2_py rounds them to a float in seconds. Not thread-safe. Source: http://wiki.ros.org/tf2/Design,
+http://docs.ros.org/en/noetic/api/tf2/html/classtf2_1_1BufferCore.html.
 """
 
 from __future__ import annotations
@@ -103,8 +103,8 @@ class TransformBuffer(FrameTree):
         target_frame, source_frame = self._frames.get(target), self._frames.get(source)
         fixed_frame = self._frames.get(fixed)
         if target_frame is None or source_frame is None:
-            # If the source frame is missing, report the fixed frame as missing, as tf2 does, which tests the wrong
-            # frame.
+            # If the source frame is missing, report the fixed frame as missing, as tf2 does because it tests the
+            # wrong frame.
             missing = "" if source_frame else f" fixed_frame: {fixed}does not exist."
             return self._unknown(target, source) + missing
         if fixed_frame is None:
@@ -319,7 +319,7 @@ def _accumulated(walk: _Walk) -> StampedTransform:
 
 
 def _composed(samples: list[Sample]) -> tuple[Vector, Quaternion]:
-    """Return the pose of the first sample's child in the last sample's parent.
+    """Return the pose of the first sample's child frame in the last sample's parent frame.
 
     The functions from `rotation` are inlined here, because a lookup spends most of its time in this function.
     """

@@ -1,4 +1,4 @@
-"""The history of a frame's transforms: samples (stamp, parent, transform) in, the sample at a given time out.
+"""The history of a frame's transforms: stores samples (stamp, parent, transform), and returns the sample at a given time.
 
 Times are nanoseconds since the epoch; time 0 means the newest sample. Source: http://wiki.ros.org/tf2/Design.
 """
@@ -71,7 +71,7 @@ class TimeCache:
         return self._stamps[self._first] if self._stamps else 0
 
     def insert(self, stamp: int, sample: Sample) -> Misfit | None:
-        """Insert a sample, and drop samples older than the span; if the sample is rejected, return the reason."""
+        """Insert a sample and drop samples older than the span; if the sample is rejected, return the reason."""
         stamps = self._stamps
         if not stamps or stamp > stamps[-1]:
             stamps.append(stamp)
@@ -158,7 +158,7 @@ class TimeCache:
 
 
 class StaticCache:
-    """A single sample that is valid at every time, until another replaces it."""
+    """A single sample that is valid at every time, until another sample replaces it."""
 
     __slots__ = ("_sample",)
 
@@ -187,4 +187,4 @@ class StaticCache:
         return ""
 
     def clear(self) -> None:
-        """Do nothing, because static transforms are kept."""
+        """Do nothing, because clearing a buffer keeps static transforms."""

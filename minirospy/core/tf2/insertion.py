@@ -1,6 +1,6 @@
 """A transform's faults with tf2's error messages, and a rate-limited log of them.
 
-The messages are tf2's (from noetic, with the parent), because people search for them.
+The messages are those of tf2 in noetic, which include the parent frame, because users search for them.
 """
 
 from __future__ import annotations

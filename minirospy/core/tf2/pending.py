@@ -22,7 +22,7 @@ _COUNT = struct.Struct("<I")
 _HEAD = struct.Struct("<4I")
 _STAMP = struct.Struct("<2I")
 _BODY = struct.Struct("<7d")
-_BLOCK = 64  # number of messages in a block; a layout drops expired messages in blocks of this size
+_BLOCK = 64  # number of messages in a block; expired messages are dropped in whole blocks
 MAX_MESSAGES = 16_384
 _MAX_LAYOUTS = 16_384
 _MAX_SAME_LENGTH = 8
@@ -82,7 +82,7 @@ class Layout:
         return [offsets.child for offsets in self._offsets]
 
     def keep(self, arrival: Arrival, span: int) -> list[str]:
-        """Store a message, and drop expired ones; return the frames that the caller must decode now."""
+        """Store a message and drop expired ones; return the frames that the caller must decode now."""
         self._arrivals.append(arrival)
         return [] if len(self._arrivals) % _BLOCK else self._drop_expired(span)
 
@@ -168,7 +168,7 @@ class Layouts:
         return None
 
     def add(self, data: bytes) -> Layout | None:
-        """Add a layout for a message, and return it; return None if there are no frames, a duplicate, or too many layouts."""
+        """Add a layout for a message and return it; return None if there are no frames, a duplicate, or too many layouts."""
         found = _find_transforms(data)
         children = {offsets.child for offsets in found}
         if not found or len(children) < len(found) or self._count >= _MAX_LAYOUTS:

@@ -57,7 +57,7 @@ def slerp(p: Quaternion, q: Quaternion, ratio: float) -> Quaternion:
     dot = px * qx + py * qy + pz * qz + pw * qw
     length = math.sqrt((px * px + py * py + pz * pz + pw * pw) * (qx * qx + qy * qy + qz * qz + qw * qw))
     if dot < 0:
-        # -q is the same rotation, and closer.
+        # -q is the same rotation as q, and closer to p.
         dot, qx, qy, qz, qw = -dot, -qx, -qy, -qz, -qw
     cosine = dot / length
     if cosine >= 1.0:

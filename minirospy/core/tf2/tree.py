@@ -1,4 +1,4 @@
-"""The frames of a buffer: transforms and TFMessages in, each frame's cache updated.
+"""The frames of a buffer: inserts transforms and TFMessages into each frame's cache.
 
 Not thread-safe. Source: http://wiki.ros.org/tf2/Design.
 """
@@ -21,7 +21,7 @@ DEFAULT_CACHE_TIME = 10_000_000_000  # nanoseconds
 class FrameTree:
     """The frame tree over the last ``cache_time`` nanoseconds.
 
-    ``on_refused`` is called with each rejected transform, inside the call that inserts it. Transforms from
+    ``on_refused`` is called with each rejected transform, during the call that inserts the transform. Transforms from
     :meth:`insert_message` may be inserted only when the frame is looked up.
     """
 
@@ -37,7 +37,7 @@ class FrameTree:
         self._lazy: dict[str, list[Layout]] = {}  # dict from child frame to the layouts that contain it
         self._arrived = 0
 
-    # --- inserting
+    # --- adding transforms
 
     def insert(
         self,
@@ -94,7 +94,7 @@ class FrameTree:
     # --- queries
 
     def frames(self) -> list[Frame]:
-        """Decode all messages, and return every frame in order of first appearance."""
+        """Decode all messages and return every frame in order of first appearance."""
         for layout in self._layouts:
             self._settle_all(layout)
         return list(self._frames.values())
@@ -118,7 +118,7 @@ class FrameTree:
                 )
         return "".join(lines)
 
-    # --- insertion
+    # --- insertion into the tables
 
     def _insert(
         self,
@@ -130,7 +130,7 @@ class FrameTree:
         authority: str,
         is_static: bool,
     ) -> bool:
-        """Insert a transform; earlier ones for the same frame must have been inserted."""
+        """Insert a transform; earlier transforms of the same frame must have been inserted before."""
         if child in self._lazy:
             self._settle(self._frames[child])
         return self._take(parent, child, stamp, translation, rotation, authority, is_static)
@@ -177,7 +177,7 @@ class FrameTree:
             for child in layout.children:
                 self._lazy.setdefault(child, []).append(layout)
 
-    # --- messages to be decoded
+    # --- undecoded messages
 
     def _settle(self, frame: Frame) -> None:
         """Insert the messages for a frame that have arrived since its last lookup, in order of arrival."""

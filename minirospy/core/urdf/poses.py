@@ -47,7 +47,7 @@ class Segment:
         self._is_sliding = joint.type is JointType.PRISMATIC
         length = math.hypot(*joint.axis)
         x, y, z = joint.axis
-        # Like KDL's normalization, use the x axis if the axis has length zero.
+        # Like KDL's normalization, use the x axis if the given axis has length zero.
         self._axis = (x / length, y / length, z / length) if length >= _EPSILON else (1.0, 0.0, 0.0)
 
     @property

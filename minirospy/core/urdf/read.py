@@ -1,4 +1,4 @@
-"""Parse a robot description into a Robot, as strictly as ROS's parser about faults that would make a robot move wrongly.
+"""Parse a robot description into a Robot. Like ROS's parser, reject faults that would make a robot move wrongly.
 
 If ROS's parser reports a fault and continues (an invalid shape or mass), the part is ignored and recorded in
 :attr:`Robot.problems`. Messages are the same as in ROS's parser; line numbers refer to the description.

@@ -1,1 +1,1 @@
-"""Pure protocols: bytes in, events out. Imports no asyncio, no socket, no threading."""
+"""Pure protocols: they parse bytes into events. Imports no asyncio, no socket, no threading."""

@@ -39,7 +39,7 @@ LENGTH_BYTES = 4  # bytes in the length prefix of a frame or of a connection hea
 
 MAX_FRAME = 1024 * 1024 * 1024  # bytes; a longer frame is rejected as invalid
 
-SPLIT = 1 << 31  # bit in the length which means that the size of the array at the end follows
+SPLIT = 1 << 31  # flag bit in the length field: the size of the trailing array follows
 
 FIRST_CLAIM = 16 * 1024 * 1024
 _LENGTH = struct.Struct("<I")
@@ -156,7 +156,7 @@ def split_sizes(size: int, tail: int) -> tuple[int, int]:
 
 
 class FrameReader:
-    """Bytes in, frames out.
+    """A parser that splits received bytes into frames.
 
     A frame is a memoryview that is valid until the next call to :meth:`space`, except that a frame longer
     than ``chunk`` gets a separate buffer, which is not reused. With ``gathers`` false the caller must read such a frame
@@ -190,12 +190,12 @@ class FrameReader:
         return self._wanted
 
     def put_back(self, data: bytes) -> None:
-        """Store these few bytes as if they were received first; the buffer must be empty."""
+        """Store these few bytes as the first received bytes; the buffer must be empty."""
         self._end = len(data)
         self._small[: self._end] = data
 
     def space(self) -> memoryview:
-        """Return the memory for the next bytes. It is never empty."""
+        """Return the memory for the next bytes, which is never empty."""
         if self._large is not None:
             if self._filled == len(self._large):
                 # Grow the buffer as bytes arrive, so that a length prefix alone cannot allocate all the memory in

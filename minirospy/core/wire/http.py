@@ -1,6 +1,6 @@
 """HTTP/1.1 for XML-RPC: POST requests and their responses, with keep-alive.
 
-Pure: bytes in, messages out. Source: RFC 9112.
+Pure: parses bytes into messages, and serializes messages. Source: RFC 9112.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class HttpMessage(NamedTuple):
 
 
 class HttpReader:
-    """Bytes in, complete messages out; several of them if they were pipelined.
+    """A parser that splits received bytes into complete messages; several messages may be pipelined.
 
     Optimized for the usual case: a single message in one piece, or its head and then its body.
     """
@@ -122,7 +122,7 @@ class HttpReader:
 
     @property
     def in_chunks(self) -> bool:
-        """Return whether the current message has a chunked body, because even a few bytes of it may contain many chunks."""
+        """Return whether the current message has a chunked body, of which even a few bytes may contain many chunks."""
         return self._chunked is not None
 
     @property

@@ -46,7 +46,7 @@ def serialize_record(record: list[object]) -> bytes:
 
 
 def pack_in_steps(value: object) -> Iterator[bytes]:
-    """Yield a large value packed in pieces; joined, they can be passed to :func:`unpack`.
+    """Yield a large value's packed bytes in pieces; :func:`unpack` accepts their concatenation.
 
     Raise ValueError or TypeError if msgpack cannot represent a value.
     """

@@ -47,7 +47,7 @@ def serialize_failure(error: Exception) -> bytes:
 
 
 def parse_request_head(head: bytes) -> int:
-    """Return the length of the body after these :data:`REQUEST_HEAD` bytes. Raise WireError if it exceeds the limit."""
+    """Return the length of the body that follows ``head``. Raise WireError if it exceeds the limit."""
     length: int = _LENGTH.unpack(head)[0]
     if length > MAX_FRAME:
         raise _too_long(length)

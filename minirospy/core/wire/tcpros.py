@@ -130,7 +130,7 @@ def service_client_header(
         fields["persistent"] = "1"
     if probe:
         fields["probe"] = "1"
-    # As in rospy, the user's fields override others.
+    # As in rospy, the user's fields override the others.
     return {**fields, **{name: str(value) for name, value in (extra or {}).items()}}
 
 

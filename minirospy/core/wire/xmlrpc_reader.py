@@ -17,7 +17,7 @@ from minirospy.base.errors import RpcProtocolError
 __all__ = ["MAX_DEPTH", "DateTime", "Reader", "read_document"]
 
 MAX_DEPTH = 64
-MAX_ELEMENTS = 1_000_000  # per document; parsing this many takes some seconds
+MAX_ELEMENTS = 1_000_000  # maximum number of elements per document; parsing this many takes some seconds
 
 _MIB = 1024 * 1024
 MAX_MEMORY = 64 * _MIB  # maximum bytes in memory of all long strings in one document
@@ -27,21 +27,24 @@ MAX_WIDE = 16 * _MIB
 string is copied.
 """
 
-MAX_TOKEN = 65536  # bytes in a tag, a comment or similar
+MAX_TOKEN = 65536  # maximum bytes in a tag, a comment or similar
 
-MAX_SCALAR = 2048  # characters in a number, a boolean or a date
+MAX_SCALAR = 2048  # maximum characters in a number, a boolean or a date
 
 _LONG_TEXT = 16  # number of 8-KiB pieces above which a string counts as long
 
 _GROWTH_SHIFT = 17
-"""A long string's new pieces are joined to it once they exceed a sixteenth of its length.
+"""The new pieces of a long string are joined to the string once they exceed a sixteenth of its length.
 
 A length in characters, shifted right by this number, is a sixteenth of the length in 8-KiB pieces.
 """
 
 
 class DateTime(NamedTuple):
-    """A date, as received, that is not in XML-RPC's format. It may be any text, because other implementations accept it."""
+    """A date, as received, that is not in XML-RPC's format.
+
+    The date may be any text, because other implementations accept it.
+    """
 
     value: str
 
@@ -106,7 +109,7 @@ class Reader:
         # The number of bytes fed, and the memory that the long strings use.
         self._fed = 0
         self._memory = 0
-        # The joined part of a long string, and its bytes per character.
+        # The part of a long string joined so far, and the string's bytes per character.
         self._joined = ""
         self._width = 1
         # The decoded part of a long base64 value.

@@ -1,4 +1,4 @@
-"""Convert values to XML, in one go, or in steps if they are large.
+"""Convert values to XML: small values in one step, large values in several steps.
 
 Pure. Source: http://xmlrpc.com/spec.md.
 """
@@ -46,7 +46,7 @@ def _write_bool(value: bool, parts: list[str], depth: int) -> None:
 
 
 def _write_float(value: float, parts: list[str], depth: int) -> None:
-    # Call float's own repr, because a subclass, such as numpy's, may have another one.
+    # Call float's own repr, because a subclass, such as numpy's, may have a different repr.
     parts.append(f"<value><double>{float.__repr__(value)}</double></value>")
 
 
@@ -110,7 +110,10 @@ def write(value: object, parts: list[str], depth: int) -> None:
 
 
 def is_numpy(value: object) -> bool:
-    """Return whether ``value.tolist()`` returns a numpy number or array as Python's: not for those without a counterpart."""
+    """Return whether a value is a numpy number or array that ``tolist()`` converts to Python values.
+
+    Some numpy types have no counterpart in Python.
+    """
     return hasattr(value, "dtype") and hasattr(value, "tolist") and type(value.tolist()) is not type(value)
 
 

@@ -1,4 +1,4 @@
-"""Check this machine's ROS installation, network and graph: an environment in, findings out.
+"""Check this machine's ROS installation, network and graph: return findings for an environment.
 
 Source: http://wiki.ros.org/roswtf, http://wiki.ros.org/ROS/NetworkSetup, http://wiki.ros.org/ROS/Troubleshooting.
 """

@@ -19,7 +19,7 @@ class Status(str, Enum):
 class Finding(NamedTuple):
     """The result of one check.
 
-    ``check``: its subject; ``text``: the observation; ``advice``: what to do, "" if nothing is needed.
+    ``check``: the check's subject; ``text``: the observation; ``advice``: the action to take, or "" if none is needed.
     """
 
     check: str

@@ -74,8 +74,8 @@ def check_frames(environment: Environment, state: SystemState) -> Iterator[Findi
         yield problem(
             "frames", f"no transforms, but other bytes: {names}", "publish tf2_msgs/TFMessage there"
         )
-    # The workers have stopped together with the node. With simulated time, stamps and arrival times cannot be
-    # compared.
+    # The workers have stopped together with the node, so ``seen`` does not change any more. With simulated time,
+    # stamps and arrival times cannot be compared.
     yield from frame_findings([*seen.values()], is_simulated=bool(state.publishers.get("/clock")))
 
 
@@ -205,7 +205,7 @@ def _similar(name: str, others: Iterable[str]) -> str:
 
 
 def _times(seen: Sequence[Observation]) -> Iterator[Finding]:
-    """Yield a finding for stamps far from their arrival time: for each node, the largest offset ahead and the largest behind."""
+    """For each node, yield findings for the stamps farthest ahead of and behind their arrival times, if they are too far off."""
     worst: dict[tuple[str, bool], tuple[float, str]] = {}
     for each in sorted(seen, key=_child):
         if each.offset is None:

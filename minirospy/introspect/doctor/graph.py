@@ -77,7 +77,7 @@ class _Pair(NamedTuple):
 
 
 def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats: bool = False) -> Answers:
-    """Query all registered nodes in parallel, except for ``besides``, and return their responses."""
+    """Query all registered nodes except ``besides`` in parallel, and return their responses."""
     tables = (state.publishers, state.subscribers, state.services)
     names = sorted({node for table in tables for nodes in table.values() for node in nodes} - {besides})
     nodes = graph.addresses(names)
@@ -98,7 +98,7 @@ def ask_nodes(graph: Graph, state: SystemState, besides: str = "", *, with_stats
 
 
 def check_nodes(answers: Answers, place: MasterLocation) -> Iterator[Finding]:
-    """Yield a problem for nodes that do not respond: one line for all nodes on a machine that fail in the same way."""
+    """Yield a problem for nodes that do not respond: one finding for all nodes on a machine that fail in the same way."""
     groups: dict[tuple[str, Fault], list[NodeAnswer]] = {}
     for answer in answers.values():
         if answer.trouble:
@@ -366,7 +366,7 @@ def _probe_service(graph: Graph, name: str) -> str:
 
 
 def _names(names: Iterable[str]) -> str:
-    """Return the first few names and how many more there are."""
+    """Return a string with the first few names and the number of further names."""
     all_ = list(names)
     more = f" and {len(all_) - _SHOWN} more" if len(all_) > _SHOWN else ""
     return ", ".join(all_[:_SHOWN]) + more

@@ -29,7 +29,7 @@ _WRONG_SECONDS = 1.0
 
 
 def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
-    """Yield a finding that a master responds, or one problem if none does."""
+    """Yield a finding that the master responds, or a problem if it does not."""
     if not place.addresses:
         yield problem(
             "master",
@@ -41,7 +41,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
     try:
         pid = f", pid {master.get_pid()}"
     except RpcFault:
-        pid = ""  # this master is another implementation, which does not support the call
+        pid = ""  # this master is another implementation that does not support getPid
     except (MasterUnreachableError, RpcError) as error:
         yield _unreachable(master.uri, place, trouble_of(error))
         return

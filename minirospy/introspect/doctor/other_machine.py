@@ -66,7 +66,7 @@ def check_listens(host: str, listeners: Answers, master_uri: str) -> Iterator[Fi
     known = addresses_of([host, *theirs])
     here = {host, *known[host]}
     if not known[host] or is_own_address(known[host][0]):
-        return  # check_machine has already reported this
+        return  # check_machine() has already reported this case
     if not any(here & {name, *known[name]} for name in theirs):
         yield warning(
             "both directions",

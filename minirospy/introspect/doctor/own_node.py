@@ -1,6 +1,6 @@
 """The doctor's own node, for checking whether other machines, the master's first, reach nodes on this machine.
 
-It is a normal node in the graph while the doctor runs: peers that reach it also reach the user's nodes.
+It is a normal node while the doctor runs: peers that reach it also reach the user's nodes.
 """
 
 from __future__ import annotations

@@ -70,7 +70,7 @@ class Fault(str, Enum):
     """No response: the machine is off, the address belongs to another machine, or a firewall drops the packets."""
     LATE = "late"  # connected, but no response: the process is busy or suspended
     NO_ROUTE = "no route"  # no network, or a firewall rejects the packets
-    STRANGER = "stranger"  # the peer does not speak a ROS protocol
+    STRANGER = "stranger"  # the peer responds, but not with a ROS protocol
     OTHER = "other"
 
 
@@ -153,7 +153,7 @@ def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict
 def look_up(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
     """Look up a name as :func:`addresses` does, but raise OSError on failure.
 
-    This is needed because the system's own timeout is half a minute.
+    The function exists because the system's own timeout is half a minute.
     """
     (found,) = in_parallel(_ask_resolver, [host], timeout)
     if isinstance(found, Exception):
@@ -173,7 +173,7 @@ def is_loopback(host: str) -> bool:
 
 
 def is_own_address(address: str) -> bool:
-    """Return whether an address belongs to this machine. It does if a socket can be bound to it."""
+    """Return whether an address belongs to this machine, that is, whether a socket can be bound to it."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
@@ -208,7 +208,7 @@ def read_topic(
 ) -> tuple[Header, bytes]:
     """Return the connection header of the publisher at ``uri`` (its Slave API) and, with ``wait``, its first message.
 
-    Each step has its own ``timeout`` in seconds. Raise RpcError if the call fails, WireError if its data is invalid, or
+    Each step may take ``timeout`` seconds. Raise RpcError if the call fails, WireError if its data is invalid, or
     OSError if the connection fails.
     """
     look_up(host_port(uri)[0])

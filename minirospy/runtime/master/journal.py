@@ -152,10 +152,11 @@ class Journal:
             os.fsync(file)
             file = self._put_in_place(file)
         except BaseException:
-            # Windows has already closed the file.
+            # On Windows, the file may already be closed.
             with contextlib.suppress(OSError):
                 os.close(file)
-            # Free the space on a full disk, because the old file may need it.
+            # Remove the incomplete new file to free space on a full disk, because appending to the old file may need
+            # it.
             with contextlib.suppress(OSError):
                 new.unlink()
             raise

@@ -31,7 +31,7 @@ class LogFileHandler(RotatingFileHandler):
     """
 
     def __init__(self, path: Path, most_bytes: int = 0, older_files: int = 0) -> None:
-        """Open ``path``; ``most_bytes`` 0 means no limit. Raise OSError if it cannot be opened."""
+        """Open ``path``; a ``most_bytes`` of 0 means no limit. Raise OSError if the file cannot be opened."""
         super().__init__(path, maxBytes=most_bytes, backupCount=older_files, encoding="utf-8")
 
     def _open(self) -> TextIOWrapper:
@@ -81,7 +81,7 @@ class LogFile(LogFileHandler):
         self._write_out()
 
     def close(self) -> None:
-        """Write the pending lines, and close the file. Idempotent."""
+        """Write the pending lines and close the file. Idempotent."""
         self._write_out()
         if self._timer:
             self._timer.cancel()

@@ -61,7 +61,7 @@ _COLLECT = (2000, 5, 1_000_000_000)
 collected automatically.
 """
 
-SWEEP_SECONDS = 10.0  # between the checks for dead nodes if the master is nearly full
+SWEEP_SECONDS = 10.0  # seconds between checks for dead nodes if the master is nearly full
 _MAX_FORGOTTEN_PER_ITERATION = 20  # dead nodes to forget per loop iteration
 
 _OWN_NODE = "/rosout"
@@ -96,7 +96,7 @@ class Master(MasterApi):
         self.calls = 0
         # The serialized response to getSystemState, and the registry's change count when it was serialized.
         self._state = (-1, Serialized(()))
-        # Messages for the user about the start: what was recovered, and what could not be recovered.
+        # Messages for the user about the startup: what was recovered, and what could not be recovered.
         self.news: list[str] = []
         self._started = time.monotonic()
         self._journal_path = journal
@@ -163,7 +163,7 @@ class Master(MasterApi):
         self._sweeping = asyncio.ensure_future(self._sweep())
 
     async def close(self, *, keep_journal: bool = False) -> None:
-        """Stop, and remove the journal, so that the next master starts empty. Idempotent.
+        """Stop the master and remove the journal, so that the next master starts empty. Idempotent.
 
         With ``keep_journal`` the next master continues this session.
         """
@@ -200,11 +200,14 @@ class Master(MasterApi):
         return self.dispatch(method, args)
 
     def _write_state(self) -> Steps[Serialized]:
-        """Return the serialized system state. It is cached, because it is slow to serialize and tools request it often."""
+        """Return the serialized system state.
+
+        The state is cached, because serializing it is slow and tools request it often.
+        """
         if self.registry.is_large:
             yield ALONE
         if self._state[0] == self.registry.changes:
-            # Another client's request serialized the state while this one was queued.
+            # Another client's request serialized the state while this request was queued.
             return self._state[1]
 
         changes = self.registry.changes
@@ -275,7 +278,7 @@ class Master(MasterApi):
             },
         ]
 
-    # --- the journal
+    # --- journal
 
     def _journal_line(self) -> str:
         if self._journal is None:
@@ -285,7 +288,7 @@ class Master(MasterApi):
         return f"{self._journal.path} ({self._journal.size} bytes)"
 
     async def _open_journal(self) -> dict[str, str]:
-        """Recover the state from the journal, and start to write the journal; return the nodes to check, with their URIs."""
+        """Recover the state from the journal and start to write the journal; return the nodes to check, with their URIs."""
         from minirospy.runtime.master.journal import RETRY_SECONDS, Journal, JournalBusyError
 
         assert self._journal_path
@@ -298,7 +301,7 @@ class Master(MasterApi):
         try:
             await _lock(journal)
         except JournalBusyError as error:
-            # The journal belongs to another master.
+            # Another master has locked the journal.
             busy = error
         except OSError:
             # The journal may still be readable. :meth:`Journal.start` then determines whether it is writable.
@@ -373,7 +376,7 @@ class Master(MasterApi):
         self._journal.retry()
         self.touching = asyncio.get_running_loop().call_later(_TOUCH_SECONDS, self.touch)
 
-    # --- the nodes of a master that was killed
+    # --- nodes of a killed master
 
     async def _anybody_lives(self, nodes: Mapping[str, str]) -> bool:
         rpc = AsyncRpcClient(same_host=self._same_host)
@@ -384,7 +387,7 @@ class Master(MasterApi):
             await rpc.close()
 
     async def _check(self, nodes: Mapping[str, str]) -> None:
-        """Forget dead nodes; send the others the notifications that they may have missed."""
+        """Forget dead nodes; send the remaining nodes the notifications that they may have missed."""
         rpc, slots = AsyncRpcClient(same_host=self._same_host), asyncio.Semaphore(_MAX_CONCURRENT_CHECKS)
 
         async def check(name: str, uri: str) -> bool:
@@ -408,7 +411,7 @@ class Master(MasterApi):
     async def _sweep(self) -> None:
         """When the registrations are nearly full, forget the nodes whose port refuses connections.
 
-        Otherwise they would stay full, because this master, like rosmaster, keeps a killed node's registrations.
+        Otherwise the master would stay full, because this master, like rosmaster, keeps a killed node's registrations.
         """
         while True:
             await asyncio.sleep(SWEEP_SECONDS)

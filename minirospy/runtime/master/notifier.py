@@ -43,7 +43,8 @@ MAX_PARAMETERS = 32
 # maximum total size in bytes of large calls in progress; further ones are queued
 _LARGE_BYTES = 32 * 1024 * 1024
 
-_MAX_ANSWER = 65536  # maximum size in bytes of a node's response to a notification, which is ignored
+# maximum size in bytes of a node's response to a notification; its contents are ignored
+_MAX_ANSWER = 65536
 
 
 class State(Protocol):
@@ -108,7 +109,7 @@ class Notifier:
         self._starts_soon = False
         self._closed = False
 
-        # The last serialized update: all subscribers of a topic get the same bytes.
+        # The last serialized update: cached, because all subscribers of a topic get the same bytes.
         self._last: tuple[str, list[str], bytes] = ("", [], b"")
         # The last serialized large update, of a topic or a parameter.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
@@ -316,7 +317,7 @@ class Notifier:
         if any(key not in node.pauses for key in node.notices):
             self._line_up(node)
         elif node.pauses:
-            # A timer may fire early by up to the clock's resolution.
+            # Add a tick, because a timer may fire early by up to the clock's resolution.
             node.timer = loop.call_at(min(node.pauses.values()) + _TICK, self._go_on, node)
         else:
             del self.nodes[node.uri]

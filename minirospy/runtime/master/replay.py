@@ -81,7 +81,7 @@ def changes_to(registry: Registry, parameters: ParameterTree) -> Iterator[list[o
     The state is copied immediately: the returned changes may be read while the state changes further.
     """
     uris, types = registry.nodes(), registry.topic_types()
-    # Each of these is a copy.
+    # Each of these results is a copy.
     publications, subscriptions = registry.publications(), registry.all_subscriptions()
     offers, subscribed = list(registry.offers()), list(parameters.subscriptions())
     tree = parameters.get("/")

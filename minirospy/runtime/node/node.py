@@ -31,7 +31,7 @@ __all__ = ["Node"]
 
 _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
-MAX_IDLE = 200  # idle connections to the Slave API; a graph has about as many as this node has peers
+MAX_IDLE = 200  # maximum number of idle connections to the Slave API; a node's peers keep about one each
 
 # seconds after an unsubscription in which the master may still send lists of publishers
 _STALE_SECONDS = 5.0
@@ -91,7 +91,7 @@ class Node:
         self.when_registered_again = self.registrations.when_registered_again
         """Functions that register further state.
 
-        They are called in workers when the node registers again with a master that had lost it.
+        The functions are called in workers when the node registers again with a master that had lost it.
         """
 
         self.server: RpcServer | None = None
@@ -100,7 +100,7 @@ class Node:
         self.unix_listener = tcp.Listener(self._accept)
         # The value of :func:`local.this_host` if this node also uses Unix sockets, else ""
         self.this_host = ""
-        # Name of the Unix socket that serves topics to processes on this machine, or "".
+        # Name of the Unix socket that serves topics to processes on this machine, or "" if there is none.
         self.unix_name = ""
 
         self._closed = False
@@ -156,7 +156,7 @@ class Node:
             return
         self._closed = True
         self._unregistering = asyncio.ensure_future(self.registrations.close(announces=announces))
-        # Let the first call be sent before doing anything else.
+        # Let the first call to the master be sent before doing anything else.
         await asyncio.sleep(0)
 
         for timer in [*self._left.values(), *self._requesting.values()]:
@@ -168,7 +168,8 @@ class Node:
             return_exceptions=True,
         )
 
-        # Close the Unix socket before the port: the next server on that port uses the same socket name.
+        # Close the Unix socket before the port: otherwise the next server on that port could not bind the socket's
+        # name.
         await close_all([self.unix_listener.close, self.listener.close])
         tables = (self.publications, self.subscriptions, self.services)
         close_each([part.close for table in tables for part in table.values()])

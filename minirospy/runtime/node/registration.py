@@ -47,7 +47,7 @@ was already silent before. The total time is not limited, because the node waits
 _CLOSING_CALL_SECONDS = 3600.0
 _PROBE_SECONDS = 3.0  # seconds between a closing node's checks whether the master still responds
 
-NOTICE_SECONDS = 3.0  # before a closing node logs that it is still waiting for the master
+NOTICE_SECONDS = 3.0  # seconds before a closing node logs that it is still waiting for the master
 
 _MAX_CALLS_PER_MULTICALL = 100  # maximum number of unregistrations per system.multicall
 
@@ -81,7 +81,7 @@ class Registrations:
         self.when_registered_again: list[Callable[[], object]] = []
         """Functions that register further state.
 
-        They are called in workers when the node registers again with a master that had lost it.
+        The functions are called in workers when the node registers again with a master that had lost it.
         """
 
         self._name = name
@@ -95,7 +95,7 @@ class Registrations:
         self._known: dict[_Key, _Part | None] = {}
         """The object registered with the master; None if the call failed or has no response yet."""
         self._taken: set[_Key] = set()
-        """Services that another node has registered later, so that the master's entry is for that node."""
+        """Services that another node has registered later, so that the master's entry now belongs to that node."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
         self.watching: asyncio.Task[None] | None = None
@@ -108,7 +108,7 @@ class Registrations:
         self.watching = asyncio.ensure_future(self._watch_master())
 
     async def close(self, *, announces: bool) -> None:
-        """Unregister everything, and register nothing more. The first call is sent before anything else is done.
+        """Unregister everything and register nothing more. The first call is sent before anything else is done.
 
         Waits while the master continues to respond; does not wait if it refuses connections, and gives up if it sends no
         response for ``SILENT_SECONDS``. With ``announces``, a line is logged if this takes long.
@@ -147,7 +147,7 @@ class Registrations:
         return answer
 
     async def _look(self, method: str, name: str) -> object:
-        """Look up this node, or one of its services; return its address.
+        """Look up this node's address, or that of one of its services.
 
         Raise MasterUnreachableError or RpcError if the look-up fails.
         """
@@ -192,8 +192,8 @@ class Registrations:
     def _has_registered(self, task: asyncio.Task[None]) -> None:
         self._registering.discard(task)
         if not task.cancelled():
-            # Retrieve the error: a waiting caller receives it. Without a caller it is ignored, because the call is
-            # retried.
+            # Retrieve the task's error, because asyncio logs unretrieved ones. A waiting caller also receives the
+            # error; without a caller it is ignored, because the call is retried.
             task.exception()
 
     async def _register_in_turn(self, key: _Key, *, again: bool) -> None:
@@ -275,8 +275,8 @@ class Registrations:
                     _log.warning("%s. What is connected goes on; will keep trying.", error)
                 continue
             except RpcRefused:
-                # An entry that has been unregistered since is expected to be missing, and an illegal name is always
-                # refused.
+                # A missing entry proves nothing if it has been unregistered since, or if the name is illegal, because
+                # the master always refuses illegal names.
                 if asked and (asked[0] == "Service" or is_legal_name(self._name)):
                     has_forgotten = self._known.get(asked) is not None
             except RpcError as error:
@@ -375,7 +375,7 @@ class Registrations:
             if not isinstance(answers, list) or len(answers) != len(part):
                 answers = [None] * len(part)
             for (method, args), answer in zip(part, answers, strict=True):
-                # Call individually if the batch failed, for example because it is too long.
+                # Call the methods individually if the batch failed, for example because it was too long.
                 if not isinstance(answer, list):
                     with contextlib.suppress(RpcFault, RpcProtocolError, RpcRefused):
                         await self.call(method, *args)

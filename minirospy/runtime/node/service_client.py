@@ -83,8 +83,8 @@ class ServiceClient:
         responses need only one wait. If the server sends no header, it has not started to process the request.
         """
         try:
-            # Only a Unix socket allows this, because only minirospy serves those: rospy may lose data that arrives
-            # together with a header.
+            # Do this only on a Unix socket, because only minirospy's servers use those: rospy may lose data that
+            # arrives together with a header.
             if request is not None and len(request) < _RECEIVE and self._sock.family not in sockets.FAMILIES:
                 self._send(request)
                 self._is_asked = True
@@ -235,7 +235,7 @@ def _connected(address: tuple[str, int], timeout: float, *, same_host: bool) -> 
         sockets.tune(sock)
         return sock
 
-    # Do this first, because most service URIs contain an IP address, which needs no resolver.
+    # The URI contains an IP address, as most service URIs do, so no resolver is needed.
     sock = socket.socket()
     try:
         sockets.tune(sock)

@@ -182,7 +182,7 @@ class ServiceServer:
         except Exception:  # noqa: BLE001 - the exception is the handler's, as is its text
             text = type(error).__name__
         if not isinstance(error, Exception):
-            # str(error) may be only a number, or empty.
+            # str(error) may be empty or only a number, so prepend the exception's type.
             text = f"{type(error).__name__}: {text}".removesuffix(": ")
         return serialize_failure(ServiceException(f"error processing request: {text}"))
 
@@ -251,7 +251,7 @@ class LoopServiceServer(ServiceServer):
             # asyncio would end the loop, and with it everything that the node does, if a task raised SystemExit.
             return self._failure(error)
         except asyncio.CancelledError:
-            # Either this task was cancelled, or something that the handler awaited; only Python 3.11 and later can
+            # Either this task was cancelled, or an operation that the handler awaited; only Python 3.11 and later can
             # distinguish the two.
             if not self._closed:
                 _log.error("service %s: the handler of a call was cancelled", self.name)

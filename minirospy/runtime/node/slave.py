@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 __all__ = ["SlaveApi", "connection_text"]
 
-# The shutdown reason that rosmaster and minirospy's master send
+# Matches the shutdown reason that rosmaster and minirospy's master send when another node takes over the name
 _BUMPED = re.compile(r"\[(/.*)\] Reason: new node registered with same name")
 
 

@@ -50,9 +50,10 @@ __all__ = ["Deliver", "InLink", "InTurns", "Publication", "Subscription", "Unrea
 
 _log = logging.getLogger(__name__)
 
-SETTLE_SECONDS = 10.0  # within which all nodes register again with a master that has lost its state
+SETTLE_SECONDS = 10.0  # seconds within which all nodes register again with a master that has lost its state
 
-# Failures before a publisher that refuses is reported: a publisher that is shutting down has exited by then
+# Number of failures after which a publisher that refuses connections is reported; one that is shutting down has
+# exited before that
 _WARN_AFTER = 3
 
 # maximum number of log lines about publishers with invalid responses; further ones are only counted
@@ -60,7 +61,7 @@ _REFUSALS_LOGGED = 10
 
 # seconds within which a publisher's unreachable topics are combined in one log line
 TOGETHER_SECONDS = 0.25
-MAX_TOPICS_SHOWN = 5  # maximum number of topics named in such a log line
+MAX_TOPICS_SHOWN = 5  # maximum number of topics named in one log line about an unreachable publisher
 _LEAVE_SECONDS = 10.0
 # a link counts as working once it has received a message or has been open for this many seconds
 _WORKED_SECONDS = 5.0
@@ -306,7 +307,7 @@ class Subscription:
     ) -> None:
         """Create the subscription; ``this_host`` is the value of :func:`local.this_host`, or "" to not use Unix sockets.
 
-        All subscriptions of the node share ``unreachable``, because several may lose the same publisher.
+        All subscriptions of the node share ``unreachable``, because several subscriptions may lose the same publisher.
         """
         self.topic = topic
         self.type = type_
@@ -457,8 +458,8 @@ class Subscription:
             if self.lists == lists:
                 self.plan.refused(uri)
             else:
-                # A newer list arrived after this refusal, and there may be no further list: retry, because the
-                # publisher may accept now.
+                # A newer list arrived after this refusal, and there may be no further list, so retry now: the
+                # publisher may accept.
                 self.retry(uri, error)
         except _NoPublisher as error:
             self._limited_log.warning("no connection for %s: %s", self.topic, error)
@@ -504,7 +505,7 @@ class Subscription:
     async def open_link(self, uri: str) -> InLink:
         protocols: list[list[str]] = [["TCPROS"]]
         if self._this_host:
-            # Add this after TCPROS, because third-party nodes read the first protocol only.
+            # Add the Unix socket after TCPROS, because third-party nodes read the first protocol only.
             protocols.append([local.PROTOCOL, self._this_host])
         answer = await self.rpc.call(uri, "requestTopic", self._caller_id, self.topic, protocols)
         sock, address = await self._reach(answer, uri)
@@ -537,7 +538,8 @@ class Subscription:
         if unix:
             with contextlib.suppress(OSError):
                 return local.connect(unix.name), unix.name
-            # Connecting failed, so the two processes are isolated from each other, for example by a sandbox: use TCP.
+            # Connecting to the Unix socket failed, so the two processes are isolated from each other, for example by
+            # a sandbox: use TCP.
             host, port = unix.host, unix.port
         else:
             host, port = _tcpros_address(answer, uri, self.topic)
@@ -552,7 +554,7 @@ class Subscription:
             deliver(frame, header)
 
         def on_latched_frame(frame: Frame) -> None:
-            # Copy a small frame: it is in a buffer that the next receive overwrites.
+            # Copy a small frame, because it is in a buffer that the next receive overwrites.
             link.latched = frame if len(frame) > CHUNK else bytes(frame)
             on_frame(frame)
 
@@ -566,7 +568,7 @@ class Subscription:
         except (OSError, WireError) as error:
             link.fault = error
         except MemoryError:
-            # There is not enough memory for the message, or for what a callback allocates.
+            # There is not enough memory for the message, or for an object that a callback allocates.
             link.fault = WireError("no memory for a message")
         finally:
             with contextlib.suppress(RuntimeError):

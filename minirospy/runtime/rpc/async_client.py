@@ -385,7 +385,7 @@ class Call:
         self._next = 1
 
     def _send_early(self) -> None:
-        """Send now if the peer is on this machine, because the connection is then open before the loop reports that."""
+        """Send now if the peer is on this machine, because such a connection is open before the loop reports it."""
         assert self._connection
         try:
             sent = self._connection.sock.send(self._left)

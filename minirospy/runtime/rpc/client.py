@@ -18,7 +18,8 @@ __all__ = ["RpcClient", "parse_http_uri"]
 
 _RECEIVE = 65536
 
-# Seconds; the kernel accepts connections even for a busy program, so after this time the server counts as absent
+# Seconds; the kernel accepts connections even for a busy program, so a server that takes longer is considered
+# unreachable
 _CONNECT_SECONDS = 5.0
 
 

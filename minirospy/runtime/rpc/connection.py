@@ -1,4 +1,4 @@
-"""One client of the XML-RPC server: bytes in, requests out, and their responses in order.
+"""One client of the XML-RPC server: parses requests, and sends their responses in order.
 
 This module limits each client; the server (``runtime/rpc/server.py``) accepts clients and limits the memory of all
 clients together.
@@ -47,18 +47,19 @@ _SHORT_BODY = 4096  # bytes; a longer request is read in steps
 _ALONE_BODY = 1024 * 1024
 
 PROGRESS_BYTES = (
-    65536  # transferred bytes that restart the time limit: slow radio needs long for a large value
+    # transferred bytes that restart the time limit, because a slow radio link needs long for a large value
+    65536
 )
 
 _RECEIVE = 4096
 _RECEIVE_MORE = 16384
-"""Bytes per receive, for a new request and for the rest of a long one. The first number is small, because all pipelined
-requests in one receive are parsed before the next client is served.
+"""Bytes per receive, for a new request and for the rest of a long one. The first is small, because all pipelined requests
+in one receive are parsed before the next client is served.
 """
 
 _END_OF_HEAD = b"\r\n\r\n"
 
-# Number of requests processed immediately if several arrive together; the others are processed in steps
+# Number of requests processed immediately if several arrive together; the remaining ones are processed in steps
 _ANSWERS_AT_ONCE = 1
 
 
@@ -278,7 +279,7 @@ class Connection:
         self._go_on()
 
     def _go_on(self) -> None:
-        """Read and process further requests if they were waiting for this response."""
+        """Continue reading requests, and process those that were waiting for this response."""
         if self._enter(Event.ANSWERED):
             self._answer_waiting()
             self._set_deadline()
@@ -466,7 +467,7 @@ class Connection:
         self._count_unread(kept)
         self._set_deadline()
         if self._out.size > MAX_UNREAD:
-            # Send no more responses, and stop reading requests.
+            # Send no more responses and stop reading requests.
             self._enter(Event.UNREAD)
         self._server.limit_unread()
 

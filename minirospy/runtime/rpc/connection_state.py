@@ -32,7 +32,8 @@ class State(Enum):
     REFUSED = "received bytes are ignored, until the client closes the connection or the time is over"
     ENDED = "the socket is closed"
 
-    __hash__ = object.__hash__  # Enum defines a function in Python, which takes longer than a transition
+    # use object's hash, because Enum's is a Python function that takes longer than a transition
+    __hash__ = object.__hash__
 
 
 class Event(Enum):
@@ -47,7 +48,7 @@ class Event(Enum):
     REFUSE = "the client violated the protocol or a limit, and has been sent an error"
     END = "the connection is lost, its time is over, or the server closes"
 
-    __hash__ = object.__hash__  # as in State
+    __hash__ = object.__hash__  # see State
 
 
 _OPEN, _BUSY, _FULL, _CLOSING, _REFUSED, _ENDED = State

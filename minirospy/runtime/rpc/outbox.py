@@ -12,7 +12,7 @@ MAX_UNREAD = 256 * 1024  # bytes; a client with more unread bytes gets no furthe
 
 
 class Outbox:
-    """A queue of bytes to send on a non-blocking socket. It is true if it contains bytes."""
+    """A queue of bytes to send on a non-blocking socket. Truthy while bytes are queued."""
 
     __slots__ = ("_pieces", "_sock", "size")
 

@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 # Maximum total bytes of all clients' incomplete requests and those being read; beyond that the largest are refused
 MAX_HELD = 72 * 1024 * 1024
-LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are not refused because of that limit
+LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are not refused because of MAX_HELD
 
 # Maximum bytes of responses that all clients together have not read; beyond that, the client that has not read
 # anything for the longest time is disconnected
@@ -53,7 +53,7 @@ accepted per iteration, and the seconds that accepting may take.
 Thousands of clients may connect together; the server accepts all of them, 30 us each, before it serves a later one.
 """
 
-_ACCEPTS_BETWEEN = 64  # connections to accept before reading from others
+_ACCEPTS_BETWEEN = 64  # connections to accept before reading from accepted ones
 
 # Connections to read from before accepting new ones, which takes some 1 ms; thousands may be readable together
 _READS_AT_ONCE = 16
@@ -303,7 +303,7 @@ class RpcServer:
             slowest.end()
 
     def _end_longest_silent(self) -> None:
-        """Close a connection that has been silent for long, preferably an idle one."""
+        """Close a connection that has been silent for a long time, preferably an idle one."""
         longest_silent = list(islice(self.connections, 20))
         if longest_silent:
             next((each for each in longest_silent if each.is_idle), longest_silent[0]).end()

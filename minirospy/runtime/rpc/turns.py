@@ -1,4 +1,4 @@
-"""Runs long work on the event loop, for a few milliseconds in each iteration, so that other work is not delayed."""
+"""Run long work on the event loop, for a few milliseconds in each iteration, so that other work is not delayed."""
 
 from __future__ import annotations
 

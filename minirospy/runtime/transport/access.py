@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from minirospy.base.errors import UsageError
 
 if TYPE_CHECKING:
-    # Imported only if networks are given, which is rare.
+    # Imported only for type checking; otherwise imported only if networks are given, which is rare.
     from ipaddress import IPv4Network, IPv6Network
 
 __all__ = ["Access", "listening_lines"]
@@ -20,7 +20,7 @@ class Access:
     def __init__(self, networks: Iterable[str] = ()) -> None:
         """Allow ``networks``, such as 192.168.65.0/24 or a single address. Raise UsageError if one is invalid."""
         self.networks = tuple(_network(text) for text in networks)
-        # A cache, because a robot has few peers, and they connect often.
+        # A cache of decisions by address, because a robot has few peers, and they connect often.
         self._known: dict[str, bool] = {}
 
     @classmethod
@@ -28,7 +28,7 @@ class Access:
         """Parse networks separated by commas or spaces; "" allows all peers. Raise UsageError if one is invalid."""
         networks = text.replace(",", " ").split()
         if text and not networks:
-            # The text may come from unset variables, which must not result in allowing all peers.
+            # The text may come from unset variables: an empty list must not allow all peers.
             raise UsageError(f"'{text}' names no network: write as 192.168.65.0/24, or an address")
         return cls(networks)
 

@@ -22,7 +22,8 @@ def naming_thread_limit() -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
-        # Python raises this while it exits; since 3.13 it raises a separate class.
+        # Let other errors pass: while it exits, Python also raises RuntimeError here; since 3.13 it raises a separate
+        # class.
         if sys.is_finalizing() or type(error) is not RuntimeError:
             raise
         if "interpreter shutdown" in str(error):
@@ -36,7 +37,7 @@ def is_file_limit(error: BaseException | None) -> bool:
 
 
 def explain(error: BaseException) -> str:
-    """Return an error's message; for a file limit add which limit it is and how to raise it."""
+    """Return an error's message; for a file limit, add the limit's name and how to raise it."""
     if not is_file_limit(error):
         return str(error)
     assert isinstance(error, OSError)

@@ -165,7 +165,8 @@ class OutLink:
         """Append ``frame`` to the outbox and return True; return False if the outbox has become empty in the meantime."""
         outbox = self._outbox
         if not self.sent % _GATHER or (self._is_reading and self._is_full()):
-            # Send from here, because a thread that publishes without pause would not let the loop's thread send.
+            # Send from this thread, because a thread that publishes without pause would not let the loop's thread
+            # send.
             self._help()
             if not outbox:
                 return False
@@ -247,7 +248,7 @@ class OutLink:
 
     def _writable(self) -> None:
         if not self._drained.acquire(blocking=False):
-            # A publishing thread is already sending, so the loop does other work.
+            # A publishing thread is already sending, so stop watching the socket for a moment.
             self._loop.remove_writer(self._sock)
             self._loop.call_later(_PUSH_SECONDS, self._start_writing)
             return

@@ -1,8 +1,8 @@
 """Connections between two processes on one machine, through a Unix socket instead of TCP.
 
-Each server port has a Linux abstract socket, whose name is derived from the server's host and port. It is not a
-file, so nothing is left behind when a process is killed. Like the port, it is visible to processes in the same network
-namespace. Source: docs/transports.md.
+Each server port has a Linux abstract socket, whose name is derived from the server's host and port. The socket is not a
+file, so nothing is left behind when a process is killed. Like the port, the socket is visible to processes in the same
+network namespace. Source: docs/transports.md.
 """
 
 from __future__ import annotations

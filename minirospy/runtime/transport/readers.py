@@ -36,7 +36,7 @@ __all__ = ["QueueSize", "ReaderSet", "read_frames", "watch_frames", "watch_frame
 _TURN_CHUNK = 4096  # bytes per receive, and in each connection's buffer, if frames are read in turns
 
 _DRAIN_BYTES = 64 * 1024 * 1024
-# bytes per receive, so that a length prefix does not allocate more memory before the data arrives
+# maximum bytes to allocate per receive, so that a large length prefix alone does not allocate much memory
 _CLAIM = 16 * 1024 * 1024
 
 _WAIT_ALL: int = getattr(socket, "MSG_WAITALL", 0)
@@ -203,8 +203,8 @@ class _FrameSource:
                 count = busy_receive(self.sock, space)
         if count is None:
             count = self.sock.recv_into(space)
-        # This is also false if bytes were ready but this thread had to wait for the GIL: then other threads in this
-        # process need it.
+        # The flag is also False if bytes were ready but this thread had to wait for the GIL, because then other
+        # threads in this process need the GIL.
         self._is_fast = self._may_busy_poll and time.perf_counter() - start < BUSY_POLL_SECONDS
         self._readers.last = self
         return count
@@ -267,7 +267,7 @@ def _deliver_newest(
     while True:
         for frame in frames:
             total += len(frame)
-            # Copy a small frame: it is in the reader's buffer, which the next receive overwrites.
+            # Copy a small frame, because it is in the reader's buffer, which the next receive overwrites.
             kept.append(frame if isinstance(frame, bytes) else bytes(frame))
         if total >= _DRAIN_BYTES or not is_readable(source.sock):
             break

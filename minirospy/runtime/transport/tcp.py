@@ -31,13 +31,13 @@ __all__ = [
     "send_header",
 ]
 
-# Maximum number of handshakes in progress. Another one closes the oldest, because a genuine one takes only
-# milliseconds
+# Maximum number of handshakes in progress. An additional handshake closes the oldest one, because a genuine handshake
+# takes only milliseconds
 MAX_HANDSHAKES = 200
 
 _AT_HAND = 8192
 _SHORT_HEADER = 64 * 1024
-# total bytes of all incomplete headers above _SHORT_HEADER from a node's peers
+# maximum total bytes of incomplete headers above _SHORT_HEADER, for all of a node's peers
 _MAX_LONG_HEADERS = 16 * 1024 * 1024
 
 _REFUSALS_LOGGED = 10
@@ -220,7 +220,7 @@ class Listener:
         def done(finished: asyncio.Task[None]) -> None:
             self.handshakes.pop(finished, None)
             if finished.cancelled():
-                # The task may have been cancelled before its first step.
+                # Close the socket here, because the task may have been cancelled before its first step.
                 peer.close()
 
         task.add_done_callback(done)
@@ -285,7 +285,7 @@ async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | in
 
 
 def _header_at_hand(sock: socket.socket) -> Header | None:
-    """Return a header that has already arrived completely, or None. Most have, which saves a task and a timer."""
+    """Return a header that has already arrived completely, or None. Most headers have, which saves a task and a timer."""
     try:
         seen = sock.recv(_AT_HAND, socket.MSG_PEEK)
     except (BlockingIOError, InterruptedError):

@@ -61,7 +61,7 @@ class Workers:
                     if self._idle:
                         self._idle -= 1
                         return
-                # This worker was claimed just as it was about to exit, so the entry will arrive immediately.
+                # This worker was claimed just as it was about to exit, so its entry is about to arrive.
                 function, args = self._work.get()
 
 

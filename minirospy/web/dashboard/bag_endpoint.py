@@ -68,7 +68,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
         is_starting = self._starting and not self._starting.done()
         if is_starting or (self.recording and not self.recording.state().is_ended):
             raise UsageError("there is a recording already: stop it first")
-        # The page may be closed while the recording starts, and the child process must not be lost then.
+        # The page may be closed while the recording starts, and the child process must then be stopped and not lost.
         self._starting = self.spawn(self._start(name, suffix, topics, compression))
         await asyncio.shield(self._starting)
 
@@ -108,7 +108,7 @@ class BagSession(JsonSession):
         self._endpoint = endpoint
         self._bag: OpenBag | None = None
         self._shown: dict[str, int] = {}
-        """The topics whose messages are sent, each with the time of the last message sent, or -1 if none was."""
+        """Dict from each topic whose messages are sent to the time of the last message sent, or -1 if none was sent."""
         self._thumbnails: deque[tuple[str, int]] = deque()
         self._sent: dict[str, str] = {}
         handlers: Mapping[str, Handler] = {
@@ -141,7 +141,7 @@ class BagSession(JsonSession):
         return 0.0 if self._thumbnails else pause
 
     async def left(self) -> None:
-        """Stop the player, and close the bag."""
+        """Stop the player and close the bag."""
         await self._close_bag()
 
     # --- recording
@@ -164,7 +164,7 @@ class BagSession(JsonSession):
         await self._endpoint.stop()
         return await self._list(fields)
 
-    # --- a bag
+    # --- bag
 
     def _opened(self) -> OpenBag:
         if self._bag is None:
@@ -259,7 +259,7 @@ class BagSession(JsonSession):
         for topic, body in await self.in_thread(lambda: bag.latched_before(new, time)):
             bag.output.send(topic, body)
 
-    # --- what is shown
+    # --- shown messages
 
     async def _show(self, fields: Fields) -> None:
         bag = self._opened()

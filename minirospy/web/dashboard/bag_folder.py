@@ -36,7 +36,7 @@ class FoundBag(NamedTuple):
 
 
 class BagFolder:
-    """A folder with bags; ``given`` are the files on the command line, which may be in any folder."""
+    """A folder with bags; ``given`` lists the files on the command line, which may be in any folder."""
 
     def __init__(self, root: Path, given: Sequence[Path] = ()) -> None:
         self.root = root.absolute()
@@ -68,7 +68,7 @@ class BagFolder:
         return sorted(found.values(), key=lambda bag: bag.modified, reverse=True)
 
     def path_of(self, name: str) -> Path:
-        """Return the file of an existing bag, given its name as in :meth:`bags`. Raise BagError if it does not exist."""
+        """Return the file of an existing bag, by its name from :meth:`bags`. Raise BagError if it does not exist."""
         if name in self._given:
             return self._given[name]
         parts = name.split("/")

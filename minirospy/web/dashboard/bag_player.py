@@ -58,7 +58,7 @@ class GraphOutput:
         return self._clock is not None
 
     def switch(self, timeline: Timeline, topics: Collection[str], *, clock: bool) -> list[str]:
-        """Enable exactly these topics; return one line for each topic that cannot be published."""
+        """Enable exactly the given topics; return one line for each topic that cannot be published."""
         refused = []
         for topic in [each for each in self._publications if each not in topics]:
             self._publications.pop(topic).close()
@@ -118,7 +118,7 @@ class GraphOutput:
         return True
 
     def running(self, on_key: Callable[[str], object]) -> AbstractContextManager[None]:
-        """See :meth:`Output.running`. Reads no keys, because the process does other work."""
+        """See :meth:`Output.running`. Reads no keys, because the terminal belongs to the dashboard's process."""
         return nullcontext()
 
     def publish(self, number: int, message: StoredMessage) -> None:
@@ -156,7 +156,7 @@ class GraphOutput:
         try:
             self._loop.call_soon_threadsafe(run)
         except RuntimeError:
-            # The loop has been closed.
+            # The loop has been closed, so the message was not queued.
             self._free.release()
 
 
@@ -208,7 +208,7 @@ class OpenBag:
         ]
 
     def close(self) -> None:
-        """Stop the player, and close the file."""
+        """Stop the player and close the file."""
         self.player.end()
         if self._thread.ident is not None:
             self._thread.join()

@@ -66,7 +66,7 @@ class BoardSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: the board cannot be changed with it"
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """See :meth:`JsonSession.parse`. The name of an operation's only field is the operation's name."""
+        """See :meth:`JsonSession.parse`. Each operation has a single field, whose name is the operation."""
         (name,) = fields
         return name, fields
 

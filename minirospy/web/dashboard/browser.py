@@ -47,7 +47,7 @@ class LinkFile:
 
     def __init__(self, link: str) -> None:
         """Create the file. Raise OSError if that fails."""
-        # mkdtemp makes the folder accessible only to this user; on Windows by its access control list.
+        # mkdtemp makes the folder accessible only to this user; on Windows it does so by an access control list.
         self._folder = Path(tempfile.mkdtemp(prefix="minirospy-browser-", dir=_parent()))
         self.path = self._folder / "dashboard.html"
         try:
@@ -63,14 +63,14 @@ class LinkFile:
 
 
 def open_link(link: str) -> Callable[[], object] | None:
-    """Open a link without waiting for the browser; return a function that removes its file, or None if nothing was opened.
+    """Open a link without waiting for the browser; return a function that removes the link's file, or None if nothing was opened.
 
     Nothing is opened without a display, or if the file cannot be created.
     """
     if not has_screen(os.environ):
         return None
     if os.environ.get("WSL_DISTRO_NAME"):
-        # A Windows browser cannot open a file given by its Linux path.
+        # Pass the link itself, because a Windows browser cannot open a file by its Linux path.
         return _open(link, lambda: None)
     try:
         file = LinkFile(link)

@@ -4,7 +4,7 @@ A client of the sub-protocol sends ``{"topic", "twist": [x, y, z, roll, pitch, y
 "axes": [...], "buttons": [...]}`` repeatedly while a control is held, and ``{"leave": topic}`` when it no longer drives
 a topic. The server sends ``{"writes": bool}`` first, ``{"stopped": topic}`` after it has stopped a topic because
 commands stopped arriving, and ``{"error": text, "topic"}``. The last message on each topic is a zero velocity, whether
-the control is released or the connection is lost. If a client stops sending, a separate thread publishes it
+the control is released or the connection is lost. If a client stops sending, a separate thread publishes this message
 (:mod:`minirospy.runtime.stop_guard`), even if the event loop is blocked.
 """
 
@@ -53,7 +53,7 @@ _MAX_TOPICS = 20
 _MAX_VALUES = 100
 _MAX_COMMAND_LENGTH = 20_000  # maximum number of characters in a command
 
-_MAX_AXIS = 3.4028234663852886e38  # largest float32
+_MAX_AXIS = 3.4028234663852886e38  # largest finite float32
 
 
 @dataclass(frozen=True)
@@ -258,7 +258,7 @@ class _Driven:
     def hold(self, held: Velocity | Joystick) -> None:
         """Publish a command, and a zero velocity if no further command arrives in time.
 
-        Raise BridgeError, and publish nothing, if a later stop cannot be guaranteed.
+        Raise BridgeError and publish nothing if a later stop cannot be guaranteed.
         """
         deadline = math.inf if held.is_zero else time.monotonic() + SILENT_SECONDS
         if held.is_zero:

@@ -109,7 +109,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self.changed()
 
     async def close(self) -> None:
-        """End all sessions, and stop publishing. Idempotent."""
+        """End all sessions and stop publishing. Idempotent."""
         await super().close()
         working, self._working = self._working, None
         tasks = [*self._sources, *([working] if working else [])]
@@ -120,12 +120,12 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             await self._publisher.close()
             self._publisher = None
 
-    # --- the joints
+    # --- joints
 
     def start_work(self) -> None:
         """Start the task that follows the parameters and publishes.
 
-        It runs while there are clients or ``always_publishes``.
+        The task runs while there are clients, or always if ``always_publishes`` is set.
         """
         if self._working is None or self._working.done():
             self.is_publishing = self.is_publishing or self.always_publishes
@@ -158,7 +158,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         self._follow([])
 
     async def load(self, *, is_forced: bool = False) -> None:
-        """Read the parameters, and parse the description again if one has changed.
+        """Read the parameters. If one has changed, parse the description again.
 
         Raise MinirospyError if the master cannot be reached.
         """
@@ -184,7 +184,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
             parameters = read_parameters(
                 lambda name, default: values.get(f"~{name}", values.get(name, default)), zeros
             )
-            # Parsing a large description takes seconds.
+            # Parse in a thread, because parsing a large description takes seconds.
             loop = asyncio.get_running_loop()
             joints, robot, kinds = await loop.run_in_executor(None, _described, parameters, warnings.append)
         except (JointError, UrdfError) as error:
@@ -208,7 +208,7 @@ class JointEndpoint(JsonEndpoint["JointSession"]):
         return [topic for topic in sources if not why_illegal(topic)]
 
     def _follow(self, topics: Sequence[str]) -> None:
-        """Subscribe to exactly these topics of source_list."""
+        """Subscribe to exactly these topics from source_list."""
         from sensor_msgs.msg import JointState
 
         for task in self._sources:

@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 
 _MAX_ERROR_LENGTH = 1000
 _VALUE_FACTOR = 4
-"""Memory that a parsed operation takes, in bytes per byte of its string, for objects and lists of numbers."""
+"""Memory that a parsed operation uses, in bytes per byte of its JSON string; measured for objects and lists of numbers."""
 
 _INTERNAL_ERROR = 1011  # WebSocket close code for an internal error, RFC 6455, section 7.4.1
 
@@ -133,7 +133,7 @@ class JsonSession:
         """Send an operation's result."""
         self.client.send_text(json.dumps(answer))
 
-    # --- from the connection
+    # --- called by the connection
 
     def received_text(self, text: str) -> None:
         """Parse and queue an operation."""
@@ -180,7 +180,7 @@ class JsonSession:
             with contextlib.suppress(RuntimeError):  # the loop has been closed
                 self._loop.call_soon_threadsafe(self.changed)
 
-    # --- the session's task
+    # --- session task
 
     async def _run(self) -> None:
         try:
@@ -219,7 +219,7 @@ class JsonSession:
             except Exception as error:  # noqa: BLE001 - it may succeed the next time; until then the page says so
                 self._reporter.report(error)
                 if not self._has_failed:
-                    # Show other errors' messages only on the terminal, because they may contain details that clients
+                    # Log other errors' messages only on the terminal, because they may contain details that clients
                     # must not see.
                     why = (
                         _line(error) if isinstance(error, MinirospyError | OSError) else type(error).__name__
@@ -231,7 +231,7 @@ class JsonSession:
                 self._next_look = min(self._next_look, now + pause)
 
     async def carry_out(self, name: str, fields: Fields) -> None:
-        """Execute an operation, and send its result or its error."""
+        """Execute an operation and send its result or its error."""
         try:
             answer = await self._handlers[name](fields)
         except (MinirospyError, OSError) as error:
@@ -311,7 +311,7 @@ class JsonEndpoint(Generic[_S]):
             _log.error("%s: %s", type(self).__name__, error, exc_info=error)
 
     async def close(self) -> None:
-        """End all sessions, and wait for their tasks. Idempotent."""
+        """End all sessions and wait for their tasks. Idempotent."""
         self.is_closed = True
         sessions = list(self.sessions)
         for session in sessions:

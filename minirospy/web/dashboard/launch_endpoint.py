@@ -31,7 +31,7 @@ __all__ = ["SUBPROTOCOL", "LaunchEndpoint", "LaunchSession"]
 SUBPROTOCOL = "minirospy.launch.v1"
 
 _LOG_SECONDS = 0.2
-"""Poll interval in seconds for a log file that a page shows, because a file reports no changes."""
+"""Poll interval in seconds for a log file that a page shows; polling is necessary, because a file reports no changes."""
 
 _STOPPING_SECONDS = 0.2
 _MAX_RUNS = 50
@@ -65,9 +65,10 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         self.changed()
 
     async def restart(self, run: LaunchRun) -> None:
-        """Stop a launch, and start its file again with the same arguments.
+        """Stop a launch and start its file again with the same arguments.
 
-        Do nothing if another client is restarting or has restarted it. Raise UsageError if the file cannot be started.
+        Do nothing if another client is restarting the launch or has restarted it. Raise UsageError if the file cannot be
+        started.
         """
         if run.id in self._restarting or run.id not in self.runs:
             return
@@ -88,7 +89,7 @@ class LaunchEndpoint(JsonEndpoint["LaunchSession"]):
         super().changed()
 
     async def close(self) -> None:
-        """End all sessions and all launches, and wait until they have ended."""
+        """End all sessions and all launches and wait until they have ended."""
         self.is_closed = True
         runs = list(self.runs.values())
         for run in runs:
@@ -113,7 +114,7 @@ class _Tail:
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)
-        # Query this before reading, so that everything the node wrote before it exited is in the file.
+        # Query this before reading, so that the file contains everything that the node wrote before it exited.
         has_exited = self.run.has_exited(self.node)
         path = self.run.log_file(self.node)
         if path is None:
@@ -162,7 +163,7 @@ class LaunchSession(JsonSession):
 
     async def follow(self) -> float | None:
         """Send the launches, if one has changed, and new lines of the log."""
-        # Check this before sending, so that a change after the check triggers another call.
+        # Query this before sending, so that a change in the meantime triggers another call.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()
         is_growing = await self._send_log()
@@ -242,7 +243,7 @@ class LaunchSession(JsonSession):
             found = {"log": {"id": tail.run.id, "node": tail.node}, "text": text, "isFirst": tail.is_first}
             tail.is_first = False
             self.send(found)
-        # The file may contain more than one read returns.
+        # The file may contain more data than one read returns.
         return is_growing or bool(tail.node and text)
 
 

@@ -45,9 +45,9 @@ class LaunchFiles:
         return sorted(found)
 
     def path_of(self, file: LaunchFile) -> Path:
-        """Return the path of a launch file that was found.
+        """Return the path of a launch file.
 
-        Raise NotFoundError if it was not found, because such files must not be started.
+        Raise NotFoundError if :meth:`scan` has not found it, because such files must not be started.
         """
         if not self._found:
             self.scan()

@@ -21,10 +21,14 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""Timeouts in seconds for stopping. They are long, because after SIGINT the file is completed, possibly on a slow disk."""
+"""Timeouts in seconds for stopping. The timeouts are long, because after SIGINT the file is completed, possibly on a slow
+disk.
+"""
 
 TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
-"""Short timeouts while no file is open: a starting interpreter may lose a SIGINT that arrives in a callback of importlib."""
+"""Timeouts while no file is open. The timeouts are short, because a starting interpreter may lose a SIGINT that arrives in
+a callback of importlib.
+"""
 
 _MAX_LINES = 20
 COMPRESSIONS = {".bag": {"none": [], "lz4": ["--lz4"], "bz2": ["--bz2"]},
@@ -49,7 +53,7 @@ class RecordingState(NamedTuple):
 class Recording:
     """A process that runs `rosbag record` into ``path``, whose suffix is .bag or .mcap.
 
-    Raise MinirospyError if it cannot be started.
+    Raise MinirospyError if the process cannot be started.
     """
 
     def __init__(self, path: Path, topics: Sequence[str], compression: str, master_uri: str) -> None:
@@ -142,7 +146,7 @@ class Recording:
         return RecordingState(self._path.name, self._topics, seconds, size, status is not None, error)
 
     async def stop(self) -> None:
-        """Stop the recording, and wait until the file is complete. Idempotent."""
+        """Stop the recording and wait until the file is complete. Idempotent."""
         await asyncio.get_running_loop().run_in_executor(None, self._stop)
 
     def _stop(self) -> None:

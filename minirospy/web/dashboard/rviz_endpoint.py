@@ -71,7 +71,10 @@ class RvizEndpoint(JsonEndpoint["RvizSession"]):
         super().__init__(SUBPROTOCOL, lambda client: RvizSession(self, client))
         self.file = file
         self.thread = ThreadPoolExecutor(1, "rviz-files")
-        """One thread for all sessions, because parsing in parallel would delay the loop longer, and saves could conflict."""
+        """The thread for all sessions.
+
+        There is only one, because parsing in parallel would delay the loop longer, and saves could conflict.
+        """
 
     async def close(self) -> None:
         """End all sessions after completing the saves in progress."""
@@ -80,7 +83,7 @@ class RvizEndpoint(JsonEndpoint["RvizSession"]):
 
 
 class RvizSession(JsonSession):
-    """One client's session; its operations read and parse in the endpoint's thread."""
+    """One client's session. Its operations are read and parsed in the endpoint's thread."""
 
     subject: ClassVar[str] = ".rviz files"
     longest: ClassVar[int] = 600_000
@@ -97,7 +100,7 @@ class RvizSession(JsonSession):
         super().__init__(client, handlers)
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """See :meth:`JsonSession.parse`. The name of an operation's only field is the operation's name."""
+        """See :meth:`JsonSession.parse`. Each operation has a single field, whose name is the operation."""
         (name,) = fields
         return name, fields
 

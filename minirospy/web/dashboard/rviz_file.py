@@ -46,7 +46,7 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
     try:
         value = _built(yaml.parse(text, Loader=_LOADER), name)
     except yaml.MarkedYAMLError as error:
-        # If something is missing at the end of the file, the compiled parser reports the line after the last one.
+        # If the end of the file is missing, the compiled parser reports the line after the last one.
         line = min(error.problem_mark.line, text.count("\n")) + 1 if error.problem_mark else 1
         raise RvizFileError(name, line, f"not YAML: {error.problem}") from None
     except (yaml.YAMLError, ValueError) as error:
@@ -60,7 +60,8 @@ def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
 def _built(events: Iterator[Event], name: str) -> object:
     """Return the document's value. Raise RvizFileError if it is invalid."""
     result: list[object] = []
-    # The open collections, each with the key that has no value yet; the first one is the stream.
+    # The open collections, each with the keys whose values have not been parsed yet; the first collection is the
+    # stream.
     stack: list[tuple[list[object] | dict[str, object], list[str]]] = [(result, [])]
     for event in events:
         line = event.start_mark.line + 1 if event.start_mark else 0

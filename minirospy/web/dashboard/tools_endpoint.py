@@ -40,7 +40,7 @@ SUBPROTOCOL = "minirospy.tools.v1"
 _T = TypeVar("_T")
 _log = logging.getLogger(__name__)
 
-# bool must come first, because it is a subclass of int.
+# List bool first, because it is a subclass of int.
 _TYPE_NAMES: Mapping[type, str] = {
     bool: "bool", int: "int", float: "double", str: "string", bytes: "binary", list: "list", tuple: "list", dict: "dictionary",
 }  # fmt: skip
@@ -102,7 +102,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         while True:
             started = time.monotonic()
             try:
-                # Use one thread, so that if a survey is cancelled, the next one waits until it has ended.
+                # Use one thread, so that after a cancelled survey the next one waits until the first has ended.
                 now = await asyncio.get_running_loop().run_in_executor(self._surveyor, self._survey)
             except (MinirospyError, OSError) as error:
                 fields: Mapping[str, object] = {"trouble": str(error)}

@@ -1,4 +1,4 @@
-"""The views of the page, and links to them. Pure.
+"""A view and its settings are in the link's fragment, which browsers do not send, so that the token in it is not logged.
 
 A view and its settings are in the link's fragment, which browsers do not send, so that the token in it is not logged.
 """

@@ -1,4 +1,4 @@
-"""Files for clients: meshes and images that a robot description refers to. They are read only from known packages."""
+"""Files for clients: meshes and images that a robot description refers to. The files are read only from known packages."""
 
 from __future__ import annotations
 

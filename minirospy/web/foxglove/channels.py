@@ -14,7 +14,9 @@ from minirospy.web.graph import SharedGraph
 __all__ = ["Channels", "Services"]
 
 TYPE_SECONDS = 3.0
-"""Timeout in seconds for querying topic types that are not installed. It is short because all clients wait for the channels."""
+"""Timeout in seconds for querying topic types that are not installed. The timeout is short, because all clients wait for
+the channels.
+"""
 
 
 class Channels:
@@ -64,7 +66,7 @@ class Channels:
             else:
                 others[topic] = snapshot.publishers.get(topic, ())
 
-        # If no publisher responds in time, the type is taken from the first message.
+        # If no publisher responds in time, the type will be taken from the first message.
         found = await graph.texts.of_publishers(others, TYPE_SECONDS)
         new += [
             self._add(topic, wanted[topic], found.get(topic) or InterfaceType(wanted[topic], ANY))
@@ -75,8 +77,8 @@ class Channels:
     def redefine(self, channel: Channel, header: Header) -> Channel | None:
         """Return a replacement for a channel whose publisher sends messages with another definition.
 
-        Return None if the channel has been removed. Also return None if it was replaced before, because that means that
-        its publishers contradict each other.
+        Return None if the channel has been removed, or if it was replaced before, because its publishers then contradict
+        each other.
         """
         md5sum = header.get("md5sum", ANY)
         if self.by_id.get(channel.id) is not channel or md5sum in self._definitions[channel.topic]:

@@ -36,7 +36,10 @@ _DROP_REPORT_SECONDS = 2.0
 
 @dataclass(frozen=True)
 class FoxgloveOptions:
-    """``name`` is the server's name that clients show; ``session_id`` is different for each start of the bridge."""
+    """The options of the endpoint.
+
+    ``name`` is the server's name that clients show; ``session_id`` is different for each start of the bridge.
+    """
 
     name: str = "minirospy bridge"
     capabilities: Sequence[str] = CAPABILITIES
@@ -110,7 +113,7 @@ class FoxgloveEndpoint:
         if not self.sessions:
             self._stop()
 
-    # --- for sessions
+    # --- called by sessions
 
     def capabilities_of(self, client: WebClient) -> list[str]:
         """Return a client's capabilities."""
@@ -137,7 +140,7 @@ class FoxgloveEndpoint:
         for session in list(self.sessions):
             session.client.send_binary(serializing.playback_state(state))
 
-    # --- within
+    # --- internals
 
     def _start(self) -> None:
         self.graph.watch(self._graph_changed)

@@ -64,7 +64,7 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
 
 
 def _capabilities(names: Sequence[str]) -> list[str]:
-    """Return the capabilities with these names; "time" depends on /use_sim_time, as in the real bridge."""
+    """Return the capabilities for the configured names; "time" depends on /use_sim_time, as in the real bridge."""
     unknown = [name for name in names if name not in (*CAPABILITIES, "time")]
     if unknown:
         raise BridgeError(f"~capabilities: {', '.join(unknown)}: known are {', '.join(CAPABILITIES)}")

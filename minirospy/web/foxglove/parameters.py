@@ -72,7 +72,7 @@ class Parameters:
         return failed
 
     def subscribe(self, listener: ParameterListener, names: tuple[str, ...]) -> None:
-        """Report changes to these parameters, or to all if ``names`` is empty, to a client."""
+        """Report changes of these parameters, or of all if ``names`` is empty, to ``listener``."""
         before = self._wanted.get(listener, set())
         self._wanted[listener] = None if not names or before is None else before | set(names)
         if not self._is_watching:
@@ -114,7 +114,8 @@ class Parameters:
         allowed = self._graph.filters.parameters
         is_empty = value == {}
         leaves = [] if is_empty else [leaf for leaf in _leaves(name.rstrip("/"), value) if allowed(leaf[0])]
-        # The master's notification does not distinguish a deleted namespace from an empty one, so read the value.
+        # The master's notification does not distinguish a deleted namespace from an empty one, so read the value from
+        # the master.
         emptied = name if is_empty and name != _ROOT and allowed(name) else ""
         again = {emptied} - {""}
         for listener, names in list(self._wanted.items()):

@@ -72,7 +72,7 @@ def server_info(
 
 
 def status(level: StatusLevel, message: str, id_: str | None = None) -> str:
-    """Return a status message; a later message with the same id replaces it."""
+    """Return a status message. Clients replace it when a later message has the same id."""
     fields: dict[str, object] = {"op": "status", "level": int(level), "message": message}
     if id_ is not None:
         fields["id"] = id_

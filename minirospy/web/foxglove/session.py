@@ -53,9 +53,9 @@ _MAX_PARAMETERS = 10_000
 # maximum per client message, because a message may name thousands of nonexistent channels
 _MAX_STATUSES = 100
 _VALUE_FACTOR = 4
-"""Memory that a parsed operation takes, in bytes per byte of its string, for objects and lists of numbers."""
+"""Memory that a parsed operation uses, in bytes per byte of its JSON string; measured for objects and lists of numbers."""
 
-_TIME = "time"  # key of time messages in a client's queue, so that only the newest one is kept
+_TIME = "time"  # key of time messages in a client's queue, which keeps only the newest one
 
 
 class FoxgloveServer(Protocol):
@@ -72,7 +72,7 @@ class FoxgloveServer(Protocol):
         """Return a client's capabilities."""
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
-        """Replace a channel whose publisher's messages have another definition than the installed type."""
+        """Replace a channel if its publisher's definition differs from that of the installed type."""
 
     def playback_changed(self, state: PlaybackState) -> None:
         """Send a player's state to all clients."""
@@ -82,7 +82,7 @@ class FoxgloveServer(Protocol):
 
 
 class FoxgloveSession:
-    """One client's state. The client's connection calls it on the loop."""
+    """One client's state. The client's connection calls the methods on the loop."""
 
     def __init__(self, endpoint: FoxgloveServer, client: WebClient) -> None:
         self.client = client
@@ -116,7 +116,7 @@ class FoxgloveSession:
             protocol.PlaybackControl: self._control_playback,
         }
 
-    # --- from the connection
+    # --- called by the connection
 
     def received_text(self, text: str) -> None:
         """Handle a JSON message."""
@@ -141,7 +141,7 @@ class FoxgloveSession:
         self._endpoint.parameters.forget(self)
         self._endpoint.left(self)
 
-    # --- from the endpoint
+    # --- called by the endpoint
 
     def send(self, text: str) -> None:
         """Send a JSON message."""
@@ -181,7 +181,7 @@ class FoxgloveSession:
         """Report changes of parameters."""
         self.send(serializing.parameter_values(changed))
 
-    # --- within
+    # --- internals
 
     def _handle(self, parse: Callable[[Any], Event], data: str | bytes) -> None:
         self._statuses = 0

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ClientPublications"]
 
-_LARGE_LATCHED = 100_000  # bytes; a larger latched message is not kept after its publisher has left
+_LARGE_LATCHED = 100_000  # maximum bytes of a latched message that is kept after its publisher has left
 
 
 @dataclass

@@ -37,7 +37,7 @@ class ClientServices:
         self._reporter = ErrorReporter(_log, "a client's call of a service")
 
     def close(self) -> None:
-        """Stop offering the client's services. Its calls are tasks of the session, which cancels them."""
+        """Stop offering the client's services. The client's calls are tasks of the session, which cancels them itself."""
         shared = self._session.shared
         for name, service in list(shared.services.items()):
             if service.owner is self._session:
@@ -58,7 +58,7 @@ class ClientServices:
             self._session.count()
 
         self._session.spawn(self._call(event, is_large=self._session.is_large)).add_done_callback(ended)
-        # Do this last, because it closes the client, and cancels the call, if the limit is exceeded.
+        # Report the memory last, because this closes the client, and cancels the call, if the limit is exceeded.
         self._session.count()
 
     async def _call(self, event: protocol.CallService, *, is_large: bool) -> None:

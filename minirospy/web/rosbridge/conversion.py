@@ -1,7 +1,7 @@
 """Convert messages to dictionaries, for JSON and CBOR, and back, with rosbridge's rules and error messages. Pure.
 
-uint8[] and char[] become base64 (bytes in CBOR), NaN and infinities null (in JSON), times {secs, nsecs}. Source:
-ROSBRIDGE_PROTOCOL.md, and the responses of rosbridge_library.
+uint8[] and char[] become base64 (in CBOR: bytes), NaN and infinities become null (in JSON), and times become {secs,
+nsecs}. Source: ROSBRIDGE_PROTOCOL.md, and the responses of rosbridge_library.
 """
 
 from __future__ import annotations
@@ -140,7 +140,10 @@ def fill(message: Message, found: object, now: Callable[[], Time]) -> None:
 
 
 def request_values(message: Message, arguments: object) -> Mapping[str, object]:
-    """Return the request's fields from the arguments of a call: a dictionary, or a list in order; otherwise no fields."""
+    """Return the request's fields from the arguments of a call: a dictionary, or a list in order.
+
+    For other arguments, return no fields.
+    """
     if isinstance(arguments, dict):
         return arguments
     if isinstance(arguments, list):

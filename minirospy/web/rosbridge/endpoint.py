@@ -59,4 +59,4 @@ class RosbridgeEndpoint:
 
 
 def _ignore(_: Changes) -> None:
-    """Do nothing, because sessions look at the graph when they need it."""
+    """Do nothing, because sessions query the graph when they need it."""

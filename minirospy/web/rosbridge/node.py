@@ -1,6 +1,6 @@
 """`rosrun rosbridge_server rosbridge_websocket`: rosbridge as a node for launch files, with the real node's parameters.
 
-Tokens come from the environment, as those of foxglove_bridge. Source: http://wiki.ros.org/rosbridge_suite.
+As for foxglove_bridge, tokens come from the environment. Source: http://wiki.ros.org/rosbridge_suite.
 """
 
 from __future__ import annotations
@@ -95,7 +95,10 @@ def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> Bri
 
 
 def _size(private: Mapping[str, object]) -> int | None:
-    """Return the size above which messages to clients are sent in fragments; rosbridge's parameter limits only those."""
+    """Return the size above which messages to clients are sent in fragments.
+
+    As in rosbridge, the parameter limits only messages to clients.
+    """
     if private.get("max_message_size") in (None, "None", ""):
         return None
     most = value(private, "max_message_size", int, 0)

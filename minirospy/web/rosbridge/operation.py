@@ -40,7 +40,7 @@ REFUSALS = (MinirospyError, ServiceException, ROSSerializationException, Message
 """Exceptions in an operation that are reported to the client."""
 
 Work = Coroutine[object, object, None]
-"""The rest of an operation that must wait for something."""
+"""The rest of an operation that must wait, for example for the graph."""
 
 
 class OperationSession(Protocol):

@@ -16,7 +16,7 @@ from minirospy.base.errors import BridgeProtocolError
 __all__ = ["decode", "encode"]
 
 _MAX_PIXELS = 5_600_000
-"""Maximum pixels in a client's image: 17 MB of text, which takes four times the memory if it contains wide characters."""
+"""Maximum pixels in a client's image, which decode to 17 MB of text (3 bytes per pixel); wide characters quadruple the memory."""
 
 
 def encode(text: str) -> str:

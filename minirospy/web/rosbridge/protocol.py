@@ -67,7 +67,7 @@ _SHOWN = 200
 
 
 class StatusLevel(IntEnum):
-    """The severity of a status message; a client receives those up to the level that it has set."""
+    """The severity of a status message; a client receives the messages up to the level that it has set."""
 
     NONE = 0
     ERROR = 1
@@ -151,7 +151,7 @@ class CallService(ServiceEvent):
 
 @dataclass(frozen=True)
 class ServiceResponse(ServiceEvent):
-    """Respond to a call; if ``result`` is false, ``values`` is an error message."""
+    """Respond to a call; if ``result`` is False, ``values`` is an error message."""
 
     values: object
     result: bool
@@ -196,7 +196,7 @@ class Auth(Event):
 Fields = Mapping[str, Any]
 
 
-# --- in
+# --- parsing
 
 
 def is_quick(data: str | bytes) -> bool:
@@ -273,7 +273,7 @@ def _text_of(value: object, most: int) -> str:
 
 
 def _cut(value: object, most: int, numbers: Iterator[int]) -> object:
-    """Return only the first values in a value from JSON or CBOR, because each one takes at least one character."""
+    """Return only the first items of a value from JSON or CBOR, because each item takes at least one character."""
     # The quotes around a string depend on the quotes in it, including those in the part cut off.
     if isinstance(value, str) and len(value) > most:
         return value[:most] + "".join(quote for quote in "'\"" if quote in value)
@@ -460,7 +460,7 @@ OPERATIONS = (
 """The operations that clients may send, in the order in which errors list them."""
 
 
-# --- out
+# --- encoding
 
 
 def encode(
@@ -519,7 +519,7 @@ def status(level: StatusLevel, text: str, id_: Id = None) -> dict[str, object]:
 
 
 def service_response(service: str, values: object, id_: Id, *, result: bool) -> dict[str, object]:
-    """Return the response to a call; if ``result`` is false, ``values`` is an error message."""
+    """Return the response to a call; if ``result`` is False, ``values`` is an error message."""
     fields: dict[str, object] = {
         "op": "service_response",
         "service": service,

@@ -42,14 +42,14 @@ _FAILED = 1011
 
 
 class _Pending(NamedTuple):
-    """The rest of an operation that must wait for something. ``event`` is None if the work reports its errors itself."""
+    """The rest of an operation that must wait. ``event`` is None if the work reports its errors itself."""
 
     event: Event | None
     work: Work
 
 
 class RosbridgeSession:
-    """The session of one client; its connection calls it on the loop.
+    """The session of one client. The client's connection calls the methods on the loop.
 
     Operations are executed in the order of arrival: if one has to wait (for the graph, or for the subscribers of a new topic),
     later operations wait too, except for service calls.
@@ -58,12 +58,12 @@ class RosbridgeSession:
     def __init__(
         self, shared: RosbridgeShared, client: WebClient, on_end: Callable[[RosbridgeSession], None]
     ) -> None:
-        """``on_end`` is called with the session once its client has disconnected."""
+        """Create the session; ``on_end`` is called with it once its client has disconnected."""
         self.client = client
         self.shared = shared
         self.graph = shared.graph
         self.connected = shared.graph.node.now()  # time when the client connected, for /connected_clients
-        self.budget = Budget()  # for messages on topics whose rate the client limits
+        self.budget = Budget()  # budget of bytes for queued messages on topics whose rate the client limits
         self.operation_size = 0  # bytes of memory of the current operation
         # True if the current operation's message is large: a thread then creates the ROS message, too
         self.is_large = False
@@ -95,7 +95,7 @@ class RosbridgeSession:
             protocol.Auth: self._auth,
         }
 
-    # --- from the connection
+    # --- called by the connection
 
     def received_text(self, text: str) -> None:
         """Process a JSON message."""
@@ -120,7 +120,7 @@ class RosbridgeSession:
             task.cancel()
         self._on_end(self)
 
-    # --- for services and topics
+    # --- called by services and topics
 
     def send(self, fields: Mapping[str, object]) -> None:
         """Send a message that does not belong to a topic's stream."""
@@ -142,7 +142,7 @@ class RosbridgeSession:
             shown = text if id_ is None else f"[id: {id_}] {text}"
             self.shared.log.warning("[Client %s] %s", self.client.name, shown)
 
-    # --- one operation after the other
+    # --- sequential execution
 
     def count(self) -> None:
         """Report the memory used for the client to the server's account."""
@@ -288,7 +288,7 @@ class RosbridgeSession:
         self.shared.log.warning("Client %s did not authenticate. Closing connection.", self.client.name)
         self.client.close(_POLICY, "not authenticated")
 
-    # --- for handlers of operations
+    # --- called by operation handlers
 
     async def type_of(self, topic: str) -> str:
         """Return a topic's type in the graph. Raise BridgeError if it has none."""

@@ -25,7 +25,7 @@ _LOG_LINES = 20
 
 # maximum bytes of a message that is encoded immediately; 8,000 numbers take 8 ms
 _MAX_QUICK_BODY = 64 * 1024
-# maximum bytes of an image that is encoded immediately; in base64 it takes 3 ms
+# maximum bytes of an image that is encoded immediately; encoding it in base64 takes 3 ms
 _MAX_QUICK_IMAGE = 1024 * 1024
 _IMAGES = {
     "sensor_msgs/Image",
@@ -37,7 +37,7 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class RosbridgeOptions:
-    """``fragment_timeout`` and ``unregister_timeout`` are in seconds.
+    """The options of the rosbridge server. ``fragment_timeout`` and ``unregister_timeout`` are in seconds.
 
     ``fragment_size`` is the maximum number of characters in a message to clients; None disables fragments.
     """
@@ -57,7 +57,7 @@ class _LargeWork:
         self._is_busy = asyncio.Lock()
 
     async def __call__(self, work: Callable[[], _T]) -> _T:
-        """Run ``work`` in the thread, and return its result."""
+        """Run ``work`` in the thread and return its result."""
         # Do not queue work in the executor: if a client leaves while its work waits here, the message is freed
         # immediately.
         async with self._is_busy:
@@ -112,7 +112,7 @@ class RosbridgeShared:
         return task
 
     async def free_service(self, name: str, why: str) -> None:
-        """Close the service that a client offers with this name, and wait until the name is free."""
+        """Close the service that a client offers with this name and wait until the name is free."""
         while name in self.services or name in self._closing:
             if name in self.services:
                 self.close_service(self.services[name], why)
@@ -134,7 +134,7 @@ class RosbridgeShared:
         return len(body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
 
     def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
-        """Return a message as clients receive it, encoded once for all of them. Raise BridgeError if that is not possible."""
+        """Return a message as clients receive it, encoded once for all clients. Raise BridgeError if it cannot be encoded."""
         found = self._encodings(topic, arrival)
         made = found.get(compression)
         if made is None:

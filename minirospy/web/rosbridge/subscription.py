@@ -36,7 +36,7 @@ class Merged:
 
 
 def merge(subscriptions: Iterable[Subscribe]) -> Merged:
-    """Return parameters for all subscriptions: the shortest interval, queue and fragments, and the strongest compression."""
+    """Merge the subscriptions: the shortest interval, the smallest queue and fragment size, and the strongest compression."""
     each = tuple(subscriptions)
     sizes = [one.fragment_size for one in each if one.fragment_size is not None]
     return Merged(
@@ -49,7 +49,7 @@ def merge(subscriptions: Iterable[Subscribe]) -> Merged:
 
 @dataclass
 class Budget:
-    """The bytes of messages that a client's topics hold back, and their maximum."""
+    """The bytes of messages that a client's topics queue to limit their rates, and the maximum."""
 
     most: int = DEFAULT_LIMIT
     taken: int = 0
@@ -58,7 +58,7 @@ class Budget:
 class Pacer(Generic[_T]):
     """Limits a topic's rate to one message per ``throttle`` seconds.
 
-    The newest ``queue_length`` messages are queued, others are dropped.
+    The newest ``queue_length`` messages are queued, older ones are dropped.
     """
 
     def __init__(self, budget: Budget, size_of: Callable[[_T], int]) -> None:

@@ -51,7 +51,7 @@ class ClientTopic:
         self._update()
         self._shared.graph.subscribe(self._topic, self._arrived)
         if not is_first:
-            # This was a second subscription, made only because each subscription receives the latched messages.
+            # Cancel the additional subscription, which was made only to receive the latched messages again.
             self._shared.graph.unsubscribe(self._topic, self._arrived)
 
     def remove(self, id_: object) -> None:
@@ -99,7 +99,8 @@ class ClientTopic:
         self._wait()
 
     def _send(self, arrival: Arrival) -> None:
-        # Encoding a large message, and splitting it into fragments, takes milliseconds per client.
+        # Encode in the client's turn, because encoding a large message, and splitting it into fragments, takes
+        # milliseconds per client.
         self._session.client.in_turn(lambda: self._send_now(arrival), arrival.body)
 
     def _send_now(self, arrival: Arrival) -> None:

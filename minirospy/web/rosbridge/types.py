@@ -1,4 +1,4 @@
-"""Find message and service classes by the names that clients send, with rosbridge's errors, or for publishers' messages."""
+"""Find message and service classes by the names that clients send (with rosbridge's errors), or by publishers' headers."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ the limit is exceeded, the client that uses the most memory, at the address that
 first messages that may be dropped, then its connection. The owner's clients are chosen last. Therefore no client can
 use up the memory, or cause another client to be disconnected.
 
-The same large piece, such as a camera image, may be queued for many clients; it counts only once.
+A large piece, such as a camera image, that is queued for many clients counts only once.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Share:
                 self._account.enforce()
 
     def hold(self, pieces: Sequence[Piece]) -> None:
-        """Count those of the pieces that are large."""
+        """Count the large pieces among ``pieces``."""
         self.large += self._account.hold(pieces)
 
     def release(self, pieces: Sequence[Piece]) -> None:
@@ -92,7 +92,7 @@ class Account:
         share.size = 0
 
     def hold(self, pieces: Sequence[Piece]) -> int:
-        """Count those of the pieces that are large; return their total bytes."""
+        """Count the large pieces among ``pieces``; return their total bytes."""
         found = 0
         for piece in pieces:
             size = len(piece)
@@ -119,7 +119,7 @@ class Account:
     def enforce(self) -> None:
         """Make clients release memory until the total is within the limit."""
         if self._is_enforcing:
-            return  # releasing memory calls this method again
+            return  # releasing memory calls this method recursively
         self._is_enforcing = True
         try:
             while self.total > self.limit:

@@ -3,10 +3,10 @@
 An attacker occupies connections: it opens them and sends no request, or is served and then sends nothing, or only occasionally
 a little. It has few addresses and no token. Therefore connections are closed in this order:
 
-1. a connection without a request that is older than some seconds, or whose address has too many of these;
-2. a client that has sent and received nothing for some time: the longest idle one at the address with the most connections;
-3. for an address with few connections, a client of an address that has more than half of all connections;
-4. for the owner, any client of another user.
+1. a connection without a request that is older than some seconds, or whose address has too many such connections; 2. a
+client that has sent and received nothing for some time: the longest idle one at the address with the most connections;
+3. for an address with few connections, a client of an address that has more than half of all connections; 4. for the
+owner, any client of another user.
 
 A client is closed only for a connection whose rights are at least equal.
 """
@@ -24,7 +24,7 @@ __all__ = ["Occupant", "Rank", "displaced", "rank_of"]
 
 # seconds within which a client should send its request; a browser opens some connections in advance
 SILENT_SECONDS = 5.0
-# maximum connections per address without a request that are younger than this; a browser opens six
+# maximum connections per address that have sent no request and are younger than SILENT_SECONDS; a browser opens six
 MAX_SILENT = 16
 # seconds without traffic after which a client is idle; pages send or receive something more often
 IDLE_SECONDS = 30.0
@@ -94,7 +94,7 @@ def displaced(peer: str, rank: Rank, occupants: Iterable[_O], now: float) -> _O 
 
 
 def _of_heaviest(occupants: list[_O]) -> list[_O]:
-    """Return the connections of the address that has the most of them."""
+    """Return the connections from the address that has the most connections."""
     counts = Counter(each.peer for each in occupants)
     heaviest = max(counts, key=counts.__getitem__)
     return [each for each in occupants if each.peer == heaviest]

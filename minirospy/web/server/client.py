@@ -1,4 +1,4 @@
-"""The peers to which a protocol's sessions and pages' handlers send: a WebSocket client, and an HTTP request."""
+"""The objects through which sessions and page handlers send data: a WebSocket client, and an HTTP exchange."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PLAIN_HEADERS = {
 }
 """The headers of every response.
 
-They prevent caching, because the contents change constantly, and the path may contain a token.
+The headers prevent caching, because the contents change constantly, and the path may contain a token.
 """
 
 
@@ -55,7 +55,7 @@ class Limits:
 
     message: int = 64_000_000
     read_only_message: int = 64 * 1024
-    """Maximum bytes in a message from a read-only client, which subscribes but sends nothing large."""
+    """Maximum bytes in a message from a read-only client, which subscribes but sends no large messages."""
     memory: int = MAX_BYTES
     """Maximum bytes held for all clients together: see account.py."""
     messages_a_second: int = 20_000
@@ -220,7 +220,10 @@ class WebClient:
         self._connection.queue.discard(key)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
-        """Run ``work``, which takes long, in the client's turn. It uses ``message``, whose bytes are counted until then."""
+        """Run ``work``, which takes long, in the client's turn.
+
+        ``work`` uses ``message``, whose bytes are counted until then.
+        """
         self._connection.in_turn(work, message)
 
     def hold_work(self, *, is_held: bool) -> None:
@@ -266,7 +269,7 @@ class Exchange:
     def respond(
         self, status: int, body: bytes, content_type: str = "text/plain; charset=utf-8", **headers: str
     ) -> None:
-        """Send a complete response, and close the connection."""
+        """Send a complete response and close the connection."""
         head = response_head(status, {**PLAIN_HEADERS, "Content-Type": content_type,
                                        "Content-Length": str(len(body)), **_dashed(headers)})  # fmt: skip
         self._connection.answer((head, body))

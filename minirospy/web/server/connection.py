@@ -60,7 +60,7 @@ _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
 
 On loopback any program may write; the dashboard's page has the owner's token.
 """
-# weight until the request is known, so that clients that are served do not wait for 250 handshakes
+# weight until the request is known; low, so that established clients do not wait for 250 handshakes
 _NEW_WEIGHT = 0.25
 
 
@@ -115,7 +115,7 @@ class Connection:
         limits = site.limits
         now = loop.time()
         self.peer = peer  # the client's address
-        self.share = site.account.open(peer, self._shed)  # its share of the server's memory
+        self.share = site.account.open(peer, self._shed)  # the connection's share of the server's memory
         self.traffic = Traffic()  # counters for display
         self.session: Session | None = None  # set from a WebSocket's handshake until the connection closes
         self.client: WebClient | None = None  # set once a WebSocket's handshake is complete
@@ -167,7 +167,7 @@ class Connection:
         """Return the ports of the client and the server, and the server's address."""
         return self._pipe.endpoints
 
-    # --- from the pipe
+    # --- called by the pipe
 
     def received(self, data: bytes) -> None:
         """Process bytes received from the client."""
@@ -211,13 +211,13 @@ class Connection:
         self.site.account.close(self.share)
         self.site.left(self)
 
-    # --- to the pipe
+    # --- output
 
     def answer(self, pieces: tuple[Piece, ...]) -> None:
         """Send a message that must not be dropped."""
         if not self.is_open:
             return
-        # Check this first, because a single response, such as a mesh, may be larger than the limit.
+        # Check the limit before appending, because a single response, such as a mesh, may be larger than the limit.
         if self.queue.is_overrun:
             _log.warning("%s reads no answers: disconnected", self.peer)
             self._abort()
@@ -251,7 +251,7 @@ class Connection:
         self._timer = self.loop.call_later(self._limits.handshake_seconds, self._abort)
 
     def close_websocket(self, code: int, reason: str) -> None:
-        """Send a close frame, and close the connection when all queued data has been sent."""
+        """Send a close frame and close the connection when all queued data has been sent."""
         if not self.is_open or not self._websocket.is_open:
             return
         self._websocket.close(code, reason)
@@ -268,7 +268,7 @@ class Connection:
         """Close the connection immediately."""
         self._abort()
 
-    # --- for the session
+    # --- called by the session
 
     def hold(self, *, is_held: bool) -> None:
         """Stop or continue handling frames while the session is processing one; unread data stays in the client's socket."""
@@ -309,7 +309,7 @@ class Connection:
         if self._phase is not _Phase.ENDED:
             self._count()
 
-    # --- the client's turn
+    # --- handling the client's input
 
     def _work(self, end: float) -> bool:
         """Do work for the client until a time; return whether more is left."""
@@ -410,7 +410,7 @@ class Connection:
         if data:
             self.answer(data)
 
-    # --- the request
+    # --- request
 
     def _parse_head(self) -> None:
         try:

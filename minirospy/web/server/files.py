@@ -17,7 +17,7 @@ __all__ = ["PIECE_BYTES", "FileAnswer", "FileSender"]
 
 _log = logging.getLogger(__name__)
 
-# bytes to read at a time: large compared with a worker's overhead, small for 256 clients
+# bytes to read at a time: enough that a worker's overhead is small, but little memory for 256 clients
 PIECE_BYTES = 128 * 1024
 
 
@@ -65,7 +65,7 @@ class FileSender:
         return piece
 
     def close(self) -> None:
-        """Close the file, or if it is being read, close it afterwards. Idempotent."""
+        """Close the file; if it is being read, close it after the read. Idempotent."""
         self._is_closed = True
         if self._file and not self._reading:
             self._file.close()

@@ -18,7 +18,7 @@ class FrameByFrame(ServerProtocol):
     reader: _GatedReader
 
     def feed(self, data: bytes) -> None:
-        """Add received bytes."""
+        """Add received bytes to the parser's buffer."""
         self.reader.feed_data(data)
 
     def next_request(self) -> Request | None:
@@ -42,12 +42,12 @@ class FrameByFrame(ServerProtocol):
                 setattr(self, name, size)
 
     def parse(self) -> Generator[None]:
-        """See the library's method. Called once, before anything is read."""
+        """See the library's method. Called once, before any data is read."""
         self.reader = _GatedReader()
         yield from super().parse()
 
     def recv_frame(self, frame: Frame) -> None:
-        """Process a frame, and stop; the connection responds to pings."""
+        """Process a frame and then stop the parser; the connection responds to pings."""
         if frame.opcode is Opcode.PING:
             self.events.append(frame)
         else:

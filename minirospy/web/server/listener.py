@@ -169,7 +169,7 @@ class Listener:
         self.connections.discard(connection)
         self._on_change(len(self.connections))
 
-    # --- within
+    # --- internals
 
     def _accept(self, listening: socket.socket) -> None:
         for _ in range(_ACCEPTS_A_TURN):
@@ -243,7 +243,7 @@ class Listener:
         now = asyncio.get_running_loop().time()
         while found := displaced(peer, rank, occupants, now):
             if Rank.SILENT < found.rank < Rank.OWN and self._is_own(found):
-                found.rank = Rank.OWN  # the user is not looked up before this is needed
+                found.rank = Rank.OWN  # looked up only here, because it is rarely needed
                 continue
             _log.info("%s gives way to %s", found.peer, peer)
             found.give_way()
@@ -288,9 +288,9 @@ class Relay:
         self.target.received(data)
 
     def writable(self) -> None:
-        """Tell the connection that more can be written."""
+        """Notify the connection that it can write more."""
         self.target.writable()
 
     def ended(self) -> None:
-        """Tell the connection that the pipe has closed."""
+        """Notify the connection that the pipe has closed."""
         self.target.ended()

@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Output"]
 
-_BATCH_BYTES = 256 * 1024  # bytes of small messages that are written with one call
+_BATCH_BYTES = 256 * 1024  # maximum bytes of small messages to combine in one write
 _BATCH_PIECES = 128
-_PUMP_BYTES = 1024 * 1024  # bytes written to a client that reads quickly, before the loop's next iteration
+# maximum bytes to write to a fast-reading client before the loop's next iteration
+_PUMP_BYTES = 1024 * 1024
 
 
 class Output:
@@ -145,7 +146,8 @@ class Output:
         piece = file.take()
         if piece is None:
             if file.has_failed:
-                # the size has been sent, so the client would mistake any further data for the file
+                # Close the pipe, because the size has been sent and the client would mistake any further data for the
+                # file.
                 self.abort()
             return None
         if file.is_done:

@@ -41,7 +41,7 @@ def is_own_user(peer: tuple[str, int], here: tuple[str, int]) -> bool:
 
 
 def owner_of(end: tuple[str, int], other_end: tuple[str, int]) -> int | None:
-    """Return the user of the local TCP socket at ``end`` that is connected to ``other_end``, in any state.
+    """Return the owner (user) of the local TCP socket from ``end`` to ``other_end``, whatever the socket's state.
 
     Return None if there is no such socket, or if no process has it open any more, because the kernel lists it as root's.
     """
@@ -54,7 +54,7 @@ def owner_of(end: tuple[str, int], other_end: tuple[str, int]) -> int | None:
     try:
         return _by_query(*ends)
     except (OSError, AttributeError, struct.error):
-        # This system does not support such sockets, or does not allow them.
+        # This system does not support sock_diag, or does not allow it.
         return _by_table(*ends)
 
 
@@ -74,7 +74,8 @@ def _by_query(end: _End, other_end: _End) -> int | None:
         answer = asking.recv(4096)
     kind = _MESSAGE.unpack_from(answer)[1]
     if kind != _SOCK_DIAG_BY_FAMILY:
-        # This is an error, which is the same for a missing socket and for a query that the kernel does not support.
+        # The response is an error; a missing socket and a query that the kernel does not support cause the same
+        # error.
         return _by_table(end, other_end)
     if len(answer) < _ANSWER_SIZE or answer[_MESSAGE.size + 1] == _LISTEN:
         return None

@@ -17,7 +17,8 @@ from minirospy.web.server.queue import Piece
 
 __all__ = ["LARGE_READ", "SMALL_READ", "Endpoints", "Pipe", "PipeEvents", "PlainPipe", "TlsPipe"]
 
-SMALL_READ = 64 * 1024  # bytes per receive: 250 sending clients are read in one loop iteration
+# bytes per receive: small enough to read from 250 sending clients in one loop iteration
+SMALL_READ = 64 * 1024
 LARGE_READ = 256 * 1024  # bytes per receive for a large message, if no other client is waiting
 _MAX_PIECES = 128
 """Maximum pieces per sendmsg call; systems accept 1024 at most."""
@@ -178,7 +179,8 @@ class PlainPipe:
         self._loop.remove_reader(self._sock)
         self._loop.remove_writer(self._sock)
         with contextlib.suppress(OSError):
-            # This way the peer receives the data that was sent, even if it has sent data that was not read.
+            # Shut down first: closing a socket with unread data resets the connection, and the peer could lose data
+            # sent to it.
             self._sock.shutdown(socket.SHUT_WR)
         self._sock.close()
         self._events.ended()
@@ -207,7 +209,7 @@ class TlsPipe(asyncio.Protocol):
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
         """Create a connection. ``connected(pipe, peer's address)`` returns the object that receives the events.
 
-        It may return None to refuse the connection, after writing a response.
+        ``connected`` may return None to refuse the connection, after writing a response.
         """
         self._connected = connected
         self.read_bytes = LARGE_READ  # the size that asyncio itself uses

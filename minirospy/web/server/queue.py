@@ -1,9 +1,9 @@
 """The output queue of one client: limited in size, oldest first, and always with the newest message of each topic.
 
-Pure. A message is queued under a key (its topic or subscription). If the limit is exceeded, the key's own oldest message is
-dropped, then the oldest message of the key with the most bytes, so that a camera does not displace small messages. Responses
-(``put_answer``) are never dropped: the caller disconnects a client that does not read them. Sizes are bytes in memory: of a
-message and of its entry in the queue, which is larger than a small message.
+Pure. A message is queued under a key (its topic or subscription). If the limit is exceeded, the key's own oldest message
+is dropped, then the oldest message of the key with the most bytes, so that a camera does not displace small messages.
+Responses (``put_answer``) are never dropped: the caller disconnects a client that does not read them. Sizes are bytes in
+memory: a message's and that of its entry in the queue, which is larger than a small message.
 """
 
 from __future__ import annotations
@@ -91,7 +91,10 @@ class SendQueue:
         return self.answers > MAX_ANSWERS
 
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:
-        """Append a message. Drop older ones if the limit is exceeded, or with ``newest_only`` all others of its key."""
+        """Append a message.
+
+        Drop older messages if the limit is exceeded, or with ``newest_only`` all older messages of its key.
+        """
         size = sum(map(len, pieces)) + self._entry_bytes
         waiting = self._waiting.get(key)
         if waiting is None:
@@ -195,5 +198,5 @@ class SendQueue:
 
 
 def _large(pieces: tuple[Piece, ...]) -> int:
-    """Return the total bytes of those pieces that are large."""
+    """Return the total bytes of the large pieces among ``pieces``."""
     return sum(size for size in map(len, pieces) if size >= LARGE_PIECE)

@@ -43,14 +43,14 @@ IMMEDIATE_SHARE = 0.5  # share of the time for work that starts without being qu
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients: interactive clients alone may use 200 ms before bulk clients get a slice again
 MAX_DEBT_TURNS = 10
-BULK_SHARE = 0.2  # share of the time for bulk clients while interactive clients use the rest
+BULK_SHARE = 0.2  # minimum share of the time for bulk clients, even while interactive clients use the rest
 
 Work = Callable[[float], bool]
 """Does some work until a time of the clock; returns whether more is left."""
 
 
 class Share:
-    """The loop time that one client has used; seconds are divided by its weight."""
+    """One client's use of the loop, in seconds divided by the client's weight."""
 
     __slots__ = (
         "burst",
@@ -72,7 +72,8 @@ class Share:
         # seconds used; at least the tag that the queue was serving when the client last started
         self.tag = queue.served
         self.weight = 1.0  # set once the client's rights are known
-        self.expected = 0.0  # seconds that its next piece of work may take, estimated from earlier pieces
+        # seconds that the client's next piece of work may take, estimated from earlier pieces
+        self.expected = 0.0
         self.pieces = 0  # number of pieces of work done while the client is new
         self.burst = 0.0  # seconds used since the client last had nothing to do
         self.last_burst = 0.0  # seconds used in the previous burst
@@ -101,7 +102,7 @@ class _FairQueue:
         self.highest = 0.0  # highest tag of a client that was served
 
     def update(self) -> None:
-        """Reset the time that clients have used if none is queued: clients that start now have the same tag."""
+        """If no work is queued, set ``served`` to the highest tag, so that all clients that start now have the same tag."""
         if not self.entries:
             self.served = self.highest
 
@@ -198,7 +199,7 @@ class FairTurns:
         return burst <= INTERACTIVE_SLICES * self._slice
 
     def _push(self, share: Share, start: float) -> None:
-        # If clients would end at the same tag, the one that has used less is served first.
+        # If several clients would end at the same tag, serve the client that has used less time first.
         end = self._end_of(share, start)
         heapq.heappush(share.queue.entries, _Entry(end, share.tag, next(self._numbers), start, share))
 
@@ -213,7 +214,8 @@ class FairTurns:
             queue = self._next_queue()
             end_tag, *_, start, share = heapq.heappop(queue.entries)
             if self._end_of(share, start) > end_tag + self._slice:
-                # more time is expected for new clients than when this one was queued
+                # A new client's work is now expected to take longer than when this client was queued, so queue it
+                # again.
                 self._push(share, start)
                 continue
             share.is_queued = False

@@ -1,4 +1,4 @@
-"""The WebSocket protocol of one client: bytes in, messages and pings out, one frame at a time. Pure.
+"""The WebSocket protocol of one client: parses received bytes into messages and pings, one frame at a time. Pure.
 
 The sockets-free part of the library ``websockets`` parses the bytes; :mod:`minirospy.web.server.frames` stops it after
 each frame. :class:`minirospy.web.server.client.WebClient` writes the frames of messages, so that a message is sent to
@@ -78,10 +78,10 @@ class WebSocket:
         self._fragments = bytearray()  # received fragments of an incomplete message
         self._opcode = Opcode.BINARY  # opcode of the frame that started the last message
 
-    # --- bytes in, events out
+    # --- receiving
 
     def feed(self, data: bytes) -> None:
-        """Add received bytes."""
+        """Add received bytes to the parser's buffer."""
         self._frames.feed(data)
 
     def next_request(self) -> Request | None:
@@ -99,7 +99,7 @@ class WebSocket:
         return frame
 
     def event_of(self, frame: Frame) -> Message | Ping | None:
-        """Return the ping in a frame, or the message that the frame completes, or None."""
+        """Return the ping in a frame, or the message that the frame completes, or None if there is neither."""
         if frame.opcode in (Opcode.TEXT, Opcode.BINARY):
             self._opcode = frame.opcode
         elif frame.opcode is Opcode.PING:
@@ -135,7 +135,7 @@ class WebSocket:
         """Refuse larger messages from now on."""
         self._frames.limit(max_size)
 
-    # --- events in, bytes out
+    # --- sending
 
     @property
     def subprotocol(self) -> str | None:

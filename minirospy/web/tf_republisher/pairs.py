@@ -18,7 +18,7 @@ _MAX_FRAMES = 1000
 
 
 class FramePair:
-    """A source frame seen from a target frame. Its transform is sent if it has changed by more than a threshold (m, rad)."""
+    """A source frame seen from a target frame. The transform is sent if it has changed by more than a threshold (m, rad)."""
 
     def __init__(self, source: str, target: str, angle: float, distance: float) -> None:
         self.source = source
@@ -63,7 +63,7 @@ def _distance(one: Vector3, other: Vector3) -> float:
 
 
 def _angle(one: Quaternion, other: Quaternion) -> float:
-    """Return the angle between two rotations as quaternions. Like the real node's, it is half the angle of rotation."""
+    """Return the angle between two rotations as quaternions. As in the real node, this is half the angle of rotation."""
     first, second = ((each.x, each.y, each.z, each.w) for each in (one, other))
     norm = math.hypot(*first) * math.hypot(*second)
     if not norm:

@@ -32,7 +32,7 @@ _DEFAULT_RATE = 10.0
 _MAX_RATE = 1000.0
 _MAX_REQUESTS = 1000
 _A_TURN = 50
-"""Number of frames after which other tasks may run."""
+"""Number of frames to look up before other tasks may run."""
 
 
 class _Closing(Protocol):

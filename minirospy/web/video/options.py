@@ -26,7 +26,7 @@ _MAX_PIXELS = 10_000
 
 @dataclass(frozen=True)
 class Picture:
-    """How to encode an image.
+    """The encoding of an image.
 
     ``format``: jpeg or png, or "" to pass a compressed image unchanged. If a size is None, the image's size is kept.
     """
@@ -69,7 +69,7 @@ def request_of(query: Mapping[str, str], *, is_snapshot: bool = False) -> VideoR
         _number(query, "height", None, 1, _MAX_PIXELS),
         "invert" in query and query["invert"].lower() not in ("false", "0"),
     )
-    # web_video_server subscribes to the topic's "compressed" topic.
+    # As in web_video_server, subscribe to the "compressed" subtopic.
     return VideoRequest(f"{topic}/compressed" if type_ == "ros_compressed" else topic, picture)
 
 

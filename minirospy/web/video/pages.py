@@ -198,7 +198,7 @@ class VideoPages:
 
         self._graph.spawn(self._when_published(exchange, request, start))
 
-    # --- within
+    # --- internals
 
     async def _look(self, exchange: Exchange) -> Snapshot | None:
         """Return the graph; if it cannot be read, send an error response and return None."""

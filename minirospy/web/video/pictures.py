@@ -56,7 +56,7 @@ def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
         return _file(image, picture), f"image/{picture.format or 'jpeg'}"
     except BridgeError:
         raise
-    except Exception as error:  # image libraries raise many types of errors for invalid data
+    except Exception as error:  # image libraries raise many types of exceptions for invalid data
         why: object = error
         if isinstance(error, ImportError) or isinstance(error.__cause__, ImportError):
             # Do not include the install command, which contains the server's interpreter path: clients receive this
@@ -152,7 +152,7 @@ def _debayered(image: Pixels, encoding: str) -> Pixels:
 
 
 def _changed(image: Pixels, picture: Picture) -> Pixels:
-    """Return an image in the requested size, rotated by 180 degrees if requested."""
+    """Return an image scaled to the requested size, rotated by 180 degrees if requested."""
     if image.dtype != "uint8":
         # A compressed image may have 16 bits per channel.
         image = (image >> 8).astype("uint8")
