@@ -90,6 +90,9 @@ def check_constructors(lines: list[str]) -> None:
     ]
 
 
+MAX_ANY = 2.0  # uses of `Any` in 1,000 lines
+
+
 def test_any_stays_rare() -> None:
     """`Any` disables the checker; a value that is only passed on should be an `object`, and a message should have a protocol."""
     package = Path(__file__).parents[1] / "minirospy"
@@ -105,7 +108,8 @@ def test_any_stays_rare() -> None:
         for token in tokenize.generate_tokens(io.StringIO(text).readline)
         if token.type == tokenize.NAME and token.string == "Any" and "import" not in token.line
     }
-    assert len(lines) < 200, "\n".join(sorted(lines))
+    total = sum(text.count("\n") for text in texts.values())
+    assert 1000 * len(lines) / total < MAX_ANY, "\n".join(sorted(lines))
 
 
 @pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 replaces the constructor of a protocol")

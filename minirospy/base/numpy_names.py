@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 
+from minirospy.base.installation import install_command
+
 __all__ = ["add_numpy_note"]
 
 _REMOVED = {
@@ -26,4 +28,5 @@ def add_numpy_note(error: BaseException) -> None:
     removed = _REMOVED.get(error.name or "")
     if removed and isinstance(error.obj, numpy.ndarray):
         version, instead = removed
-        error.add_note(f"numpy {version} has removed it: use {instead}, or `pip install 'numpy<{version}'`")
+        command = install_command(f"numpy<{version}")
+        error.add_note(f"numpy {version} has removed it: use {instead}, or `{command}`")

@@ -191,9 +191,9 @@ def _text(name: str, source: Path) -> str:
     if is_package and "." not in name:
         lines += [
             *([""] if lines[-1] else []),
-            "from minirospy.ros.submodules import offer_standard_library",
+            "from minirospy.ros.submodules import offer_standard_library as _offer_standard_library",
             "",
-            "offer_standard_library()",
+            "_offer_standard_library()",
         ]
     later = {each: place for each, place in later.items() if each not in names_here}
     if later or passed_on:

@@ -9,6 +9,7 @@ import pytest
 
 np = pytest.importorskip("numpy")
 
+from minirospy.base.installation import install_command  # noqa: E402
 from minirospy.base.numpy_names import add_numpy_note  # noqa: E402
 
 
@@ -20,7 +21,9 @@ def notes(error: BaseException) -> list[str]:
 @pytest.mark.skipif(sys.version_info < (3, 11), reason="notes are new in Python 3.11")
 def test_note_on_a_removed_method() -> None:
     error = AttributeError("no tostring", name="tostring", obj=np.zeros(3))
-    assert notes(error) == ["numpy 2.3 has removed it: use a.tobytes(), or `pip install 'numpy<2.3'`\n"]
+    assert notes(error) == [
+        f"numpy 2.3 has removed it: use a.tobytes(), or `{install_command('numpy<2.3')}`\n"
+    ]
 
 
 @pytest.mark.parametrize(

@@ -131,9 +131,9 @@ def test_module_without_names_is_only_a_module(sources: Path, tmp_path: Path) ->
     text = (tmp_path / "overlay" / "pack" / "__init__.py").read_text()
     assert text.splitlines()[1:] == [
         "",
-        "from minirospy.ros.submodules import offer_standard_library",
+        "from minirospy.ros.submodules import offer_standard_library as _offer_standard_library",
         "",
-        "offer_standard_library()",
+        "_offer_standard_library()",
     ]
 
 

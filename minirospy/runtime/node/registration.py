@@ -94,7 +94,7 @@ class Registrations:
 
         self._known: dict[_Key, _Part | None] = {}
         """The object registered with the master; None if the call failed or has no response yet."""
-        self._taken: set[_Key] = set()
+        self.taken: set[_Key] = set()
         """Services that another node has registered later, so that the master's entry now belongs to that node."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
@@ -201,7 +201,7 @@ class Registrations:
             part = self._wanted(key)
             if part is not None and self._known.get(key) is not part:
                 self._known[key] = None
-                self._taken.discard(key)
+                self.taken.discard(key)
                 await self._register(part, again=again)
                 self._known[key] = part
             elif part is None and key in self._known:
@@ -258,14 +258,14 @@ class Registrations:
             if not (self._known or any(self._tables.values())):
                 continue
 
-            known = [key for key, part in self._known.items() if part and key not in self._taken]
+            known = [key for key, part in self._known.items() if part and key not in self.taken]
             asked = next((key for key in known if key[0] == "Service"), known[0] if known else None)
             has_forgotten = False
             try:
                 if asked and asked[0] == "Service":
                     if await self._look("lookupService", asked[1]) != self.service_uri:
                         # As in ROS, a service belongs to the node that registered it last, so this entry tells us nothing.
-                        self._taken.add(asked)
+                        self.taken.add(asked)
                         continue
                 else:
                     await self._look("lookupNode", self._name)
@@ -287,7 +287,7 @@ class Registrations:
             if has_forgotten:
                 self._known.clear()
             with contextlib.suppress(MasterUnreachableError):
-                await self._register_all(again=has_forgotten)
+                await self.register_all(again=has_forgotten)
             if has_forgotten and any(self._known.values()):
                 _log.warning("the master at %s has restarted: registered again", self._environment.master_uri)
                 for function in self.when_registered_again:
@@ -297,11 +297,11 @@ class Registrations:
                 # this node.
                 _log.warning("the master does not know this node, and refuses to")
 
-    async def _register_all(self, *, again: bool = False) -> None:
+    async def register_all(self, *, again: bool = False) -> None:
         """Register everything that the master is missing. Raise MasterUnreachableError if it does not respond."""
         keys = [(kind, name) for kind, table in self._tables.items() for name in table]
         for key in dict.fromkeys([*keys, *self._known]):
-            if key in self._taken and self._wanted(key):
+            if key in self.taken and self._wanted(key):
                 continue
             # A registration that the master never accepts must not block the others.
             try:

@@ -726,14 +726,14 @@ def test_a_node_whose_service_another_node_took_notices_a_restarted_master() -> 
             await offer(a, "service")
             await offer(a, "publisher")
             await offer(b, "service")
-            await until(lambda: a._registrations._taken)
+            await until(lambda: a.registrations.taken)
             port = master.port
             await master.close()
             restarted = Master(host="127.0.0.1", port=port)
             await restarted.start()
             try:
                 await until(lambda: known(restarted) == {"publisher": ["/a"], "service": ["/b"]})
-                await a._registrations._register_all(again=True)
+                await a.registrations.register_all(again=True)
                 assert known(restarted)["service"] == ["/b"]
             finally:
                 await restarted.close()

@@ -175,6 +175,7 @@ except rospy.ROSException as error:
 threading.stack_size(0)
 rospy.Subscriber("/t", String, print)
 print("subscribed")
+rospy.signal_shutdown("done")
 """
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False

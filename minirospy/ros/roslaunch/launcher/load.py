@@ -332,7 +332,7 @@ class _File:
                 raise child.error(
                     "<machine>: <env> tag is not supported since ROS Fuerte: use env-loader instead"
                 )
-            self._spec.warnings.append(child.error(f"unrecognized '{child.name}' tag in <machine> tag"))
+            self._spec.add_warning(child.error(f"unrecognized '{child.name}' tag in <machine> tag"))
 
         timeout = tag.number("timeout", 10.0)
         if timeout <= 0:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from minirospy.base.installation import install_command
 from minirospy.ros.rosunit.runner.unit import (
     XML_OUTPUT_FLAG,
     create_xml_runner,
@@ -70,4 +71,4 @@ def stop_coverage(packages: Sequence[str], html: str | None = None) -> None:
 
 def _warn_of_coverage() -> None:
     print("WARNING: cannot import python-coverage, coverage tests will not run.", file=sys.stderr)
-    print("To install coverage, run 'pip install coverage'", file=sys.stderr)
+    print(f"To install coverage, run '{install_command('coverage')}'", file=sys.stderr)
