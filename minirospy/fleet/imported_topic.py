@@ -1,6 +1,6 @@
 """A robot's topic in the local graph.
 
-It is published here while it has local subscribers, and offered to the robot while it has local publishers.
+The topic is published here while it has local subscribers, and offered to the robot while it has local publishers.
 """
 
 from __future__ import annotations
