@@ -104,7 +104,7 @@ class Bond:
         return f"[Bond {self.id}, Instance {self.instance_id} ({self._state.value})]"
 
     def __del__(self) -> None:
-        # ``pub`` is missing if __init__ has failed; then there is nothing to shut down.
+        # If __init__ has failed, ``pub`` is missing, and there is nothing to shut down.
         if hasattr(self, "pub"):
             self.shutdown()
 

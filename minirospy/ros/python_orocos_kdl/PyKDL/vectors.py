@@ -72,7 +72,7 @@ class Vector:
         return self._component(2, value)
 
     def Norm(self, eps: float = EPSILON) -> float:
-        """Return the length; 0 if it is below ``eps``."""
+        """Return the length, or 0 if the length is below ``eps``."""
         length = math.hypot(*self._v)
         return 0.0 if length < eps else length
 

@@ -1,4 +1,4 @@
-"""The state of `rosbag play` and what requests do in it, as a state machine. Pure: wall times are arguments.
+"""The state of `rosbag play` and the effects of requests, as a state machine. Pure: wall times are arguments.
 
 ========= ============================================== ===================================================
 phase     meaning                                        left for
@@ -84,7 +84,7 @@ class Playback:
             self._schedule.set_paused(False, wall)
 
     def restart(self, wall: int, *, keeps_schedule: bool) -> None:
-        """Return to the first message, for ``--loop``. With ``keeps_schedule``, keep the current rate."""
+        """Return to the first message, for ``--loop``. If ``keeps_schedule``, keep the current rate."""
         if keeps_schedule:
             self._running.seek(self._span[0], wall)
         else:

@@ -215,7 +215,7 @@ def _read_record_data(f: BinaryIO) -> bytes:
 
 
 def _read_header(f: BinaryIO, req_op: int | None = None) -> Header:
-    """Return a record's header. Raise ROSBagFormatException if it is invalid, or its operation is not ``req_op``."""
+    """Return a record's header. Raise ROSBagFormatException if the header is invalid, or its operation is not ``req_op``."""
     try:
         data = _read_sized(f)
     except ROSBagException as error:

@@ -232,7 +232,7 @@ def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> l
 
 
 def _ros_argument_error(text: str) -> str:
-    """Return ROS's error message for an argument that is not valid YAML; it contains the error of PyYAML's own parser."""
+    """Return ROS's error message for an argument that is not valid YAML, including the error of PyYAML's own parser."""
     import yaml
 
     try:
