@@ -220,7 +220,7 @@ class Ros2Bridge:
             pause = _MIN_REFRESH_INTERVAL if changed else min(pause * 1.5, slowest)
 
     async def _snapshot(self) -> Snapshot:
-        """Return the ROS 1 graph, and record its run_id."""
+        """Return the ROS 1 graph and record its run_id."""
         snapshot = await fetch(self.node.call_master)
         run_id = await self.node.get_param("/run_id", "")
         self.header = marker(str(run_id))

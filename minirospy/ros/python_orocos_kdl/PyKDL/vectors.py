@@ -77,7 +77,7 @@ class Vector:
         return 0.0 if length < eps else length
 
     def Normalize(self, eps: float = EPSILON) -> float:
-        """Scale the vector to length 1, and return the previous length; a vector shorter than ``eps`` becomes (1, 0, 0)."""
+        """Scale the vector to length 1 and return the previous length; a vector shorter than ``eps`` becomes (1, 0, 0)."""
         length = self.Norm(eps)
         self._v = [1.0, 0.0, 0.0] if length < eps else [each / length for each in self._v]
         return length

@@ -75,7 +75,7 @@ class Playback:
         self._schedule = Schedule(self.options._replace(paused=True), *self._span, wall)
 
     def start(self, wall: int) -> None:
-        """Enter PLAYING, and apply earlier requests."""
+        """Enter PLAYING and apply earlier requests."""
         self.phase = Phase.PLAYING
         if self._schedule is None:
             options = self.options._replace(paused=self._starts_paused)

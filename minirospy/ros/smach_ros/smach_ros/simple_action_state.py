@@ -122,7 +122,7 @@ class SimpleActionState(State):
                 return
 
     def request_preempt(self) -> None:
-        """Preempt the state, and cancel its goal."""
+        """Preempt the state and cancel its goal."""
         rospy.loginfo(f"Preempt requested on action '{self._action_name}'")
         super().request_preempt()
         if self._status == SimpleActionState.ACTIVE:

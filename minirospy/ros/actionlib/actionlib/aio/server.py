@@ -134,7 +134,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         self._registration = self._start(self._register())
 
     async def close(self) -> None:
-        """Unregister from the action's topics, and abort running goals. Idempotent."""
+        """Unregister from the action's topics and abort running goals. Idempotent."""
         self._is_closed = True
         await self._end_tasks()
         for end in (*self._subscriptions, self._result, self._feedback, self._status):
