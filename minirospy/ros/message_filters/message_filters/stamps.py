@@ -78,7 +78,7 @@ class StampQueue(MutableMapping[Time, object]):
             del self._entries[self.order.pop(0)]
 
     def nearest(self, stamp: int) -> int:
-        """Return the stored stamp closest to ``stamp``; of two equally close ones, the first to arrive.
+        """Return the stored stamp closest to ``stamp``; of two equally close stamps, the first to arrive.
 
         Raise IndexError if empty.
         """

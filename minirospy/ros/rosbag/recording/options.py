@@ -85,7 +85,7 @@ def parse_size(text: str) -> int:
 
 
 def topic_filter(options: RecordOptions, subscribed_by_node: bool = False) -> Callable[[str], bool]:
-    """Return a predicate that tells whether to record a topic, given its global name.
+    """Return a predicate that returns whether to record a topic, given the topic's global name.
 
     Expressions must match the whole name. If ``subscribed_by_node``, topics found by ``--node`` need not match any
     expression. Raise UsageError if an expression is invalid.

@@ -6,7 +6,7 @@ phase     meaning                                        left for
 OPENING   bags are read, topics advertised; requests     READY by :meth:`Playback.accept_control`; PLAYING by
           other than a pause have no effect              :meth:`Playback.start`
 READY     waiting for the delay and for subscribers; all PLAYING by :meth:`Playback.start`
-          requests are accepted, and the clock stands
+          requests are accepted, and the clock is stopped
 PLAYING   messages are offered and polled                AT_END by :meth:`Playback.reach_end`
 AT_END    waiting after the last message                 PLAYING by a seek, by resuming, by
                                                          :meth:`Playback.leave_end`

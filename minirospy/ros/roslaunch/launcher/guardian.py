@@ -28,7 +28,7 @@ def watch(
     master_uri: str,
     end: Callable[[list[int], float, float], object],
 ) -> None:
-    """Track the process groups until ``lines`` are exhausted; then call ``end`` with the remaining ones."""
+    """Track the process groups until ``lines`` are exhausted; then call ``end`` with the remaining groups."""
     nodes: dict[int, str] = {}
     masters: dict[int, str] = {}
     for line in lines:

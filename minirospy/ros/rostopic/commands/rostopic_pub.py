@@ -155,7 +155,7 @@ class _Publishing(NamedTuple):
 
 def _publish(options: _Publishing, arguments: Arguments | None) -> None:
     """Publish messages. ``arguments`` are the remapping arguments on the command line."""
-    # Import it here because the other verbs do not need message classes.
+    # Import fill_message here, because the other verbs do not need message classes.
     from minirospy.introspect.echo import fill_message
     from minirospy.introspect.publishing import publish_all, values_to_publish
 
