@@ -1,6 +1,6 @@
 """The robot half of a gateway.
 
-It announces the robot's graph, sends topics that have readers, and delivers messages and calls.
+The exporter announces the robot's graph, sends topics that have readers, and delivers messages and calls.
 """
 
 from __future__ import annotations

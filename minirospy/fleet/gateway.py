@@ -250,7 +250,7 @@ class Gateway:
             await asyncio.gather(opening, ending, return_exceptions=True)
 
     def _hidden(self) -> list[str]:
-        """Return the names of the robots whose topics are imported here."""
+        """Return the names of the robots whose topics this gateway imports."""
         return self.importer.names if self.importer else []
 
     async def _pong(self, _: str, __: bytes) -> bytes:

@@ -1,6 +1,6 @@
 """A robot's topic in the local graph.
 
-It is published here while it has local subscribers, and offered to the robot while it has local publishers.
+The topic is published locally while it has local subscribers, and offered to the robot while it has local publishers.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ class ImportedTopic:
 
     @property
     def dropped(self) -> int:
-        """Return how many of the robot's messages were dropped here because local subscribers were too slow."""
+        """Return how many of the robot's messages were dropped because local subscribers were too slow."""
         return self._flow.dropped
 
     @property
@@ -205,7 +205,7 @@ class ImportedTopic:
     # --- from the robot
 
     def _links_changed(self) -> None:
-        """Request the topic from the robot while nodes other than this gateway subscribe to it here."""
+        """Request the topic from the robot while local nodes other than this gateway subscribe to it."""
         publisher = self._publisher
         if publisher is None or self._is_closed:
             return
@@ -239,7 +239,7 @@ class ImportedTopic:
             declared.undeclare()
         self._numbers.clear()
         if wanted and self._publisher and not self._is_global:
-            # The robot sends its latched message again to the next subscriber; the copy here may be outdated by then.
+            # The robot sends its latched message again to the next subscriber; the local copy may be outdated by then.
             self._publisher.forget_latched()
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
@@ -258,7 +258,7 @@ class ImportedTopic:
         self._publish(message)
 
     def _deliver(self, message: bytes, attachment: bytes) -> None:
-        """Publish a message here. Runs in the receiver's thread."""
+        """Publish a message locally. Runs in the receiver's thread."""
         stamp = parse_stamp(attachment)
         if stamp:
             before = self._numbers.get("out")
@@ -312,7 +312,7 @@ class ImportedTopic:
             await subscription.close()
 
     def _offer(self) -> None:
-        """Offer the topic to the robot while nodes other than this gateway publish it here."""
+        """Offer the topic to the robot while local nodes other than this gateway publish it."""
         subscription = self._subscription
         if subscription is None:
             return
@@ -337,7 +337,7 @@ class ImportedTopic:
         self._offer()
         token = self.token
         md5sum = header["md5sum"]
-        # Store the definition, so that a peer can request a type that is installed only here.
+        # Store the definition, so that a peer can request a type that is installed only on this machine.
         self._shared.definitions.learn(token.type, md5sum, header.get("message_definition", ""))
         key = in_key(token.robot, token.gateway, md5sum, token.topic, self._shared.gateway)
         outflow.send(key, bytes(frame), always=header.get("latching") == "1")

@@ -1,4 +1,4 @@
-"""A topic that a robot subscribes to and other gateways offer. The topic is published here while a gateway offers it."""
+"""A topic that a robot subscribes to and other gateways offer. The topic is published locally while a gateway offers it."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ class InboundTopic:
             await publisher.close()
 
     def _prepare(self, md5sum: str, writer: str) -> None:
-        # A topic has only one type: the one known here, or otherwise that of the first writer.
+        # A topic has only one type: the locally known type, or otherwise the type of the first writer.
         if self._md5sum or self.token.md5sum not in (UNKNOWN_MD5, md5sum):
             return
         self._md5sum = md5sum

@@ -43,7 +43,7 @@ class RobotGraph:
     ) -> None:
         """Create the graph.
 
-        ``hidden`` contains the names of robots whose topics are imported here. ``gateways(snapshot)`` returns the other
+        ``hidden`` contains the names of robots whose topics are imported. ``gateways(snapshot)`` returns the other
         gateways'
         nodes, whose endpoints are ignored like this node's.
         """

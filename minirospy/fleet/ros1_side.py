@@ -83,7 +83,7 @@ class Ros1Side:
     ) -> None:
         """Create this half.
 
-        ``hidden`` contains the names of robots whose topics are imported here; ``namespace`` is the keys' namespace.
+        ``hidden`` contains the names of robots whose topics are imported; ``namespace`` is the keys' namespace.
         """
         # Exclude /rosout_agg, which repeats /rosout: if both were forwarded, each log message would return to the
         # master on which it was logged.
@@ -335,7 +335,7 @@ class Ros1Side:
 def error_in(resource: Resource, answer: bytes) -> str:
     """Return the error message in a reply to a call, or "" if the reply is a response.
 
-    The bridge sends errors and responses in the same way. If the type is installed here, a reply is an error if it is text
+    The bridge sends errors and responses in the same way. If the type is installed locally, a reply is an error if it is text
     and is not exactly one serialized response.
     """
     from minirospy.core.idl.load import get_service_class

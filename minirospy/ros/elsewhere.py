@@ -1,6 +1,6 @@
 """Modules that programs import but minirospy does not provide; importing one raises ImportError with advice.
 
-Their names and messages are in `workspace/elsewhere.py`. If the real module is installed, it takes precedence.
+The modules' names and messages are in `workspace/elsewhere.py`. If the real module is installed, it takes precedence.
 """
 
 from __future__ import annotations

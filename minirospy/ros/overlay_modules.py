@@ -78,7 +78,7 @@ class _Source(NamedTuple):
     """The names that a module's top level defines, read from its source."""
 
     public: tuple[str, ...] | None
-    """``__all__``, or None if the module has none."""
+    """``__all__``, or None if the module does not define it."""
     imported: dict[str, Origin]
     """Names bound by imports, including imports for type checkers only."""
     passed_on: frozenset[str]

@@ -56,7 +56,7 @@ def goal_message(goal: GoalId, body: bytes) -> bytes:
 
 
 def parse_goal(data: bytes | memoryview) -> tuple[GoalId, bytes]:
-    """Return the goal's id and body from an ActionGoal. Raise DeserializationError if it is invalid."""
+    """Return the goal's id and body from an ActionGoal. Raise DeserializationError if the data is invalid."""
     data = bytes(data)
     goal, end = _parse_goal_id(data, _parse_header(data))
     return goal, data[end:]
@@ -68,7 +68,7 @@ def cancel_message(goal: GoalId) -> bytes:
 
 
 def parse_cancel(data: bytes | memoryview) -> GoalId:
-    """Parse a GoalID. Raise DeserializationError if it is invalid."""
+    """Parse a GoalID. Raise DeserializationError if the data is invalid."""
     return _parse_goal_id(bytes(data), 0)[0]
 
 
@@ -78,7 +78,7 @@ def status_and_body(secs: int, nsecs: int, status: Status, body: bytes) -> bytes
 
 
 def parse_status_and_body(data: bytes | memoryview) -> tuple[Status, bytes]:
-    """Return the status and body from an ActionFeedback or ActionResult. Raise DeserializationError if it is invalid."""
+    """Return the status and body from an ActionFeedback or ActionResult. Raise DeserializationError if the data is invalid."""
     data = bytes(data)
     status, end = _parse_status(data, _parse_header(data))
     return status, data[end:]
@@ -91,7 +91,7 @@ def statuses_message(secs: int, nsecs: int, statuses: Iterable[Status]) -> bytes
 
 
 def parse_statuses(data: bytes | memoryview) -> list[Status]:
-    """Parse a GoalStatusArray. Raise DeserializationError if it is invalid."""
+    """Parse a GoalStatusArray. Raise DeserializationError if the data is invalid."""
     data = bytes(data)
     end = _parse_header(data)
     (count,) = _unpacked(_LENGTH, data, end)

@@ -172,7 +172,7 @@ class GoalsToRos2:
         self._changed.set()
 
     async def _run(self, goal: _Goal, request: bytes) -> None:
-        """Send a goal to ROS 2, and send its result back."""
+        """Send a goal to ROS 2 and send its result back."""
         body = self._codec.empty_result
         self._changed.set()
         try:

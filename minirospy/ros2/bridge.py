@@ -91,7 +91,7 @@ class _Types:
         return InterfaceType(spec.full_name, message_md5(spec, lookup), full_text(spec, lookup))
 
     def installed(self, name: str) -> tuple[MessageSpec, Lookup]:
-        """Return an installed message type. Raise TypesDiffer if it is not installed."""
+        """Return an installed message type. Raise TypesDiffer if the type is not installed."""
         try:
             return self._catalogue.message(name), self._catalogue.message
         except (NotFoundError, DefinitionError) as error:
@@ -127,7 +127,7 @@ class _Types:
 class Ros2Bridge:
     """Bridges topics with endpoints on both sides, services and actions that one side offers, and parameters.
 
-    Runs on the node's loop, but ROS 2 messages are passed on in the thread of ROS 2's executor.
+    Runs on the node's loop, but ROS 2 messages are forwarded in the thread of ROS 2's executor.
     """
 
     def __init__(self, node: Node, side: Ros2Side, options: Ros2Options, catalogue: Catalogue) -> None:
@@ -220,7 +220,7 @@ class Ros2Bridge:
             pause = _MIN_REFRESH_INTERVAL if changed else min(pause * 1.5, slowest)
 
     async def _snapshot(self) -> Snapshot:
-        """Return the ROS 1 graph, and record its run_id."""
+        """Return the ROS 1 graph and record its run_id."""
         snapshot = await fetch(self.node.call_master)
         run_id = await self.node.get_param("/run_id", "")
         self.header = marker(str(run_id))

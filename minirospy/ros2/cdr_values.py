@@ -1,6 +1,6 @@
 """Encodes and decodes the ROS 2 messages that the bridge itself uses, in CDR, by their types' fields. Pure.
 
-Messages that are only passed on are converted by ``core/idl/cdr.py``, which is faster. Numbers become int, float or bool,
+Messages that are only forwarded are converted by ``core/idl/cdr.py``, which is faster. Numbers become int, float or bool,
 byte arrays bytes, other arrays lists, and messages dicts.
 """
 

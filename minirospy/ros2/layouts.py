@@ -84,7 +84,7 @@ def _base(text: str, whole: str) -> str:
 def transcoder(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Transcoder:
-    """Return the conversion functions for a message type. Raise TypesDiffer if it has no common layout."""
+    """Return the conversion functions for a message type. Raise TypesDiffer if the two types have no common layout."""
     layout = layout_of(ros1, ros1_lookup, ros2, ros2_lookup, rules)
     try:
         made = make_transcoder(ros1.full_name, layout)
@@ -99,7 +99,7 @@ def transcoder(
 def layout_of(
     ros1: MessageSpec, ros1_lookup: Lookup, ros2: MessageSpec, ros2_lookup: Lookup, rules: Rules
 ) -> Layout:
-    """Return the common layout of a message, with ROS 1's fields in ROS 2's order. Raise TypesDiffer if there is none."""
+    """Return the common layout of a message, with ROS 1's fields in ROS 2's order. Raise TypesDiffer if none exists."""
     try:
         check_types(ros1, ros1_lookup)
     except DefinitionError as error:

@@ -20,7 +20,7 @@ BRIDGE_PREFIX = "minirospy_ros2_bridge"
 
 
 def parse_domain(text: str) -> str:
-    """Return the ROS 2 domain from the value of ``ROS_DOMAIN_ID``, or 0 if it is empty. Raise BridgeError if it is invalid."""
+    """Return the ROS 2 domain from a value of ``ROS_DOMAIN_ID`` (empty: 0). Raise BridgeError if the value is invalid."""
     if not re.fullmatch(r"[0-9]{0,9}", text):
         raise BridgeError(f"ROS_DOMAIN_ID is [{escaped(text)}]: it must be a number, such as 0")
     return str(int(text or "0"))

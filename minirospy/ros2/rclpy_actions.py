@@ -395,7 +395,7 @@ class ActionServer:
         elif status == CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:
-            # ROS 1 has preempted the goal for another one, and ROS 2 has no status for that.
+            # ROS 1 has preempted the goal in favour of another goal, and ROS 2 has no status for that.
             handle.abort()
         return self._class.Result() if data is None else self._calls.deserialize(data, self._class.Result)
 

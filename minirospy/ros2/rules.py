@@ -23,9 +23,9 @@ __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 class TypeRule:
     """The exceptions for a ROS 1 type.
 
-    ``names`` are its possible names in ROS 2, as ``pkg/Name``. ``fields`` maps all fields that are passed on to ROS 2's
-    fields. If ``fields`` is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other
-    side lacks. ``inlined`` is a field that ROS 2 replaces by that field's own fields.
+    ``names`` are its possible names in ROS 2, as ``pkg/Name``. ``fields`` maps all forwarded fields to ROS 2's fields.
+    If ``fields`` is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side lacks.
+    ``inlined`` is a field that ROS 2 replaces by that field's own fields.
     """
 
     names: tuple[str, ...] = ()
@@ -51,7 +51,7 @@ class Rules:
     actions: Mapping[str, TypeRule] = field(default_factory=dict)
 
     def message(self, ros1_type: str) -> TypeRule:
-        """Return the rule for a message type, or an empty rule if there is none."""
+        """Return the rule for a message type, or an empty rule if no rule exists."""
         return self.messages.get(ros1_type, _NO_RULE)
 
     def ros2_messages(self, ros1_type: str) -> tuple[str, ...]:

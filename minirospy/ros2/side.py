@@ -206,7 +206,7 @@ class RclpySide:
 
     def services(self) -> Mapping[str, str]:
         """Return the services of nodes other than this bridge, and their types."""
-        # This also contains services that have clients but no server.
+        # The list also contains services that have clients but no server.
         named = {str(name): _short(types[0]) for name, types in self._node.get_service_names_and_types()}
         if hasattr(self._node, "count_services"):
             own = tuple(self._served)

@@ -361,7 +361,7 @@ class ZenohActionServer:
         except CancelledError:
             status, result = ABORTED, None
         if status != SUCCEEDED and not (status == CANCELED and goal.status == _CANCELING):
-            # ROS 1 has preempted the goal for another one, and ROS 2 has no status for that.
+            # ROS 1 has preempted the goal in favour of another goal, and ROS 2 has no status for that.
             status = ABORTED
         goal.status, goal.ended_at = status, time.monotonic()
         goal.response = self._type.response(status, result)

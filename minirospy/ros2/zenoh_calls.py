@@ -35,7 +35,7 @@ MAX_UNDER_WAY = 200  # maximum number of requests to a service whose responses h
 _MAX_OF_ACTION = 2_000
 """Maximum number of pending requests to an action.
 
-It exceeds the number of goals, because a request for a result waits for the goal.
+This limit exceeds the number of goals, because a request for a result waits until its goal has ended.
 """
 _MAX_SECONDS = 10_000_000
 """Timeout in seconds, practically unlimited: the bridge has its own timeouts, and a shorter one in Zenoh would end long goals."""

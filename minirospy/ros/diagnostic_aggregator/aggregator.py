@@ -81,7 +81,7 @@ def load_group(base_path: str, namespace: str) -> AnalyzerGroup:
 
 
 def toplevel_level(levels: Iterable[int]) -> int:
-    """Return the level of the whole tree: stale only if all levels are stale; -1 if there are none."""
+    """Return the level of the whole tree: stale only if all levels are stale; -1 if there are no levels."""
     found = list(levels)
     highest = max(found, default=-1)
     return 2 if highest > 2 and min(found) <= 2 else highest

@@ -50,7 +50,7 @@ class Device(Protocol):
     name: str
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event, or None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
+        """Return the next event, or None after ``seconds`` without one. Raise DeviceError if the device is disconnected."""
 
     def rumble(self, strong: float, weak: float) -> None:
         """Run the two motors for one second, at 0 to 1 of full power. Raise RumbleError if the motors cannot be used."""
@@ -88,7 +88,7 @@ class LinuxDevice:
         self._rest = b""
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event, or None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
+        """Return the next event, or None after ``seconds`` without one. Raise DeviceError if the device is disconnected."""
         end = time.monotonic() + seconds
         while len(self._rest) < _EVENT.size:
             ready, _, _ = select.select([self._file], [], [], max(end - time.monotonic(), 0))
@@ -155,7 +155,7 @@ def find_by_name(folder: Path = _FOLDER) -> Iterator[tuple[str, str]]:
 
 
 class PygameDevice:
-    """A joystick read through SDL. As on Linux, its hats are additional axes after the others.
+    """A joystick read through SDL. As on Linux, its hats are additional axes that follow the other axes.
 
     Raise DeviceError if the joystick cannot be opened.
     """
@@ -184,7 +184,7 @@ class PygameDevice:
         self._events: list[Event] = []
 
     def wait(self, seconds: float) -> Event | None:
-        """Return the next event, or None if there is none within ``seconds``. Raise DeviceError if the device is disconnected."""
+        """Return the next event, or None after ``seconds`` without one. Raise DeviceError if the device is disconnected."""
         end = time.monotonic() + seconds
         while not self._events:
             self._pygame.event.pump()

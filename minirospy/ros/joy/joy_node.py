@@ -214,7 +214,7 @@ class Motors:
         self._wanted = strong, weak
 
     def run(self, device: Device, now: float) -> None:
-        """Apply a change to the device, and restart motors before the device stops them; ``now`` is in seconds."""
+        """Apply a change to the device and restart motors before the device stops them; ``now`` is in seconds."""
         wanted = self._wanted
         if wanted == self._running and (wanted == (0.0, 0.0) or now < self._again):
             return

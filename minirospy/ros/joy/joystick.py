@@ -1,7 +1,7 @@
 """joy_node's rules for publishing, which convert events and times to messages. Pure: the clock is an argument, in seconds.
 
 Source: http://wiki.ros.org/joy. Button events are published immediately. Axis events, and a device's initial events, are
-published after ``coalesce_interval``. With ``autorepeat_rate`` the state is republished while no event occurs.
+published after ``coalesce_interval``. If ``autorepeat_rate`` is set, the state is republished while no event occurs.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ class RumbleError(MinirospyError):
 
 
 def event_device(joystick: str, folder: Path = _INPUT) -> str:
-    """Return the event device for the joystick at a path (`/dev/input/js0`), or "" if it has none."""
+    """Return the event device for the joystick at a path (`/dev/input/js0`), or "" if the joystick has no event device."""
     found = sorted((folder / Path(joystick).name / "device").glob("event*"))
     return f"/dev/input/{found[0].name}" if found else ""
 

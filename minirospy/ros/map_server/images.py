@@ -1,6 +1,6 @@
 """Reads image files as pixels, with the same results as the real map_server's library.
 
-PGM, PBM and PPM are decoded here, all other formats by Pillow, if it is installed.
+This module decodes PGM, PBM and PPM; Pillow, if installed, decodes all other formats.
 """
 
 from __future__ import annotations

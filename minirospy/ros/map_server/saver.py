@@ -35,7 +35,7 @@ class SaverOptions(NamedTuple):
 
 
 def parse_options(words: Sequence[str]) -> SaverOptions | None:
-    """Return the options, or None for ``-h``. Raise UsageError if they are invalid, with a message if ROS has one."""
+    """Return the options, or None for ``-h``. Raise UsageError if the options are invalid, with a message if ROS has one."""
     options = SaverOptions()
     rest = iter(words)
     for word in rest:

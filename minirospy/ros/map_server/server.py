@@ -104,7 +104,7 @@ def settings_of_file(name: str) -> MapSettings:
 
 
 def load_map(settings: MapSettings) -> OccupancyGrid:
-    """Return a map whose frame and times are not set. Raise MapError if it cannot be loaded."""
+    """Return a map whose frame and times are not set. Raise MapError if the map cannot be loaded."""
     rospy.loginfo('Loading map from image "%s"', settings.image)
     try:
         pixels = read_image(Path(settings.image).read_bytes())

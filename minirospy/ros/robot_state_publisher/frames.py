@@ -51,7 +51,7 @@ class RobotFrames:
         known = {
             name: position if math.isfinite(position) else math.nan for name, position in positions.items()
         }
-        # Repeat, because a joint may mimic a joint that itself mimics another.
+        # Repeat, because a joint may mimic a joint that itself mimics another joint.
         waiting = {name: mimic for name, mimic in self._mimics.items() if name not in known}
         while found := [name for name, mimic in waiting.items() if mimic.joint in known]:
             for name in found:

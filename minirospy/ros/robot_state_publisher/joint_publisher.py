@@ -77,7 +77,7 @@ class JointPublisher:
                 pass
 
     def publish(self) -> None:
-        """Publish the state of all joints; do nothing if there are none."""
+        """Publish the state of all joints; do nothing if there are no joints."""
         with self.lock:
             if self._delta > 0:
                 self.joints.advance(self._delta)

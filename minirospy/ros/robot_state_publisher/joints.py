@@ -92,7 +92,7 @@ class StateValues:
 
 
 class JointStates:
-    """The joints in the description's order: adjustable ones in ``free``, the others with their dependency."""
+    """The joints in the description's order: adjustable joints in ``free``, the others with their dependency."""
 
     def __init__(
         self, names: Sequence[str], free: dict[str, FreeJoint], dependent: Mapping[str, Dependent]

@@ -1,7 +1,7 @@
 """The /rosout node: collects log messages from all nodes, republishes them on /rosout_agg and writes them to a file.
 
-Like every ROS node, it lists its loggers and sets their levels: here the master's loggers, because the master runs in the
-same process. Source: http://wiki.ros.org/rosout.
+Like every ROS node, it lists its loggers and sets their levels. These are the master's loggers, because the master runs in
+the same process. Source: http://wiki.ros.org/rosout.
 """
 
 from __future__ import annotations

@@ -99,7 +99,7 @@ class Simulator:
         self._services: list[rospy.Service[object]] = []
 
     def start(self) -> None:
-        """Advertise the services, and add the first turtle."""
+        """Advertise the services and add the first turtle."""
         self._services = [
             rospy.Service("clear", Empty, self._clear),
             rospy.Service("reset", Empty, self._reset),

@@ -238,7 +238,7 @@ class ActionServer:
                     self.cancel_callback(handle)
 
             if goal_id.id and self._find(goal_id.id) is None:
-                # The goal may still arrive; it is then recalled immediately.
+                # If the goal arrives after this request, it is recalled immediately.
                 tracker = StatusTracker(goal_id, GoalStatus.RECALLING)
                 self._add(tracker)
                 tracker.end()

@@ -57,7 +57,7 @@ class SimpleActionClient:
         active_cb: Callable[[], object] | None = None,
         feedback_cb: FeedbackCallback | None = None,
     ) -> None:
-        """Send a goal, and stop tracking the previous one.
+        """Send a goal and stop tracking the previous one.
 
         ``active_cb()`` is called when the server accepts the goal, ``feedback_cb(feedback)`` for each feedback message, and
         ``done_cb(state, result)`` when the goal ends. All are called in the library's threads.

@@ -38,7 +38,7 @@ class ActionException(MinirospyError):
 
 
 class ActionTypes(NamedTuple):
-    """An action's message classes; those named ``action_...`` are the ones sent on the topics."""
+    """An action's message classes; the classes named ``action_...`` are those of the topics."""
 
     action_goal: type[ActionGoal]
     action_result: type[ActionResult]

@@ -1,4 +1,4 @@
-"""axserver.py: an action server on the terminal, whose user enters the results; for testing a client without a robot.
+"""axserver.py: an action server on the terminal, for testing a client without a robot. The user enters the results.
 
 Source: http://wiki.ros.org/actionlib (Tools). ROS's axserver.py opens a window; this one reads and prints lines.
 """

@@ -104,7 +104,7 @@ class Bond:
         return f"[Bond {self.id}, Instance {self.instance_id} ({self._state.value})]"
 
     def __del__(self) -> None:
-        # ``pub`` is missing if __init__ has failed; then there is nothing to shut down.
+        # If __init__ has failed, ``pub`` is missing, and there is nothing to shut down.
         if hasattr(self, "pub"):
             self.shutdown()
 
@@ -158,7 +158,7 @@ class Bond:
     # --- public methods
 
     def start(self) -> None:
-        """Start sending heartbeats, and wait for the peer in a thread."""
+        """Start sending heartbeats and wait for the peer in a thread."""
         with self.lock:
             self._run_timeout(Event.CONNECT_TIMEOUT)
             self.sub = rospy.Subscriber(self.topic, Status, self._on_bond_status)
@@ -197,7 +197,7 @@ class Bond:
         self._flush_pending_callbacks()
 
     def shutdown(self) -> None:
-        """Break the bond, and unregister from the topic."""
+        """Break the bond and unregister from the topic."""
         with self.lock:
             if self.is_shutdown:
                 return

@@ -120,7 +120,7 @@ def ini_of(name: str, info: CameraInfo) -> str:
 
 def _pixels(word: object) -> int:
     digits = word.strip() if isinstance(word, str) else ""
-    # Check the number of digits first, because int() raises ValueError for more than 4300.
+    # Check the number of digits first, because int() raises ValueError for more than 4300 digits.
     if not (digits.isdecimal() and len(digits) <= _MAX_DIGITS and int(digits) < 1 << 32):
         raise CalibrationError(f"a width or height is not a number of pixels: {word!r:.80}")
     return int(digits)

@@ -200,7 +200,7 @@ def saveCalibrationFile(ci: CameraInfo, filename: str, cname: str) -> bool:
 
 
 def filename_of(url: str, cname: str) -> str | None:
-    """Return the path for a URL; if there is none, log the reason and return None."""
+    """Return the path for a URL; if the URL has no path, log the reason and return None."""
     resolved = resolveURL(url or default_camera_info_url, cname)
     kind = parseURL(resolved)
     if kind == URL_file:

@@ -28,7 +28,7 @@ class HeaderlessTopicDiagnostic(CompositeDiagnosticTask):
     """A task that reports a topic's frequency."""
 
     def __init__(self, name: str, diag: DiagnosticTaskVector, freq: FrequencyStatusParam) -> None:
-        """Create the task, and add it to the updater ``diag`` as "<name> topic status"."""
+        """Create the task and add it to the updater ``diag`` as "<name> topic status"."""
         super().__init__(f"{name} topic status")
         self.diag = diag
         self.freq = FrequencyStatus(freq)
@@ -74,6 +74,6 @@ class DiagnosedPublisher(TopicDiagnostic):
         self.publisher = pub
 
     def publish(self, message: Stamped) -> None:
-        """Count a message by its header's time stamp, and publish the message."""
+        """Count a message by its header's time stamp and publish the message."""
         self.tick(message.header.stamp)
         self.publisher.publish(message)

@@ -135,7 +135,7 @@ def _inner_groups(group: GroupTree) -> Iterator[GroupTree]:
 
 
 def group_dict(group: Group | GroupState) -> Config:
-    """Return a group without its subgroups and parameters. A group from a description gets the state True."""
+    """Return a group without its subgroups and parameters. A group from a description has the state True."""
     return Config(
         id=group.id,
         parent=group.parent,

@@ -27,7 +27,7 @@ def find_msg_dependencies_with_type(
 ) -> list[tuple[str, str | None]]:
     """Return (type, file) for each message that the message in ``msg_file`` uses.
 
-    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
+    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if a definition is missing.
     """
     context = MsgContext.create_default()
     return _needed(context, load_msg_from_file(context, msg_file, _type(pkg_name, msg_file)), search_paths)
@@ -36,7 +36,7 @@ def find_msg_dependencies_with_type(
 def find_msg_dependencies(pkg_name: str, msg_file: str, search_paths: SearchPath) -> list[str | None]:
     """Return the files that define the messages used by the message in ``msg_file``.
 
-    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
+    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if a definition is missing.
     """
     return [file for _, file in find_msg_dependencies_with_type(pkg_name, msg_file, search_paths)]
 
@@ -46,7 +46,7 @@ def find_srv_dependencies_with_type(
 ) -> list[tuple[str, str | None]]:
     """Return (type, file) for each message that a service uses.
 
-    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
+    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if a definition is missing.
     """
     context = MsgContext.create_default()
     return _needed(context, load_srv_from_file(context, msg_file, _type(pkg_name, msg_file)), search_paths)
@@ -55,7 +55,7 @@ def find_srv_dependencies_with_type(
 def find_srv_dependencies(pkg_name: str, msg_file: str, search_paths: SearchPath) -> list[str | None]:
     """Return the files that define the messages used by a service.
 
-    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing.
+    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if a definition is missing.
     """
     return [file for _, file in find_srv_dependencies_with_type(pkg_name, msg_file, search_paths)]
 

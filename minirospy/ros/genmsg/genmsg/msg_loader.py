@@ -114,7 +114,7 @@ class MsgContext:
         return bare_msg_type(full_msg_type) in self._specs
 
     def get_registered(self, full_msg_type: str) -> MsgSpec:
-        """Return a known message. Raise KeyError if it is unknown."""
+        """Return a known message. Raise KeyError if the message is unknown."""
         return self._specs[bare_msg_type(full_msg_type)]
 
     def set_file(self, full_msg_type: str, file_path: str) -> None:
@@ -201,7 +201,7 @@ def load_msg_from_file(msg_context: MsgContext, file_path: str, full_name: str) 
 def load_msg_by_type(msg_context: MsgContext, msg_type: str, search_path: SearchPath) -> MsgSpec:
     """Load a message by its type, add it to the context, and return it.
 
-    Raise InvalidMsgSpec if the definition is invalid, MsgNotFound if it is missing.
+    Raise InvalidMsgSpec if the definition is invalid, MsgNotFound if it does not exist.
     """
     name = HEADER_FULL_NAME if msg_type == "Header" else msg_type
     package, base = package_resource_name(name)
@@ -228,7 +228,7 @@ def load_srv_from_file(msg_context: MsgContext, file_path: str, full_name: str) 
 
 
 def load_srv_by_type(msg_context: MsgContext, srv_type: str, search_path: SearchPath) -> SrvSpec:
-    """Load a service by its type. Raise InvalidMsgSpec if the definition is invalid, MsgNotFound if it is missing."""
+    """Load a service by its type. Raise InvalidMsgSpec if the definition is invalid, MsgNotFound if it does not exist."""
     package, base = package_resource_name(srv_type)
     return load_srv_from_file(msg_context, get_srv_file(package, base, search_path), srv_type)
 
@@ -236,8 +236,8 @@ def load_srv_by_type(msg_context: MsgContext, srv_type: str, search_path: Search
 def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_path: SearchPath) -> list[str]:
     """Load all messages that a message or service uses into the context; return its fields' types, without duplicates.
 
-    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if one is missing, ValueError if ``spec`` is not a message or
-    service.
+    Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if a definition is missing, ValueError if ``spec`` is not a
+    message or service.
     """
     if not isinstance(spec, MsgSpec | SrvSpec):
         raise ValueError(f"spec does not appear to be a message or service: {spec}")

@@ -214,7 +214,7 @@ def parse_type(msg_type: str) -> tuple[str, bool, int | None]:
 
 
 def why_invalid(text: str) -> str | None:
-    """Return genmsg's message for the first error in a definition; None if genmsg finds none."""
+    """Return genmsg's message for the first error in a definition, or None if genmsg finds no error."""
     names: list[str] = []
     for line in text.splitlines():
         bare = line.split("#")[0].strip()

@@ -46,7 +46,7 @@ _Emitter = Callable[..., Iterator[str]]
 def msg_generator(msg_context: MsgContext, spec: MsgSpec, search_path: SearchPath) -> Iterator[str]:
     """Yield the lines of a message's module.
 
-    Raise MsgGenerationException or InvalidMsgSpec if the definition is invalid, MsgNotFound if one is missing.
+    Raise MsgGenerationException or InvalidMsgSpec if the definition is invalid, MsgNotFound if a definition is missing.
     """
     load_depends(msg_context, spec, search_path)
     try:
@@ -58,7 +58,7 @@ def msg_generator(msg_context: MsgContext, spec: MsgSpec, search_path: SearchPat
 def srv_generator(msg_context: MsgContext, spec: SrvSpec, search_path: SearchPath) -> Iterator[str]:
     """Yield the lines of a service's module.
 
-    Raise MsgGenerationException or InvalidMsgSpec if the definition is invalid, MsgNotFound if one is missing.
+    Raise MsgGenerationException or InvalidMsgSpec if the definition is invalid, MsgNotFound if a definition is missing.
     """
     load_depends(msg_context, spec, search_path)
     try:

@@ -101,7 +101,7 @@ def isstring(s: object) -> bool:
 def _get_message_or_service_class(
     type_str: str, message_type: str, reload_on_error: bool = False
 ) -> type[protocols.Message] | ServiceClass | None:
-    """Return the class for a ``message`` or ``service``, or None if there is none. Raise ValueError if the name is invalid."""
+    """Return the class for a ``message`` or ``service``, or None if none exists. Raise ValueError if the name is invalid."""
     if type_str == "service":
         return get_service_class(message_type, reload_on_error)
     return get_message_class(message_type, reload_on_error)

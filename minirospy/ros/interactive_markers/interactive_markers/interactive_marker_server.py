@@ -144,7 +144,7 @@ class InteractiveMarkerServer:
             return True
 
     def clear(self) -> None:
-        """Erase all markers, and discard pending changes."""
+        """Erase all markers and discard pending changes."""
         with self.mutex:
             self.pending_updates = {name: UpdateContext(UpdateContext.ERASE) for name in self.marker_contexts}
 
@@ -175,7 +175,7 @@ class InteractiveMarkerServer:
         self.publishInit()
 
     def _apply(self, name: str, update: UpdateContext, message: InteractiveMarkerUpdate) -> None:
-        """Apply a change to a marker, and add the change to a message."""
+        """Apply a change to a marker and add the change to a message."""
         context = self.marker_contexts.get(name)
         if update.update_type == UpdateContext.FULL_UPDATE:
             if context is None:

@@ -36,7 +36,7 @@ def treeFromParam(param: str) -> tuple[bool, Tree]:
 
 
 def treeFromString(xml: str | bytes) -> tuple[bool, Tree]:
-    """Build the tree from a robot description in XML. Raise UrdfError if it is invalid."""
+    """Build the tree from a robot description in XML. Raise UrdfError if the description is invalid."""
     return True, tree_of(parse_robot(xml))
 
 

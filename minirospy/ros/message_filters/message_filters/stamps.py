@@ -62,14 +62,14 @@ class StampQueue(MutableMapping[Time, object]):
         self._entries.clear()
 
     def take(self, nanoseconds: int) -> object:
-        """Remove the message with this stamp in nanoseconds, and return it. Raise KeyError if there is none."""
+        """Remove and return the message with this stamp in nanoseconds. Raise KeyError if there is no such message."""
         message = self._entries.pop(nanoseconds)[1]
         order = self.order
         del order[bisect_left(order, nanoseconds) if nanoseconds > order[0] else 0]
         return message
 
     def stamp_at(self, nanoseconds: int) -> Time:
-        """Return the stamp object that was stored. Raise KeyError if there is none."""
+        """Return the stamp object that was stored. Raise KeyError if there is no such stamp."""
         return self._entries[nanoseconds][0]
 
     def keep_newest(self, size: int) -> None:
@@ -78,7 +78,7 @@ class StampQueue(MutableMapping[Time, object]):
             del self._entries[self.order.pop(0)]
 
     def nearest(self, stamp: int) -> int:
-        """Return the stored stamp closest to ``stamp``; of two equally close ones, the first to arrive.
+        """Return the stored stamp closest to ``stamp``; of two equally close stamps, the first to arrive.
 
         Raise IndexError if empty.
         """

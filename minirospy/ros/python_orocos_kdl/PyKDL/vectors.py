@@ -72,12 +72,12 @@ class Vector:
         return self._component(2, value)
 
     def Norm(self, eps: float = EPSILON) -> float:
-        """Return the length; 0 if it is below ``eps``."""
+        """Return the length, or 0 if the length is below ``eps``."""
         length = math.hypot(*self._v)
         return 0.0 if length < eps else length
 
     def Normalize(self, eps: float = EPSILON) -> float:
-        """Scale the vector to length 1, and return the previous length; a vector shorter than ``eps`` becomes (1, 0, 0)."""
+        """Scale the vector to length 1 and return the previous length; a vector shorter than ``eps`` becomes (1, 0, 0)."""
         length = self.Norm(eps)
         self._v = [1.0, 0.0, 0.0] if length < eps else [each / length for each in self._v]
         return length

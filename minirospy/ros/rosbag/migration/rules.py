@@ -223,7 +223,7 @@ def get_path_key(c1: MessageClass, c2: MessageClass) -> tuple[Key | None, Key | 
 
 
 def copy_message(msg_from: Message, msg_to: Message) -> None:
-    """Fill a message from another one that has the same fields."""
+    """Fill a message from another message that has the same fields."""
     buffer = io.BytesIO()
     msg_from.serialize(buffer)
     msg_to.deserialize(buffer.getvalue())
@@ -261,7 +261,7 @@ Step = Callable[[MessageUpdateRule, "Message", "Message"], None]
 def make_update_rule(
     migrator: Migrator, old_class: MessageClass, new_class: MessageClass
 ) -> type[MessageUpdateRule]:
-    """Return a rule that copies fields with equal names; it is valid if no field is lost or needs an invented value."""
+    """Return a rule that copies fields with equal names; the rule is valid if no field is lost or needs an invented value."""
     lines: list[str] = []
     steps: list[Step] = []
     migrated: list[tuple[str, str]] = []

@@ -120,7 +120,7 @@ class MessageMigrator:
         return self.class_dict.get(key)
 
     def add_update_rule(self, r: MessageUpdateRule) -> None:
-        """Add an explicit rule. Report and ignore a rule that conflicts with others."""
+        """Add an explicit rule. Report and ignore a rule that conflicts with other rules."""
         if not r.valid:
             print(f"ERROR: Update rule [{r.location}] has valid set to False.", file=sys.stderr)
             self.false_rule_loaded = True

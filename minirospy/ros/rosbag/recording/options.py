@@ -59,7 +59,7 @@ class RecordOptions(NamedTuple):
 
 
 def parse_duration(text: str) -> int:
-    """Return the nanoseconds in a duration such as ``30``, ``30s``, ``5m`` or ``1.5h``. Raise UsageError if it is invalid."""
+    """Return the nanoseconds in a duration such as ``30``, ``30s``, ``5m`` or ``1.5h``. Raise UsageError for other text."""
     number = _NUMBER.match(text)
     if not number:
         raise UsageError("Duration must start with a floating point number.")
@@ -85,9 +85,9 @@ def parse_size(text: str) -> int:
 
 
 def topic_filter(options: RecordOptions, subscribed_by_node: bool = False) -> Callable[[str], bool]:
-    """Return a predicate that tells whether to record a topic, given its global name.
+    """Return a predicate that returns whether to record a topic, given the topic's global name.
 
-    Expressions must match the whole name. With ``subscribed_by_node``, topics found by ``--node`` need not match any
+    Expressions must match the whole name. If ``subscribed_by_node``, topics found by ``--node`` need not match any
     expression. Raise UsageError if an expression is invalid.
     """
     exclude = _compiled(options.exclude) if options.exclude else None

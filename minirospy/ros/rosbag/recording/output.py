@@ -1,4 +1,4 @@
-"""The output of a player: by default this process's node, for `rosbag play`, or another one for a player in a program."""
+"""The output of a player: by default this process's node, for `rosbag play`, or another output for a player in a program."""
 
 from __future__ import annotations
 

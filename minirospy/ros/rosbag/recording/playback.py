@@ -1,4 +1,4 @@
-"""The state of `rosbag play` and what requests do in it, as a state machine. Pure: wall times are arguments.
+"""The state of `rosbag play` and the effects of requests, as a state machine. Pure: wall times are arguments.
 
 ========= ============================================== ===================================================
 phase     meaning                                        left for
@@ -6,7 +6,7 @@ phase     meaning                                        left for
 OPENING   bags are read, topics advertised; requests     READY by :meth:`Playback.accept_control`; PLAYING by
           other than a pause have no effect              :meth:`Playback.start`
 READY     waiting for the delay and for subscribers; all PLAYING by :meth:`Playback.start`
-          requests are accepted, and the clock stands
+          requests are accepted, and the clock is stopped
 PLAYING   messages are offered and polled                AT_END by :meth:`Playback.reach_end`
 AT_END    waiting after the last message                 PLAYING by a seek, by resuming, by
                                                          :meth:`Playback.leave_end`
@@ -75,7 +75,7 @@ class Playback:
         self._schedule = Schedule(self.options._replace(paused=True), *self._span, wall)
 
     def start(self, wall: int) -> None:
-        """Enter PLAYING, and apply earlier requests."""
+        """Enter PLAYING and apply earlier requests."""
         self.phase = Phase.PLAYING
         if self._schedule is None:
             options = self.options._replace(paused=self._starts_paused)
@@ -84,7 +84,7 @@ class Playback:
             self._schedule.set_paused(False, wall)
 
     def restart(self, wall: int, *, keeps_schedule: bool) -> None:
-        """Return to the first message, for ``--loop``. With ``keeps_schedule``, keep the current rate."""
+        """Return to the first message, for ``--loop``. If ``keeps_schedule``, keep the current rate."""
         if keeps_schedule:
             self._running.seek(self._span[0], wall)
         else:

@@ -239,7 +239,7 @@ class Schedule:
         self._since = wall
 
     def _tick_now(self, wall: int) -> None:
-        """Set bag time to the message's time, and make a /clock message due now."""
+        """Set bag time to the message's time and make a /clock message due now."""
         self._clock = self._message
         self._next_tick = wall
 

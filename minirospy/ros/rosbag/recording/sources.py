@@ -34,7 +34,7 @@ class Selection(NamedTuple):
 class Bags:
     """Several bags, opened for reading; a context manager.
 
-    Raise NotFoundError if a file does not exist, BagError with the file's name if one cannot be read.
+    Raise NotFoundError if a file does not exist, BagError with the file's name if a file cannot be read.
     """
 
     def __init__(self, paths: Iterable[str]) -> None:
@@ -98,7 +98,7 @@ class Bags:
 def open_reader(path: Path, opened: ExitStack) -> BagReader:
     """Return a reader for a bag or an MCAP file; ``opened`` closes the reader.
 
-    Raise OSError if the file cannot be read, BagError if it is invalid.
+    Raise OSError if the file cannot be read, BagError if the file is invalid.
     """
     stream = opened.enter_context(path.open("rb"))
     reader = open_bag_or_mcap(stream)
@@ -179,7 +179,7 @@ def _span(reader: BagReader) -> tuple[int, int] | None:
 
 
 def _last_time(reader: BagReader, selection: Selection) -> int:
-    """Return the time of the last message in a selection; 0 if there is none."""
+    """Return the time of the last message in a selection, or 0 if there are no messages."""
     wanted = _wanted(reader, selection)
     end = selection.end
     found = {chunk.start_time for chunk in reader.chunks if end is None or chunk.start_time <= end}

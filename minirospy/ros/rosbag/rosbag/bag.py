@@ -290,7 +290,7 @@ class Bag(OpenedBag):
         ``topics``: one or several; None or an empty list for all. ``start_time`` and ``end_time`` are inclusive;
         ``connection_filter(topic, type, md5sum, definition, header)`` selects connections. ``raw``: messages are tuples
         of type, bytes, md5sum, position and class. ``return_connection_header``: yield BagMessageWithConnectionHeader.
-        Raise ValueError if the bag is closed, ROSBagException if it is damaged.
+        Raise ValueError if the bag is closed, ROSBagException if the bag is damaged.
         """
         self.flush()
         self._current().prepare()
@@ -472,7 +472,7 @@ class Bag(OpenedBag):
             return None
 
     def _create_reader(self) -> None:
-        """Create ``_reader``, which programs use to access the bag's internals; a subclass may set another one."""
+        """Create ``_reader``, which programs use to access the bag's internals; a subclass may set a different reader."""
         self._reader = (_BagReader200 if self._version == 200 else _BagReader)(self)
 
     # -- internal -------------------------------------------------------------------------------------------------

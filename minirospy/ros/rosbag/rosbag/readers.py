@@ -30,7 +30,7 @@ class _BagReader:
     def seek_and_read_message_data_record(
         self, position: Position, raw: bool, return_connection_header: bool = False
     ) -> BagMessage | BagMessageWithConnectionHeader:
-        """Return the message at an index entry's position. Raise ROSBagException if it cannot be read."""
+        """Return the message at an index entry's position. Raise ROSBagException if the message cannot be read."""
         return self.bag._read_message(position, raw, return_connection_header)
 
     def read_messages(

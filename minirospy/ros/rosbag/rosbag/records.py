@@ -191,12 +191,12 @@ def _unpacked(data: bytes, name: str, unpack: Callable[[bytes], _T]) -> _T:
 
 
 def _read_sized(f: BinaryIO) -> bytes:
-    """Read a length, and return that many bytes. Raise ROSBagException or ROSBagFormatException at the end of the file."""
+    """Read a length and return that many bytes. Raise ROSBagException or ROSBagFormatException at the end of the file."""
     return _read(f, _read_uint32(f))
 
 
 def _skip_sized(f: BinaryIO) -> None:
-    """Read a length, and skip that many bytes."""
+    """Read a length and skip that many bytes."""
     f.seek(_read_uint32(f), os.SEEK_CUR)
 
 
@@ -215,7 +215,7 @@ def _read_record_data(f: BinaryIO) -> bytes:
 
 
 def _read_header(f: BinaryIO, req_op: int | None = None) -> Header:
-    """Return a record's header. Raise ROSBagFormatException if it is invalid, or its operation is not ``req_op``."""
+    """Return a record's header. Raise ROSBagFormatException if the header is invalid, or its operation is not ``req_op``."""
     try:
         data = _read_sized(f)
     except ROSBagException as error:

@@ -1,4 +1,4 @@
-"""rosdep: list the dependencies of packages that are not available here, and how to install them.
+"""rosdep: list the dependencies of packages that are missing on this machine, and how to install them.
 
 Tutorials use `rosdep install --from-paths src --ignore-src -r -y`. ROS's rosdep queries a database on the network and
 runs the system's package manager. This command downloads and installs nothing, because minirospy provides ROS's packages.

@@ -1,4 +1,4 @@
-"""rosgraph: print which nodes publish to which others, and the services, every second until Ctrl-C.
+"""rosgraph: print the connections between nodes, and the services, every second until Ctrl-C.
 
 Source: http://wiki.ros.org/rosgraph. The output is identical to that of ROS, with sorted names. All data comes from the
 master, so a node that hangs causes no delay.

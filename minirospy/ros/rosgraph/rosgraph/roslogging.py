@@ -36,7 +36,7 @@ class RospyLogger(logging.Logger):
 def configure_logging(
     logname: str, level: int = logging.INFO, filename: str | None = None, env: dict[str, str] | None = None
 ) -> str | None:
-    """Log to a file in the log folder, and log the records of `rosout` also to the terminal; return the file's path.
+    """Log to a file in the log folder and log the records of `rosout` also to the terminal; return the file's path.
 
     Replace the handlers of the root logger and of `rosout`; ``level`` has no effect, as in ROS. A configuration file
     (ROS_PYTHON_LOG_CONFIG_FILE, or a file in ROS_HOME) takes precedence over these settings. Set ROS_LOG_FILENAME to the path.

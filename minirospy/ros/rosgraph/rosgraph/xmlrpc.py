@@ -60,7 +60,7 @@ class ThreadingXMLRPCServer(ThreadingMixIn, SimpleXMLRPCServer):
         super().serve_forever(poll_interval)
 
     def close(self) -> None:
-        """Stop handling requests, and close the socket."""
+        """Stop handling requests and close the socket."""
         with self._serving:
             self._is_closed = True
         if self._is_serving:

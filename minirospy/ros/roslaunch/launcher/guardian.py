@@ -1,10 +1,10 @@
 """A script that briefly outlives roslaunch: if roslaunch is killed, it terminates the remaining nodes.
 
-It reads one line per process group from stdin: ``+PID NAME`` when a node has started; ``*PID`` when the master, which is
+The script reads one line per process group from stdin: ``+PID NAME`` when a node has started; ``*PID`` when the master, which is
 terminated last, has started; ``-PID`` when a process has exited. At EOF, roslaunch has exited, for whatever reason: the
 script sends SIGINT, SIGTERM and SIGKILL to the remaining groups, and unregisters their nodes from a master that continues
 to run. On Windows, the system terminates the processes together with roslaunch, so the script only unregisters the nodes.
-It imports only a few standard modules, because it starts at the same time as the first nodes.
+The script imports only a few standard modules, because it starts at the same time as the first nodes.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def watch(
     master_uri: str,
     end: Callable[[list[int], float, float], object],
 ) -> None:
-    """Track the process groups until ``lines`` are exhausted; then call ``end`` with the remaining ones."""
+    """Track the process groups until ``lines`` are exhausted; then call ``end`` with the remaining groups."""
     nodes: dict[int, str] = {}
     masters: dict[int, str] = {}
     for line in lines:

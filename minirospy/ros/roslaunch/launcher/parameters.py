@@ -124,7 +124,7 @@ def _output_of(tag: Tag, command: str) -> str:
 def _run(words: list[str]) -> tuple[int, bytes, str]:
     """Run a command; return its status, its output, and the line in its stderr that states the reason.
 
-    Its stderr is copied to the terminal as it arrives. A command that writes more than _MAX_VALUE bytes is killed.
+    The command's stderr is copied to the terminal as it arrives. A command that writes more than _MAX_VALUE bytes is killed.
     """
     end = bytearray()
     reading, writing = os.pipe()

@@ -1,6 +1,6 @@
 """Runs a LaunchSpec: starts, watches and terminates its nodes.
 
-Its parts are in separate modules: the master (``master.py``), a node's process (``node_start.py``), the run
+The launcher's parts are in separate modules: the master (``master.py``), a node's process (``node_start.py``), the run
 (``supervisor.py``), other machines (``remote.py``), termination (``process.py``, ``registrations.py``).
 Source: http://wiki.ros.org/roslaunch/Commandline%20Tools, http://wiki.ros.org/roslaunch/Architecture.
 """

@@ -55,7 +55,7 @@ class NodeSpec:
 
     def to_xml(self) -> str:
         """Return the equivalent launch-file ``<node>``, without its machine."""
-        # Imported here because it takes longer to import than all other roslaunch modules together.
+        # Import this module here, because its import takes longer than those of all other roslaunch modules together.
         from xml.sax.saxutils import quoteattr
 
         attributes = {

@@ -26,7 +26,7 @@ _ONE = {
     "arg": "$(arg name) takes one arg",
     "anon": "$(anon name) takes one name",
 }
-# maximum number of characters produced per load, because an arg that repeats another one doubles the size
+# maximum number of characters produced per load, because an arg that repeats another arg doubles the size
 _MAX_SUBSTITUTED = 64 * 1024 * 1024
 _MAX_SHOWN = 200  # maximum number of characters shown of a string in an error message
 _VERBS = (*_ONE, "optenv", "dirname", "eval")
@@ -129,7 +129,7 @@ class Substitution:
         return str(Path(self.file).resolve().parent)
 
     def _eval(self, expression: str) -> str:
-        """Return a Python expression's value as a string. Raise SubstitutionError if it cannot be evaluated.
+        """Return a Python expression's value as a string. Raise SubstitutionError if the expression is invalid.
 
         The expression can run any Python code, as ``<param command=...>`` can run any program.
         """

@@ -1,4 +1,4 @@
-"""roslib.gentools: md5sums and full texts of definition files, computed from their dependencies.
+"""roslib.gentools: md5sums and full definitions of definition files, computed from their dependencies.
 
 The functions use a dict that describes a definition's dependencies, with the keys ``package``, ``spec``, ``deps``,
 ``uniquedeps`` and ``files``.

@@ -110,7 +110,7 @@ def load_manifest(package: str) -> Manifest:
 
 
 def parse_file(file: str) -> Manifest:
-    """Return the manifest in a file. Raise ValueError if the file does not exist, ManifestException if it is invalid."""
+    """Return the manifest in a file. Raise ValueError if the file does not exist, ManifestException if its content is invalid."""
     if not file:
         raise ValueError("Missing manifest file argument")
     if not os.path.isfile(file):
@@ -120,7 +120,7 @@ def parse_file(file: str) -> Manifest:
 
 
 def parse(string: str, filename: str = "string") -> Manifest:
-    """Return the manifest in a string. Raise ManifestException if it is invalid."""
+    """Return the manifest in a string. Raise ManifestException if the manifest is invalid."""
     from xml.dom.minidom import parseString
 
     try:

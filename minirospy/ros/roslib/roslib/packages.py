@@ -68,7 +68,7 @@ def get_pkg_dir(
 
 
 def get_dir_pkg(d: str) -> tuple[str | None, str | None]:
-    """Return (folder, name) of the package that contains a path, or (None, None) if there is none."""
+    """Return (folder, name) of the package that contains a path, or (None, None) if no package contains it."""
     name = get_package_name(d)
     place = Path(d).absolute()
     folder = next((each for each in (place, *place.parents) if package_name(each) is not None), None)

@@ -75,7 +75,7 @@ class _MasterParser(Parser):
     """Ignores the remapping arguments that a launch file may add."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name. Raise CommandLineError if they are invalid."""
+        """Return the arguments by name. Raise CommandLineError if the arguments are invalid."""
         return super().parse(split_assignments(words)[0])
 
 

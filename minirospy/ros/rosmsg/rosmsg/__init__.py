@@ -327,7 +327,7 @@ def _list_resources(path: str, rfilter: Callable[[str], bool] = os.path.isfile) 
 
 
 def _msg_filter(ext: str) -> Callable[[str], bool]:
-    """Return a predicate that tells whether a path is a file with this extension."""
+    """Return a predicate that returns whether a path is a file with this extension."""
     return lambda path: os.path.isfile(path) and path.endswith(ext)
 
 

@@ -88,7 +88,7 @@ def _ping(node: str | None, all: bool, count: int) -> int:
 
 
 def _no_node_to_ping() -> Misuse:
-    """Return the error for a missing node name; it lists the nodes if a master responds."""
+    """Return the error for a missing node name. The error lists the nodes if a master responds."""
     try:
         with Graph.open("rosnode") as graph:
             nodes = list_nodes(graph)

@@ -191,7 +191,7 @@ def kill_nodes(node_names: list[str]) -> tuple[list[str], list[str]]:
 
 
 def cleanup_master_blacklist(master: masterapi.Master, blacklist: Sequence[str]) -> None:
-    """Unregister the nodes in ``blacklist`` from the master, and print their names.
+    """Unregister the nodes in ``blacklist`` from the master and print their names.
 
     Raise ConnectionRefusedError, as ROS does, if no master responds.
     """

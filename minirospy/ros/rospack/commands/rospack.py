@@ -170,7 +170,7 @@ def _not_found(tool: _Tool, verb: str, error: NotFoundError) -> str:
 def _package(line: _Line, *others: str, said: str = "package") -> str:
     """Return the package given on a command line, or the current folder's package.
 
-    Raise _RospackError if there is none, or if it is in ``others``.
+    Raise _RospackError if no package is given or found, or if an option named in ``others`` is missing.
     """
     package = line.package or _package_here()
     if not package or not all(line.options.get(name) for name in others):

@@ -67,7 +67,7 @@ class ManifestManager:
         return list(self._folders())
 
     def get_path(self, name: str) -> str:
-        """Return the folder of a package or stack. Raise ResourceNotFound if it does not exist."""
+        """Return the folder of a package or stack. Raise ResourceNotFound if there is no such package or stack."""
         folders = self._folders()
         if name not in folders:
             raise ResourceNotFound(name, self._ros_paths, nearest(name, folders))

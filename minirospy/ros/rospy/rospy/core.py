@@ -186,7 +186,7 @@ def register_signals() -> None:
 
 
 def get_ros_root(required: bool = False, env: Mapping[str, str] | None = None) -> str | None:
-    """Return ROS_ROOT from the environment. Raise ROSException if it is ``required`` and not set."""
+    """Return ROS_ROOT from the environment. If it is not set, raise ROSException if ``required``, else return None."""
     root = (os.environ if env is None else env).get("ROS_ROOT")
     if required and not root:
         raise ROSException("ROS_ROOT is not set")

@@ -84,7 +84,7 @@ def convert_ros_message_to_dictionary(
 
 
 def _to_ros(name: str, type_: str, value: Any, options: tuple[bool, bool, bool, str]) -> object:
-    """Convert a dict's value to a field's value. Raise TypeError if its type is wrong, ValueError if it is invalid."""
+    """Convert a dict's value to a field's value. Raise TypeError if the value's type is wrong, ValueError if it is invalid."""
     if array := _ARRAY.match(type_):
         if array[1] in _BINARY:
             return _bytes_of(name, value)

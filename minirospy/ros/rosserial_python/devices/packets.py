@@ -87,7 +87,7 @@ class Decoder:
         self._bytes.clear()
 
     def feed(self, data: bytes) -> Iterator[Packet | Fault | WrongVersion]:
-        """Add bytes, and yield the packets and errors that they complete."""
+        """Add bytes and yield the packets and errors that they complete."""
         self._bytes += data
         while self._bytes:
             if self._bytes[0] != _SYNC:

@@ -42,14 +42,14 @@ _logger = logging.getLogger("rostest")
 
 
 def printlog(msg: str, *args: object) -> None:
-    """Print a line with its ``%s`` replaced by ``args``, and log the line."""
+    """Print a line with its ``%s`` replaced by ``args`` and log the line."""
     text = msg % args if args else msg
     _logger.info("%s", text)
     print("[ROSTEST]" + text)
 
 
 def printlogerr(msg: str, *args: object) -> None:
-    """Print a line to stderr with its ``%s`` replaced by ``args``, and log the line as an error."""
+    """Print a line to stderr with its ``%s`` replaced by ``args`` and log the line as an error."""
     text = msg % args if args else msg
     _logger.error("%s", text)
     print("[ROSTEST]" + text, file=sys.stderr)

@@ -155,7 +155,7 @@ class _Publishing(NamedTuple):
 
 def _publish(options: _Publishing, arguments: Arguments | None) -> None:
     """Publish messages. ``arguments`` are the remapping arguments on the command line."""
-    # Import it here because the other verbs do not need message classes.
+    # Import fill_message here, because the other verbs do not need message classes.
     from minirospy.introspect.echo import fill_message
     from minirospy.introspect.publishing import publish_all, values_to_publish
 
@@ -232,7 +232,7 @@ def _first_values(all_values: Iterator[list[object]], options: _Publishing) -> l
 
 
 def _ros_argument_error(text: str) -> str:
-    """Return ROS's error message for an argument that is not valid YAML; it contains the error of PyYAML's own parser."""
+    """Return ROS's error message for an argument that is not valid YAML, including the error of PyYAML's own parser."""
     import yaml
 
     try:

@@ -214,7 +214,7 @@ def msgevalgen(pattern: str) -> Callable[[Message], object] | None:
 
 
 def _slice_fault(field: str) -> str:
-    """Return the error in a field's brackets, worded as in ROS, or an empty string if there is none."""
+    """Return the error in a field's brackets, worded as in ROS, or an empty string if there is no error."""
     name, bracket, rest = field.partition("[")
     if not bracket:
         return ""

@@ -42,7 +42,7 @@ def start_coverage(packages: Sequence[str]) -> None:
 
 
 def stop_coverage(packages: Sequence[str], html: str | None = None) -> None:
-    """Stop measuring the coverage, and print the coverage of ``packages``; also write a report into the folder ``html``."""
+    """Stop measuring the coverage and print the coverage of ``packages``; also write a report into the folder ``html``."""
     if not _running:
         return
     measured = _running.pop()

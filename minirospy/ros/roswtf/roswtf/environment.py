@@ -180,7 +180,7 @@ environment_errors: list[Rule] = [
 
 
 def wtf_check_environment(ctx: Any) -> None:
-    """Check the environment variables in a context, and add the errors and warnings to the context."""
+    """Check the environment variables in a context and add the errors and warnings to the context."""
     for rule in environment_warnings:
         warning_rule(rule, rule[0](ctx), ctx)
     for rule in environment_errors:

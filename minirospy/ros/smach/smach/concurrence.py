@@ -25,8 +25,8 @@ _SHUTDOWN_CHECK = 0.1  # seconds between two checks for a shutdown
 class Concurrence(Container):
     """Executes all of its states in parallel, and finishes when all of them have finished.
 
-    Its outcome is the return value of ``outcome_cb``, else the outcome in ``outcome_map`` that most states match, else
-    ``default_outcome``. It is "preempted" if the states finished because the container was preempted.
+    The container's outcome is the return value of ``outcome_cb``, else the outcome in ``outcome_map`` that most states match,
+    else ``default_outcome``. The outcome is "preempted" if the states finished because the container was preempted.
     """
 
     def __init__(

@@ -58,7 +58,7 @@ class Container(State):
         raise NotImplementedError
 
     def set_initial_state(self, initial_states: Sequence[str], userdata: UserData) -> None:
-        """Set the initial states, and add ``userdata`` to the container's userdata."""
+        """Set the initial states and add ``userdata`` to the container's userdata."""
         raise NotImplementedError
 
     def get_initial_states(self) -> list[str]:
@@ -160,7 +160,7 @@ class Container(State):
         Container._construction_stack.append(self)
 
     def close(self) -> None:
-        """Close the container, and log an error if it is not consistent."""
+        """Close the container and log an error if it is not consistent."""
         self._leave()
         try:
             self.check_consistency()

@@ -67,7 +67,7 @@ class StateMachine(Container):
         remapping: Mapping[str, str] | None = None,
         constants: Mapping[str, object] | None = None,
     ) -> object:
-        """Add a state to the open machine, and return the state.
+        """Add a state to the open machine and return the state.
 
         ``transitions`` maps each outcome to a label or to an outcome of the machine; ``remapping`` maps the state's keys
         to the machine's keys; ``constants`` are values that are set in the userdata before the state executes. Raise

@@ -94,7 +94,7 @@ class ActionServerWrapper:
             self._action_server.publish_feedback(userdata[self._feedback_key])
 
     def execute_cb(self, goal: Message) -> None:
-        """Execute the container with a goal, and set the goal's final state from its outcome."""
+        """Execute the container with a goal and set the goal's final state from its outcome."""
         self._store_goal(goal)
         container = self.wrapped_container
         try:

@@ -54,7 +54,7 @@ class IntrospectionClient:
         initial_userdata: UserData | None = None,
         timeout: rospy.Duration | None = None,
     ) -> bool | None:
-        """Set the initial states of the container at a path, and add values to its userdata.
+        """Set the initial states of the container at a path and add values to its userdata.
 
         Return whether the container confirmed the change within ``timeout``, or None without a timeout.
         """

@@ -122,7 +122,7 @@ class SimpleActionState(State):
                 return
 
     def request_preempt(self) -> None:
-        """Preempt the state, and cancel its goal."""
+        """Preempt the state and cancel its goal."""
         rospy.loginfo(f"Preempt requested on action '{self._action_name}'")
         super().request_preempt()
         if self._status == SimpleActionState.ACTIVE:
@@ -177,7 +177,7 @@ class SimpleActionState(State):
         return None
 
     def _wait_for_result(self) -> bool:
-        """Return whether the result has arrived; cancel the goal if it takes too long."""
+        """Return whether the result has arrived; cancel the goal if the result takes too long."""
         cancelled: rospy.Time | None = None
 
         while not self._done.wait(_LOOK):

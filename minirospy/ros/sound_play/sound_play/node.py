@@ -183,7 +183,7 @@ class SoundNode:
             rospy.logerr(str(error))
 
     def _execute(self, goal: SoundRequestGoal) -> None:
-        """Stop all other sounds, and play one with feedback until it has ended."""
+        """Stop all other sounds and play the requested sound, with feedback, until it has ended."""
         self.close()
         start = rospy.Time.now()
         feedback = SoundRequestFeedback()

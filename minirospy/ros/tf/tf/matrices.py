@@ -38,7 +38,7 @@ _NEAR = 1e-8
 
 
 def identity_matrix() -> Floats:
-    """Return the 4x4 identity."""
+    """Return the 4x4 identity matrix."""
     import numpy
 
     return numpy.identity(4, dtype=numpy.float64)

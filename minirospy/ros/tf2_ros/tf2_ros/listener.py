@@ -66,7 +66,7 @@ class TransformListener:
 
     def check_for_reset(self) -> None:
         """Clear the buffer if time has jumped back since the last message."""
-        # Read the time while holding the lock; otherwise, a thread that is overtaken by another one would report a
+        # Read the time while holding the lock; otherwise, a thread that is overtaken by another thread would report a
         # jump.
         with self.last_update_lock:
             now = rospy.get_time()

@@ -171,7 +171,7 @@ def _positive(text: str) -> float:
 
 
 def _precision() -> int | None:
-    """Return the parameter ~precision. Raise ToolError if it is invalid."""
+    """Return the parameter ~precision. Raise ToolError if the parameter is invalid."""
     value = rospy.get_param("~precision", None)
     if value is None:
         return None

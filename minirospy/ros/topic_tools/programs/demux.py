@@ -1,4 +1,4 @@
-"""demux: forward a topic to one of several others, selected through services.
+"""demux: forward a topic to one of several output topics, selected through services.
 
 Topic demux/selected (latched); services demux/select, demux/add, demux/list, demux/delete; ``__none`` selects no output.
 """

@@ -1,4 +1,4 @@
-"""mux: forward one of several topics, selected through services.
+"""mux: forward one of several input topics, selected through services.
 
 Topic mux/selected (latched); services mux/select, mux/add, mux/list, mux/delete, OUT_select; ``__none`` selects no input.
 Parameters: ~lazy (subscribe only to the selected topic, while the output has subscribers), ~latch, ~initial_topic.

@@ -119,7 +119,7 @@ def _picture(robot: Robot) -> str:
 
 
 def _read(file: str) -> Robot:
-    """Read the robot from a file, and print its problems. Raise WordedError if the file cannot be read or parsed."""
+    """Read the robot from a file and print its problems. Raise WordedError if the file cannot be read or parsed."""
     from minirospy.core.urdf.read import read_robot
 
     try:

@@ -92,7 +92,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
     If a client cancels the goal, ``execute`` is cancelled: CancelledError is raised at its current ``await``. The goal is
     then preempted, with the result that ``execute`` may still return.
 
-    One goal runs at a time, and a newer one preempts it, as in SimpleActionServer; with ``concurrent``, goals run
+    One goal runs at a time, and a newer one preempts it, as in SimpleActionServer; if ``concurrent``, goals run
     concurrently. ``accepts(goal)`` may reject a goal by returning False.
 
     Use it with ``async with``, or call ``await server.close()`` when done. Raise ActionException if ``action`` is not an
@@ -134,7 +134,7 @@ class ActionServer(ActionEnd, Generic[_G, _R, _F]):
         self._registration = self._start(self._register())
 
     async def close(self) -> None:
-        """Unregister from the action's topics, and abort running goals. Idempotent."""
+        """Unregister from the action's topics and abort running goals. Idempotent."""
         self._is_closed = True
         await self._end_tasks()
         for end in (*self._subscriptions, self._result, self._feedback, self._status):

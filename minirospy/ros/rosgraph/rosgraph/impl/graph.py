@@ -112,7 +112,7 @@ class EdgeList:
 def edge_args(start: str, dest: str, direction: str, label: str) -> list[tuple[str, str, str]]:
     """Return [(start, end, label)] for a row from getBusInfo.
 
-    The edge is reversed for direction ``i``. For ``b`` there are two edges; for an unknown direction there is none.
+    The edge is reversed for direction ``i``. Direction ``b`` results in two edges, an unknown direction in none.
     """
     there, back = (start, dest, label), (dest, start, label)
     return {"o": [there], "i": [back], "b": [there, back]}.get(direction, [])

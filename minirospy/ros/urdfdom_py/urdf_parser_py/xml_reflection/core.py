@@ -228,7 +228,7 @@ class Object:
         return found
 
     def parse(self: _T, xml_string: str | bytes) -> _T:
-        """Read an XML string into this object, and return the object. Raise exceptions as from_xml_string does."""
+        """Read an XML string into this object and return the object. Raise exceptions as from_xml_string does."""
         self.read_xml(_root(xml_string), Path(self.TAG))
         return self
 
