@@ -160,7 +160,8 @@ class SimulatedClock:
     ) -> None:
         """Start at ``now``; ``changed`` is notified each time the clock is set.
 
-        ``on_silence()`` is called once, in a thread that has waited two seconds for the first time.
+        ``on_silence()`` is called once, in a thread that has waited two seconds for the clock to be set for the first
+        time.
         """
         self._now = now
         self._first = FirstTimeWait(on_silence)

@@ -451,7 +451,7 @@ class ThreadLimitError(ROSException):
 
 
 class NoThreadsAtEndError(ThreadLimitError):
-    """A thread cannot be started: Python 3.12.0 to 3.12.2 start none once the main thread has exited (CPython issue 113964)."""
+    """A thread cannot be started: Python 3.12.0 to 3.12.2 start none after the main thread has exited (CPython issue 113964)."""
 
     def __init__(self) -> None:
         super().__init__(0, [])

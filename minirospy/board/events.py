@@ -26,7 +26,7 @@ class Slope(IntEnum):
 
 
 class Detector:
-    """Watches one channel: decides which edges count, and records that one has occurred.
+    """Watches one channel: decides which edges to report, and records that one has occurred.
 
     ``bouncetime`` is in seconds, or None for no debouncing.
     """
@@ -62,7 +62,7 @@ class Detector:
         return occurred
 
     def wait(self, timeout: float | None) -> bool:
-        """Wait up to ``timeout`` seconds for an edge that counts; return whether one occurred."""
+        """Wait up to ``timeout`` seconds for an edge to report; return whether one occurred."""
         if timeout is not None or sys.platform != "win32":
             return self._occurred.wait(timeout)
         # Wait in slices, because Windows delivers Ctrl-C only between waits.

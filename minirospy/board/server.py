@@ -129,7 +129,7 @@ class _Server:
             self._wait_for_clients()
 
     def carry_out(self, request: Request) -> Message:
-        """Apply a request and notify all clients; return the response for the caller."""
+        """Apply a request and notify all clients; return the response for the client that sent the request."""
         if request.operation is None:
             return Done(request.number)
         try:

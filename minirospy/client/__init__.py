@@ -203,7 +203,7 @@ def get_node_uri() -> str | None:
 
 
 def is_shutdown_requested() -> bool:
-    """Return whether a shutdown has started; while its hooks run, is_shutdown() is still false."""
+    """Return whether a shutdown has started; while the shutdown hooks run, is_shutdown() still returns False."""
     return current_session().lifecycle.is_shutdown_requested
 
 

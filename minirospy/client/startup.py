@@ -169,7 +169,10 @@ def _is_interrupt(error: BaseException) -> bool:
 
 
 def _wait_for_master(session: Session) -> None:
-    """Wait until the master responds; print once if it does not. Raise ROSInterruptException if the node shuts down."""
+    """Wait until the master responds; print a message once if it does not.
+
+    Raise ROSInterruptException if the node shuts down.
+    """
     uri = session.identity.environment.master_uri
     is_reported = False
 

@@ -231,7 +231,10 @@ class SubscribedTopic(SharedTopic):
         unregister_from_master(wait)
 
     def add_callback(self, cb: Callable[..., object], cb_args: object) -> None:
-        """Add the callback ``cb``, and call it immediately with the last message if the topic is latched; rosbridge uses this."""
+        """Add the callback ``cb``. If the topic is latched, call ``cb`` immediately with the last message.
+
+        rosbridge calls this method.
+        """
         callback = _Callback(cb, cb_args)
         with self._session.lock:
             self._added.append(callback)
@@ -283,7 +286,7 @@ class SubscribedTopic(SharedTopic):
             register_with_master("subscription", self.resolved_name, wait)
 
     def _newest(self) -> int:
-        """Return how many messages to keep: as many as the Subscriber with the largest queue_size."""
+        """Return the number of messages to keep, as required by the Subscriber with the largest queue_size."""
         sizes = [handle._newest for handle in self._handles]
         return 0 if 0 in sizes else max(sizes, default=0)
 

@@ -1,4 +1,4 @@
-"""`catkin_make install`: copy what a package needs at run time to the install folder."""
+"""`catkin_make install`: copy the files that a package needs at run time to the install folder."""
 
 from __future__ import annotations
 

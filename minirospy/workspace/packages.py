@@ -205,7 +205,7 @@ def built_in_roots() -> tuple[Path, ...]:
 
 
 def crawl(root: Path) -> Iterator[Path]:
-    """Yield the package folders at or below ``root`` as rospack does: skip folders inside packages, and hidden ones."""
+    """Yield the package folders at or below ``root`` as rospack does: skip folders inside packages and hidden folders."""
     if (root / _MANIFEST).is_file():
         if not (root / "CATKIN_IGNORE").exists():
             yield root

@@ -489,7 +489,7 @@ def _error(command: Command, text: str) -> BuildError:
 
 
 def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return two tuples of patterns: those included by ``PATTERN x`` and ``REGEX x``, and those followed by ``EXCLUDE``."""
+    """Return two tuples of patterns (``PATTERN x``, ``REGEX x``): those to include, and those followed by ``EXCLUDE``."""
     chosen: list[str] = []
     excluded: list[str] = []
     for index, (kind, text) in enumerate(pairwise(arguments)):

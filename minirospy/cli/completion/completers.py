@@ -307,7 +307,7 @@ def _as_typed(names: Iterable[str], word: str) -> list[str]:
 
 
 def topics(cursor: Cursor) -> Iterable[str]:
-    """Return the topics; for echo and type, also the fields of their messages."""
+    """Return the topics; for `echo` and `type`, also return the fields of their messages."""
     from minirospy.introspect.topics import find_topic, topic_names
 
     fields = cursor.verb in ("echo", "type") and "/" in cursor.word[1:]
@@ -515,7 +515,7 @@ def on_one_line(text: str) -> str:
 
 
 def pins(cursor: Cursor) -> Iterable[str]:
-    """Return the virtual board's wired pins; for press, the pins with buttons."""
+    """Return the virtual board's wired pins; for `press`, return the pins with buttons."""
     from minirospy.board.model import BUTTONS, LEDS
 
     return map(str, BUTTONS if cursor.verb in ("press", "release") else (*LEDS, *BUTTONS))

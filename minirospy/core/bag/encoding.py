@@ -55,7 +55,7 @@ def message_prefix(connection: int) -> bytes:
 
 
 def message_prefixes(connection: int) -> tuple[bytes, bytes]:
-    """Return :func:`message_prefix` as rosbag writes it in Python, and as it does in C++, with sorted fields.
+    """Return :func:`message_prefix` as rosbag's Python writer writes it, and as its C++ writer does, with sorted fields.
 
     A reader recognizes nearly every message by comparing it with these two; :func:`parse_record` parses the others.
     """

@@ -286,7 +286,7 @@ class _Loose(_Run):
 
 
 class _Bounded:
-    """A stream for the library, which may request any length: returns the available data without allocating that length."""
+    """A stream for the mcap library, which may request any length; returns the available data without allocating that length."""
 
     def __init__(self, data: bytes) -> None:
         self._stream = BytesIO(data)

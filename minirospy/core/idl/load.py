@@ -409,7 +409,10 @@ _running: weakref.WeakValueDictionary[int, type[Message]] = weakref.WeakValueDic
 
 
 def _reduced(message: Any) -> tuple[Any, ...]:
-    """Return how pickle and copy can recreate a message whose class is in no module: from the class's full text."""
+    """Return the data with which pickle and copy recreate a message whose class is in no module.
+
+    The data contains the class's full text.
+    """
     kind = type(message)
     return _unpickled, (id(kind), kind._type, kind._full_text), message.__getstate__()
 

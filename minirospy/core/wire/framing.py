@@ -190,7 +190,7 @@ class FrameReader:
         return self._wanted
 
     def put_back(self, data: bytes) -> None:
-        """Store these few bytes as the first received bytes; the buffer must be empty."""
+        """Store ``data``, which is short, as the first received bytes; the buffer must be empty."""
         self._end = len(data)
         self._small[: self._end] = data
 

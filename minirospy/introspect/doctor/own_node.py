@@ -44,7 +44,7 @@ _log = logging.getLogger(__name__)
 
 
 class DoctorNode:
-    """A node that publishes a latched message to any peer; registered while the context is active.
+    """A node that publishes a latched message to any peer. It is registered while the context is active.
 
     Entering raises OSError if no server can be opened at this machine's address.
     """

@@ -279,7 +279,10 @@ class Notifier:
     def _called(
         self, node: _Backlog, line: _Line, notice: Notice, count: int, size: int, answer: Body | RpcError
     ) -> None:
-        """Continue after a call whose notification listed ``count`` publishers; ``size`` is its size in bytes if it was large."""
+        """Continue after a call whose notification listed ``count`` publishers.
+
+        ``size`` is the call's size in bytes, if the call was large.
+        """
 
         line.under_way -= 1
         self._large_bytes -= size

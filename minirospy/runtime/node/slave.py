@@ -208,7 +208,7 @@ class SlaveApi:
 
 
 def _refusal_before_tcpros(protocols: object) -> Answer | None:
-    """Return rospy's response if the list has no TCPROS, or an invalid entry before it; otherwise None."""
+    """Return rospy's response if the list does not contain TCPROS, or contains an invalid entry before it; otherwise None."""
     if not isinstance(protocols, (list, dict, str)):
         kind = type(protocols).__name__
         return [ERROR, f"Error: invalid arguments: {kind!r} object is not iterable", []]

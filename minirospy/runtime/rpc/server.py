@@ -201,7 +201,10 @@ class RpcServer:
         self._late.pop(connection, None)
 
     def _may_read(self) -> bool:
-        """Return whether one more connection may be read in this loop iteration; now and then, accept new connections first."""
+        """Return whether one more connection may be read in this loop iteration.
+
+        Occasionally, accept new connections first.
+        """
         if self._reads_over:
             return False
         self._reads += 1

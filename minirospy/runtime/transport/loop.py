@@ -56,7 +56,7 @@ class LoopThread:
         return self.start(coroutine)(timeout)
 
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[float | None], _T]:
-        """Start ``coroutine``, like the first half of :meth:`run`; coroutines start in the order of the calls.
+        """Start ``coroutine`` as :meth:`run` does, without waiting; coroutines start in the order of the calls.
 
         Return a function that waits for the result; call it once.
         """

@@ -127,7 +127,7 @@ def watch_frames_in_turns(
     most: int,
     on_left_out: Callable[[], None],
 ) -> None:
-    """Read frames on the loop in steps; ``start_steps`` runs them in turns with those of other connections.
+    """Read frames on the loop in steps; ``start_steps`` runs the steps alternately with those of other connections.
 
     Frames of more than ``most`` bytes are skipped; ``on_left_out`` is called for each.
     """

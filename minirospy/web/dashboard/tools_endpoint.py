@@ -235,7 +235,7 @@ class ToolsSession(JsonSession):
         return {}
 
     async def _cleanup(self, fields: Fields) -> list[str]:
-        """Unregister those of ``nodes`` that still do not respond, as `rosnode cleanup` does; return their names."""
+        """Unregister the nodes in ``nodes`` that still do not respond, as `rosnode cleanup` does; return their names."""
         self._require_writing("unregisters no node")
         wanted = texts_of(fields, "nodes")
 

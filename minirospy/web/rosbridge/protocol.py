@@ -142,7 +142,7 @@ class Unsubscribe(TopicEvent):
 
 @dataclass(frozen=True)
 class CallService(ServiceEvent):
-    """Call a service. ``arguments``: the request's fields, or a list of their values; anything else means none."""
+    """Call a service. ``arguments``: the request's fields, or a list of their values; any other value means no fields."""
 
     arguments: object
     fragment_size: int | None

@@ -1,4 +1,4 @@
-"""A client's subscriptions to one topic, merged into one; the rate at which messages are sent; received fragments. Pure."""
+"""A client's subscriptions to one topic, merged into one; a rate limit for messages; and received fragments. Pure."""
 
 from __future__ import annotations
 
