@@ -29,9 +29,22 @@ _NUMBERS = frozenset({"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"})
 
 def safe_load(text: str) -> object:
     """Parse YAML text, like yaml.safe_load. Raise yaml.YAMLError if it is invalid, TypeError if it is not a string."""
+    return load(text, _plain_loader())
+
+
+@lru_cache(maxsize=1)
+def _plain_loader() -> type[yaml.SafeLoader]:
+    """Return a safe loader that reads !!binary as bytes, even after `import rosparam`, which changes PyYAML's own loaders."""
     import yaml
 
-    return load(text, yaml.SafeLoader)
+    class PlainLoader(yaml.SafeLoader):
+        pass
+
+    def binary(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> object:
+        return loader.construct_yaml_binary(node)
+
+    PlainLoader.add_constructor("tag:yaml.org,2002:binary", binary)
+    return PlainLoader
 
 
 def load(text: str, loader: Loader) -> Any:

@@ -16,6 +16,7 @@ import pytest
 import yaml
 
 from minirospy.base.environment import Environment
+from minirospy.base.yaml_text import safe_load
 from minirospy.cli.completion import completers
 from minirospy.cli.completion.complete import candidates, main
 from minirospy.cli.registry import COMMANDS, Entry, console_scripts
@@ -399,7 +400,7 @@ def test_every_text_is_a_message() -> None:
         for spec in catalogue.messages(package):
             text = prototype(spec, catalogue)
             message = message_class(spec.full_name)()
-            serialize(fill(message, [yaml.safe_load(text)]))
+            serialize(fill(message, [safe_load(text)]))
 
 
 # --- the graph

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Iterator
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from minirospy.base import yaml_text
 from minirospy.base.errors import ValueTextError
+from minirospy.base.yaml_text import safe_load
 from minirospy.introspect.values import (
     check_parameter,
     format_pretty,
@@ -231,3 +233,8 @@ def test_non_string_raises_type_error_as_in_pyyaml(value: object) -> None:
         yaml_text.safe_load(value)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="YAML is a text, not "):
         list(parse_documents(value, "file"))  # type: ignore[arg-type]
+
+
+def test_binary_is_read_as_bytes_even_if_rosparam_has_changed_pyyaml() -> None:
+    importlib.import_module("rosparam")
+    assert safe_load("!!binary aGk=") == b"hi"
