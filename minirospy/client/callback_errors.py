@@ -51,7 +51,8 @@ class CallbackErrors:
         now = self._clock()
         name = getattr(callback, "__qualname__", type(callback).__qualname__)
         place = type(error), name, *_place(error.__traceback__)
-        line = f"bad callback: {callback}: {' '.join(traceback.format_exception_only(error)[-1].split())}"
+        shown = _shown(callback)
+        line = f"bad callback: {shown}: {type(error).__name__}: {' '.join(_shown(error).split())}"
         with self._lock:
             known = self._known.get(place)
             if known is None:
@@ -66,7 +67,7 @@ class CallbackErrors:
 
         if known is None:
             text = "".join(traceback.format_exception(error))
-            _log.error("bad callback: %s\n%s", callback, text, stacklevel=2)
+            _log.error("bad callback: %s\n%s", shown, text, stacklevel=2)
         else:
             _log.error("%s", line, stacklevel=2)
 
@@ -78,6 +79,14 @@ class CallbackErrors:
                 known.omitted = 0
         for line in lines:
             _log.error("%s", line)
+
+
+def _shown(value: object) -> str:
+    """Return str() of a program's object, or a replacement if that fails."""
+    try:
+        return str(value)
+    except Exception:  # noqa: BLE001 - any exception that the program's __str__ or __repr__ raises
+        return f"<{type(value).__qualname__} whose str() fails>"
 
 
 def _counted(known: _Repeated) -> str:

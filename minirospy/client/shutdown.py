@@ -112,6 +112,14 @@ class ShutdownMachine:
         self._done.update(due)
         return due
 
+    def drop_request(self) -> None:
+        """Forget the request from another process, because the main thread must not be interrupted for it.
+
+        A signal from the user may still interrupt the main thread.
+        """
+        self.is_requested = False
+        self._done.discard(Action.INTERRUPT)
+
     @property
     def main_ends_by_itself(self) -> bool:
         """Return whether the main thread will exit without an exception, because it has exited or has been notified."""

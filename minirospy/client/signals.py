@@ -123,6 +123,7 @@ class SignalWatchdog:
     # --- main thread
 
     def on_signal(self, number: int, _: FrameType | None) -> None:
+        """Handle a signal in the main thread, with the arguments of a handler in Python's `signal` module."""
         self._number = number
         self._deferral.pending = True
         self._handled += 1
@@ -217,6 +218,7 @@ class SignalWatchdog:
         if hasattr(sys, "ps1") or not callable(handler):
             # Do not interrupt an interactive session, because the user would lose its variables. Do not send a signal
             # that is ignored, or that would terminate the process.
+            self._machine.drop_request()
             return
 
         report_interrupt(str(self._lifecycle.reason))

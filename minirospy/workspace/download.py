@@ -57,8 +57,9 @@ def _is_right(wanted: Download) -> bool:
 
 
 def _fetch(wanted: Download) -> None:
-    """Download a file. The file appears under its name only once it is complete."""
+    """Download a file. The file appears under its name only once it is complete. Raise OSError or ValueError otherwise."""
     # Imported here, because the import takes as long as a build without downloads.
+    from http.client import HTTPException
     from urllib.request import Request, urlopen
 
     wanted.path.parent.mkdir(parents=True, exist_ok=True)
@@ -67,6 +68,11 @@ def _fetch(wanted: Download) -> None:
     try:
         with urlopen(Request(url), timeout=_TIMEOUT) as source, part.open("wb") as target:
             shutil.copyfileobj(source, target)
+            missing = getattr(source, "length", None)
+        if missing:
+            raise OSError(f"the connection was closed {missing} bytes before the end")
         os.replace(part, wanted.path)
+    except HTTPException as error:
+        raise OSError(f"the response is not HTTP, or incomplete ({type(error).__name__}: {error})") from error
     finally:
         part.unlink(missing_ok=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import re
 import signal
 import subprocess
@@ -458,3 +459,21 @@ def test_argument_that_yaml_cannot_hold_is_misuse(master: str, command: Any, tex
     done = command("rostopic", "pub", "-1", "/f", "std_msgs/String", text)
     assert done.status == 2
     assert len(own_lines(done.err)) == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="select() supports only sockets on Windows")
+def test_documents_on_stdin_are_read_as_soon_as_they_arrive() -> None:
+    """Several lines in one write do not wait in a buffer for the next write."""
+    program = "import rostopic\nfor document in rostopic.stdin_yaml_arg():\n    print(document, flush=True)\n"
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdin
+        assert process.stdout
+        process.stdin.write("a: \xe4\n---\nb: 1\n---\nc: ".encode())
+        process.stdin.flush()
+        assert process.stdout.readline().decode() == "{'a': '\xe4'}\n"
+        assert process.stdout.readline() == b"{'b': 1}\n"
+        process.stdin.write(b"2\n---\nd: 1\n")
+        process.stdin.close()
+        assert process.stdout.read() == b"{'c': 2}\n"

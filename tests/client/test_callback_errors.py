@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 
 import pytest
 
@@ -93,3 +94,27 @@ def test_other_errors_are_logged_in_full(errors: CallbackErrors, caplog: pytest.
         errors.log("CALLBACK", error)
     value, kind = IN_FULL.format("ValueError: text"), IN_FULL.format("TypeError: text")
     assert messages(caplog) == [value, kind, value.replace("CALLBACK", str(len)), value]
+
+
+def test_notes_do_not_replace_the_error(errors: CallbackErrors, caplog: pytest.LogCaptureFixture) -> None:
+    for _ in range(2):
+        try:
+            raise ValueError("text")
+        except ValueError as error:
+            if sys.version_info >= (3, 11):
+                error.add_note("a note")
+            errors.log("CALLBACK", error)
+    errors.close()
+    assert caplog.messages[-1] == COUNTED.format("ValueError: text", 1)
+
+
+def test_error_is_logged_even_if_the_callback_cannot_be_shown(
+    errors: CallbackErrors, caplog: pytest.LogCaptureFixture
+) -> None:
+    class Broken:
+        def __repr__(self) -> str:
+            raise RuntimeError
+
+    fail(errors, callback=Broken())
+    assert caplog.messages[0].startswith("bad callback: <")
+    assert "Broken whose str() fails>" in caplog.messages[0]

@@ -177,6 +177,16 @@ def test_a_signal_after_a_request_leaves_a_loop_that_polls_its_time(machine: Shu
     assert timeline(machine, 1.0, 10.0) == [(3.0, Action.REPORT), (5.0, Action.INTERRUPT)]
 
 
+def test_ctrl_c_interrupts_a_session_that_a_request_must_not_interrupt(machine: ShutdownMachine) -> None:
+    machine.is_requested = True
+    machine.phase = Phase.LEFT
+    assert timeline(machine, 0.0, 3.0) == [(2.0, Action.INTERRUPT)]
+    machine.drop_request()
+    assert timeline(machine, 3.0, 100.0) == []
+    machine.signal(100.0)
+    assert timeline(machine, 100.0, 101.0) == [(100.0, Action.INTERRUPT)]
+
+
 @pytest.fixture
 def lifecycle() -> Lifecycle:
     return Lifecycle(lambda: None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import threading
 from io import BytesIO
@@ -188,3 +189,27 @@ def test_a_master_changes_its_uri_and_its_caller(master: str) -> None:
     client.caller_id = "/other"
     client.registerService("/serve", "rosrpc://localhost:3", "http://localhost:1")
     assert client.getSystemState()[2] == [["/serve", ["/other"]]]
+
+
+def test_folder_that_another_process_creates_at_the_same_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = os.mkdir
+
+    def mkdir(path: str) -> None:
+        real(path)  # by the other process
+        real(path)
+
+    monkeypatch.setattr(os, "mkdir", mkdir)
+    rosgraph.roslogging.makedirs_with_parent_perms(str(tmp_path / "a" / "b"))
+    assert (tmp_path / "a" / "b").is_dir()
+
+
+def test_folder_whose_owner_cannot_be_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError
+
+    tmp_path.chmod(0o1777)
+    monkeypatch.setattr(os, "chmod", refuse)
+    rosgraph.roslogging.makedirs_with_parent_perms(str(tmp_path / "a"))
+    assert (tmp_path / "a").is_dir()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import shlex
+import socket
 import subprocess
 import sys
+import threading
 from typing import TYPE_CHECKING
 
 import pytest
@@ -980,6 +982,38 @@ def test_download_that_is_required(scene: Scene, capsys: pytest.CaptureFixture[s
     assert catkin_make(["-C", str(scene.root)]) == 1
     line = f"{folder / 'CMakeLists.txt'}:3: cannot download {scene.root.as_uri()}/none: "
     assert line in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("response", "reason"),
+    [
+        (b"HTTP/1.0 200 OK\r\nContent-Length: 1000\r\n\r\nsome data", "closed 991 bytes before the end"),
+        (
+            b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n64\r\nsome data",
+            "incomplete (IncompleteRead",
+        ),
+        (b"\0\0\r\n\r\n", "the response is not HTTP"),
+    ],
+)
+def test_download_that_ends_early(
+    scene: Scene, capsys: pytest.CaptureFixture[str], response: bytes, reason: str
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def respond() -> None:
+            peer, _ = server.accept()
+            with peer:
+                peer.recv(1 << 16)
+                peer.sendall(response)
+
+        thread = threading.Thread(target=respond)
+        thread.start()
+        url = f"http://127.0.0.1:{server.getsockname()[1]}/data.txt"
+        scene.package("p", f"catkin_download(p_data {url})")
+        assert catkin_make(["-C", str(scene.root)]) == 0
+        thread.join()
+    assert f"{reason}" in capsys.readouterr().out
+    assert not list(scene.root.rglob("data.txt*"))
 
 
 def test_service_without_a_response(scene: Scene) -> None:

@@ -218,17 +218,9 @@ def file_yaml_arg(filename: str) -> Callable[[], Iterator[list[Any]]]:
 
 def stdin_yaml_arg() -> Iterator[Any]:
     """Yield each YAML document on stdin; a line with three hyphens ends a document. Stop at the end of stdin or at shutdown."""
-    import rospy
-
     lines: list[str] = []
-    while not rospy.is_shutdown():
-        if (
-            os.name != "nt" and not select.select([sys.stdin], [], [], 1.0)[0]
-        ):  # select() supports only sockets on Windows
-            continue
-        line = sys.stdin.readline()
-        if not line:
-            return  # ignore a document without an end, because it may be incomplete
+    # A document without an end is ignored, because it may be incomplete.
+    for line in _lines_of_stdin():
         if line.strip() != "---":
             lines.append(line)
             continue
@@ -240,6 +232,32 @@ def stdin_yaml_arg() -> Iterator[Any]:
         if document is not None:
             yield document
         lines.clear()
+
+
+def _lines_of_stdin() -> Iterator[str]:
+    """Yield the lines of stdin as they arrive. Stop at the end of stdin or at shutdown."""
+    import rospy
+
+    if os.name == "nt":
+        # select() supports only sockets on Windows.
+        while not rospy.is_shutdown() and (line := sys.stdin.readline()):
+            yield line
+        return
+
+    encoding, descriptor = sys.stdin.encoding, sys.stdin.fileno()
+    started: list[bytes] = []  # parts of a line whose end has not arrived
+    while not rospy.is_shutdown():
+        if not select.select([descriptor], [], [], 1.0)[0]:
+            continue
+        # Do not use readline(): the lines that it buffers are invisible to select().
+        data = os.read(descriptor, 1 << 16)
+        if not data:
+            return
+        *ended, rest = data.split(b"\n")
+        for part in ended:
+            yield b"".join([*started, part]).decode(encoding, "replace") + "\n"
+            started.clear()
+        started.append(rest)
 
 
 def param_publish_once(

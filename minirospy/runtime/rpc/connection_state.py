@@ -1,6 +1,8 @@
 """The states of a server's connection to one client, and a table of their transitions. Pure.
 
-How it works ------------ An event leads from one state to the next; an event that the table does not contain for a
+How it works
+------------
+An event leads from one state to the next; an event that the table does not contain for a
 state changes nothing. The state decides whether requests are read, so the shell,
 :mod:`minirospy.runtime.rpc.connection`, starts and stops reading on a transition only. All other data of a connection
 belongs to the current request or to the output, and may exist in any state:

@@ -55,18 +55,22 @@ class _LargeWork:
         self._name = name  # name of the thread
         self._thread: ThreadPoolExecutor | None = None  # created for the first work
         self._is_busy = asyncio.Lock()
+        self._is_closed = False
 
     async def __call__(self, work: Callable[[], _T]) -> _T:
         """Run ``work`` in the thread and return its result."""
         # Do not queue work in the executor: if a client leaves while its work waits here, the message is freed
         # immediately.
         async with self._is_busy:
+            if self._is_closed:
+                raise asyncio.CancelledError
             if self._thread is None:
                 self._thread = ThreadPoolExecutor(1, self._name)
             return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def close(self) -> None:
-        """Stop the thread after the work in progress. Idempotent."""
+        """Stop the thread after the work in progress, and cancel work that is queued. Idempotent."""
+        self._is_closed = True
         if self._thread:
             self._thread.shutdown(wait=False, cancel_futures=True)
             self._thread = None

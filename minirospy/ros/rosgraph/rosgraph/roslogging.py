@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import sys
@@ -95,12 +96,17 @@ def makedirs_with_parent_perms(p: str) -> None:
     if os.path.exists(path) or parent == path:
         return
     makedirs_with_parent_perms(parent)
-    os.mkdir(path)
+    try:
+        os.mkdir(path)
+    except FileExistsError:
+        return  # another process has created the folder in the meantime
     wanted, made = os.stat(parent), os.stat(path)
-    if os.name != "nt" and (wanted.st_uid, wanted.st_gid) != (made.st_uid, made.st_gid):
-        os.chown(path, wanted.st_uid, wanted.st_gid)
-    if wanted.st_mode != made.st_mode:
-        os.chmod(path, wanted.st_mode)
+    # Only root may give a folder to another user, for example to that of /tmp: otherwise, the folder stays the user's own.
+    with contextlib.suppress(PermissionError):
+        if os.name != "nt" and (wanted.st_uid, wanted.st_gid) != (made.st_uid, made.st_gid):
+            os.chown(path, wanted.st_uid, wanted.st_gid)
+        if wanted.st_mode != made.st_mode:
+            os.chmod(path, wanted.st_mode)
 
 
 def renew_latest_logdir(logfile_dir: str) -> bool:
