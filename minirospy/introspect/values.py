@@ -238,6 +238,10 @@ def arithmetic(text: str) -> float:
         ast.Sub: operator.sub,
         ast.Mult: operator.mul,
         ast.Div: operator.truediv,
+        ast.FloorDiv: operator.floordiv,
+        ast.Mod: operator.mod,
+        # Of floats, so that 9**9**9 is an error, not an integer that fills the memory.
+        ast.Pow: math.pow,
     }
 
     def value(node: ast.expr) -> float:
@@ -253,6 +257,6 @@ def arithmetic(text: str) -> float:
             case ast.BinOp(left=left, op=op, right=right) if type(op) in binary:
                 return float(binary[type(op)](value(left), value(right)))
             case _:
-                raise ValueError("only numbers, pi, + - * / and brackets")
+                raise ValueError("only numbers, pi, + - * / // % ** and brackets")
 
     return value(ast.parse(text.strip(), mode="eval").body)

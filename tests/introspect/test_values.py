@@ -62,8 +62,16 @@ def test_angles() -> None:
     assert parse_value("deg(-45.0)") == -math.pi / 4
     assert parse_value("!degrees 180") == math.pi
     assert parse_value("{a: rad(2*pi), b: degree}") == {"a": 2 * math.pi, "b": "degree"}
+    powers = ("rad(2**3)", "rad(2**-1)", "rad(-2**2)", "rad(7%4)", "rad(7//2)")
+    assert [parse_value(text) for text in powers] == [8.0, 0.5, -4.0, 3.0, 3.0]
     with pytest.raises(ValueTextError, match="not an angle"):
         parse_value("rad(__import__('os'))")
+
+
+@pytest.mark.parametrize("text", ["rad(9**9**9)", "rad((-1)**0.5)", "deg(0**-1)", "rad(7%0)"])
+def test_an_angle_without_a_value_is_refused(text: str) -> None:
+    with pytest.raises(ValueTextError, match="not an angle"):
+        parse_value(text)
 
 
 def test_bad_text_is_one_line_with_the_place() -> None:
