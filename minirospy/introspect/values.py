@@ -63,7 +63,10 @@ def parse_value(text: str) -> object:
         if isinstance(error.__cause__, UnicodeEncodeError):
             # An argument that is not UTF-8 is a usage error, which the command reports.
             raise error.__cause__ from None
-        raise ValueTextError(text, one_line(error)) from error
+        accepted = _accepted_by_ros(text, error)
+        if len(accepted) != 1:
+            raise ValueTextError(text, one_line(error)) from error
+        return accepted[0]
 
 
 def parse_documents(text: str, where: str) -> Iterator[object]:
@@ -73,10 +76,31 @@ def parse_documents(text: str, where: str) -> Iterator[object]:
     """
     import yaml
 
+    count = 0
     try:
-        yield from yaml_text.load_all(text, _loader())
+        for document in yaml_text.load_all(text, _loader()):
+            yield document
+            count += 1
     except yaml.YAMLError as error:
-        raise ValueTextError(where, one_line(error)) from error
+        accepted = _accepted_by_ros(text, error)
+        if len(accepted) <= count:
+            raise ValueTextError(where, one_line(error)) from error
+        yield from accepted[count:]
+
+
+def _accepted_by_ros(text: str, error: yaml.YAMLError) -> list[object]:
+    """Return the documents of a text with which the compiled loader failed, or [] if it is invalid for ROS, too.
+
+    ROS uses PyYAML's loader in Python, which also accepts ``{data:[1, 2]}``, without a space after the colon.
+    """
+    import yaml
+
+    if getattr(error, "problem", None) != "found unexpected ':'":
+        return []
+    try:
+        return list(yaml_text.load_all(text, _loader(compiled=False)))
+    except yaml.YAMLError:
+        return []
 
 
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
@@ -187,11 +211,12 @@ def _pretty_lines(table: dict[str, object], indent: str) -> Iterator[str]:
             yield f"{indent}{key}: {text}"
 
 
-@lru_cache(maxsize=1)
-def _loader() -> type[yaml.SafeLoader]:
+@lru_cache(maxsize=2)
+def _loader(*, compiled: bool = True) -> type[yaml.SafeLoader]:
     """Return a safe YAML loader that accepts angle expressions such as ``deg(90)``."""
+    import yaml
 
-    class AngleLoader(yaml_text.fast_loader()):  # type: ignore[misc]
+    class AngleLoader(yaml_text.fast_loader() if compiled else yaml.SafeLoader):  # type: ignore[misc]
         pass
 
     add_angles(AngleLoader)
@@ -238,6 +263,10 @@ def arithmetic(text: str) -> float:
         ast.Sub: operator.sub,
         ast.Mult: operator.mul,
         ast.Div: operator.truediv,
+        ast.FloorDiv: operator.floordiv,
+        ast.Mod: operator.mod,
+        # Of floats, so that 9**9**9 is an error, not an integer that fills the memory.
+        ast.Pow: math.pow,
     }
 
     def value(node: ast.expr) -> float:
@@ -253,6 +282,6 @@ def arithmetic(text: str) -> float:
             case ast.BinOp(left=left, op=op, right=right) if type(op) in binary:
                 return float(binary[type(op)](value(left), value(right)))
             case _:
-                raise ValueError("only numbers, pi, + - * / and brackets")
+                raise ValueError("only numbers, pi, + - * / // % ** and brackets")
 
     return value(ast.parse(text.strip(), mode="eval").body)

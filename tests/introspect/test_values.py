@@ -64,8 +64,39 @@ def test_angles() -> None:
     assert parse_value("deg(-45.0)") == -math.pi / 4
     assert parse_value("!degrees 180") == math.pi
     assert parse_value("{a: rad(2*pi), b: degree}") == {"a": 2 * math.pi, "b": "degree"}
+    powers = ("rad(2**3)", "rad(2**-1)", "rad(-2**2)", "rad(7%4)", "rad(7//2)")
+    assert [parse_value(text) for text in powers] == [8.0, 0.5, -4.0, 3.0, 3.0]
     with pytest.raises(ValueTextError, match="not an angle"):
         parse_value("rad(__import__('os'))")
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("{data:[400, 300]}", {"data": [400, 300]}),
+        ("{a:{b: deg(180)},c: 1}", {"a": {"b": math.pi}, "c": 1}),
+        ("[a:[1]]", [{"a": [1]}]),
+        ("{a:,b: 1}", {"a": None, "b": 1}),
+    ],
+)
+def test_a_colon_directly_before_a_bracket_is_accepted_as_in_ros(text: str, value: object) -> None:
+    assert value == parse_value(text) == yaml.safe_load(text.replace("deg(180)", repr(math.pi)))
+    assert list(parse_documents(f"a: 1\n---\n{text}\n---\nb\n", "it")) == [{"a": 1}, value, "b"]
+
+
+def test_text_that_no_yaml_library_accepts_after_such_a_colon_is_refused() -> None:
+    found = parse_documents("a: 1\n---\n{a:[1}\n", "it")
+    assert next(found) == {"a": 1}
+    with pytest.raises(ValueTextError, match="found unexpected ':'"):
+        next(found)
+    with pytest.raises(ValueTextError, match="found unexpected ':'"):
+        parse_value("{a:[1}")
+
+
+@pytest.mark.parametrize("text", ["rad(9**9**9)", "rad((-1)**0.5)", "deg(0**-1)", "rad(7%0)"])
+def test_an_angle_without_a_value_is_refused(text: str) -> None:
+    with pytest.raises(ValueTextError, match="not an angle"):
+        parse_value(text)
 
 
 def test_bad_text_is_one_line_with_the_place() -> None:

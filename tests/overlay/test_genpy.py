@@ -157,6 +157,32 @@ def test_filling_and_showing() -> None:
         genpy.message.check_type("data", "int8", 300)
 
 
+# The full text of a message as it is in a bag, whose package is not installed
+UNKNOWN = f"{'=' * 80}\n".join(("Part[] parts\n", "MSG: not_installed/Part\nstring from\nint32 number\n"))
+
+
+def test_filling_an_array_of_a_type_that_is_only_in_the_full_text() -> None:
+    whole = genpy.dynamic.generate_dynamic("not_installed/Whole", UNKNOWN)
+    message = whole["not_installed/Whole"]()
+    genpy.message.fill_message_args(message, [{"parts": [{"from_": "a", "number": 2}, ["b", 3]]}])
+    assert [type(part) for part in message.parts] == [whole["not_installed/Part"]] * 2
+    assert [(part.from_, part.number) for part in message.parts] == [("a", 2), ("b", 3)]
+
+
+def test_filling_an_array_of_an_unknown_type() -> None:
+    base: Any = genpy.dynamic.generate_dynamic("not_installed/Whole", UNKNOWN)["not_installed/Whole"]
+
+    class Whole(base):  # type: ignore[misc]
+        _slot_types = ("not_installed/Missing[]",)
+
+    with pytest.raises(genpy.MessageException) as caught:
+        genpy.message.fill_message_args(Whole(), [{"parts": [{}]}])
+    assert (
+        str(caught.value)
+        == "Cannot instantiate messages for field [parts] : cannot load class not_installed/Missing"
+    )
+
+
 @pytest.mark.parametrize(
     ("text", "request_fields", "response_fields", "md5"),
     [

@@ -12,6 +12,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, NamedTuple, TextIO, TypeVar, cast
 
 from minirospy.base.errors import (
+    DefinitionError,
     DeserializationError,
     MessageException,
     SerializationError,
@@ -530,12 +531,14 @@ def _fill_field(
         else:
             _fill(current, value, words, f"{path}{name}.")
     elif type_.endswith("]"):
-        setattr(message, name, _filled_array(name, type_, value, words, path))
+        setattr(message, name, _filled_array(message, name, type_, value, words, path))
     else:
         setattr(message, name, value)
 
 
-def _filled_array(name: str, type_: str, values: object, words: Mapping[str, object], path: str) -> object:
+def _filled_array(
+    message: protocols.Message, name: str, type_: str, values: object, words: Mapping[str, object], path: str
+) -> object:
     base, _, length = type_.removesuffix("]").partition("[")
     if isinstance(values, bytes) and base in ("uint8", "char"):
         return values
@@ -552,9 +555,11 @@ def _filled_array(name: str, type_: str, values: object, words: Mapping[str, obj
         return [_filled_time(kind(), value, words, "") for value in values]
     if base in _CHECKS:
         return list(values)
-    from minirospy.core.idl.load import message_class
-
-    element_class = message_class(base)
+    element_class = _element_class(message, base)
+    if element_class is None:
+        raise MessageException(
+            f"Cannot instantiate messages for field [{path}{name}] : cannot load class {base}"
+        )
     filled = []
     for value in values:
         element = element_class()
@@ -562,6 +567,20 @@ def _filled_array(name: str, type_: str, values: object, words: Mapping[str, obj
         _fill(element, value, words, "")
         filled.append(element)
     return filled
+
+
+def _element_class(message: protocols.Message, type_: str) -> type[protocols.Message] | None:
+    """Return the installed class of an array's elements, else the one in the message's full text, else None."""
+    from minirospy.core.idl.load import classes_from_text, get_message_class
+
+    found = get_message_class(type_)
+    if found is not None:
+        return found
+    try:
+        # The messages of a bag or a peer are created from this text, and their packages need not be installed.
+        return classes_from_text(message._type, message._full_text).get(type_)
+    except DefinitionError:
+        return None
 
 
 def _filled_time(current: TVal, value: object, words: Mapping[str, object], path: str) -> object:

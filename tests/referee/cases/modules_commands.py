@@ -111,7 +111,15 @@ for words in (["a", "-1"], ["-v", "a", "-.5"], ["-t", "f", "a"], ["-t", "-v"], [
     printed(
         " ".join(words), lambda w=words: rosparam._set_optparse_neg_args(parser, ["rosparam", "set", *w])[1]
     )
-for text in ("!degrees 90", "deg(90)", "!radians 2*pi", "rad(pi/2)", "!!binary aGVsbG8="):
+for text in (
+    "!degrees 90",
+    "deg(90)",
+    "!radians 2*pi",
+    "rad(pi/2)",
+    "rad(2**3)",
+    "rad(7%4)",
+    "!!binary aGVsbG8=",
+):
     outcome(text, lambda t=text: repr(yaml.safe_load(t))[:20])
 
 show("# without a master")

@@ -43,6 +43,7 @@ def test_the_workshops_file(packages: Packages) -> None:
         ('value="1" type="double"', 1.0),
         ('value="1" type="bool"', True),
         ('value="[1, a]" type="yaml"', [1, "a"]),
+        ('value="{a:[1]}" type="yaml"', {"a": [1]}),
         ('command="echo hi"', "hi\n"),
         ('value="$(env HOME)/x"', "/home/me/x"),
         ('value="$(optenv NOPE a b)"', "a b"),

@@ -200,7 +200,11 @@ def convert(text: str, type_: str) -> object:
         from minirospy.base.yaml_text import fast_loader, load
 
         try:
-            loaded: object = load(text, fast_loader())
+            try:
+                loaded: object = load(text, fast_loader())
+            except yaml.scanner.ScannerError:
+                # ROS's loader, which is in Python, also accepts a colon directly before a bracket.
+                loaded = load(text, yaml.SafeLoader)
         except yaml.YAMLError as error:
             why = " ".join(str(getattr(error, "problem", None) or error).split())
             raise ValueError(f"not YAML: {why}") from None
