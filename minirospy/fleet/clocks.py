@@ -12,7 +12,7 @@ _SHARE = 0.1  # weight of the newest message's delay in the mean delay
 
 
 class Ping(NamedTuple):
-    """A request and its reply: the local times when they were sent and received, and the peer's time in the reply."""
+    """A ping: the local times when the request was sent and the reply received, and the peer's time in the reply."""
 
     sent: int
     theirs: int
@@ -20,7 +20,7 @@ class Ping(NamedTuple):
 
 
 class ClockOffset(NamedTuple):
-    """The difference between a peer's clock and the local one. Subtract ``offset`` from the peer's times to get local times.
+    """The offset of a peer's clock. Subtract ``offset`` from the peer's times to get local times.
 
     The error of the offset is at most half the round trip.
     """
@@ -31,7 +31,7 @@ class ClockOffset(NamedTuple):
 
 @dataclass
 class Delay:
-    """The delays of a topic's messages: an exponentially weighted mean, and the maximum."""
+    """The mean (exponentially weighted) and maximum delay of a topic's messages."""
 
     mean: float = 0.0
     longest: int = 0
@@ -46,7 +46,7 @@ class Delay:
 
 
 def offset_of(pings: Iterable[Ping]) -> ClockOffset | None:
-    """Return the peer's clock offset, from the reply with the shortest round trip, or None if there was no reply."""
+    """Return the peer's clock offset, or None if there was no reply. The reply with the shortest round trip is used."""
     best = min(pings, key=lambda ping: ping.received - ping.sent, default=None)
     if best is None:
         return None

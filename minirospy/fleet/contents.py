@@ -20,8 +20,8 @@ _Token = TypeVar("_Token", TopicToken, ServiceToken)
 __all__ = ["MAX_GATEWAYS", "MAX_NAMES", "MAX_TOKENS", "FleetContents", "Refused", "Robot"]
 
 MAX_GATEWAYS = 5_000
-MAX_NAMES = 2_000  # maximum number of topics, and also of services, that a gateway may announce
-# maximum number of topics and services of all gateways together, which take some 100 MiB
+MAX_NAMES = 2_000  # maximum number of topics, and separately of services, that a gateway may announce
+# maximum number of topics and services, in total over all gateways; they take some 100 MiB
 MAX_TOKENS = 200_000
 
 
@@ -48,7 +48,7 @@ class Refused(NamedTuple):
 @dataclass(eq=False)
 class _Gateway:
     claim: Claim | None = None
-    order: int = 0  # order in which claims were seen; later claims have larger numbers
+    order: int = 0  # sequence number of the claim; later claims have larger numbers
     topics: dict[str, TopicToken] = field(default_factory=dict)
     services: dict[str, ServiceToken] = field(default_factory=dict)
 
@@ -58,10 +58,10 @@ class _Gateway:
 
 
 class FleetContents:
-    """The record of all tokens that currently exist."""
+    """Tracks the tokens that currently exist, and the robots that they announce."""
 
     def __init__(self, allows: Callable[[str], bool], clock: Callable[[], float] = time.monotonic) -> None:
-        """Create an empty record.
+        """Create an empty table.
 
         ``allows(robot)`` returns whether a robot is of interest; ``clock`` returns monotonic seconds.
         """
@@ -69,7 +69,7 @@ class FleetContents:
         self.waiting: tuple[Refused, ...] = ()
         """The gateways that :meth:`robots` left out because another gateway holds their name."""
         self.refused = 0  # number of ignored tokens
-        self.refusal = ""  # reason why the last ignored token was ignored
+        self.refusal = ""  # why the most recent token was ignored
         self._count = 0
         self._allows = allows
         self._orders = itertools.count()
@@ -140,7 +140,7 @@ class FleetContents:
         return {gateway for _, gateway in self._gateways}
 
     def robots(self, lost: Collection[str] = ()) -> dict[str, Robot]:
-        """Return the robots by name, each as announced by the gateway that holds its name. Ignore ``lost`` gateways."""
+        """Return a dict of robots keyed by name, each as announced by the name's holder. Ignore ``lost`` gateways."""
         there = [
             (gateway.order, gateway.claim)
             for gateway in self._gateways.values()

@@ -25,7 +25,7 @@ __all__ = ["Definitions", "checked_specs"]
 
 _MOST = 5_000
 ANSWER_SECONDS = 10.0
-# maximum for all cached definitions together; ROS's own packages define 3 million characters
+# maximum characters in all cached definitions together; those of ROS's own packages have 3 million
 MAX_CHARACTERS = 64 << 20
 # maximum number of concurrent queries, in total and to one gateway; an unanswered query times out after ANSWER_SECONDS
 MAX_QUERIES, MAX_QUERIES_OF_GATEWAY = 256, 4
@@ -41,7 +41,7 @@ def checked_specs(name: str, text: str, md5sum: str) -> dict[str, MessageSpec]:
 
 
 class Definitions:
-    """The types that this gateway knows. No message classes are generated, because messages stay serialized."""
+    """Caches the types that this gateway knows. Generates no message classes, because messages stay serialized."""
 
     def __init__(self, node: Node, network: FleetNetwork) -> None:
         self.texts = TypeTexts(node)
@@ -49,7 +49,7 @@ class Definitions:
         self._known: dict[tuple[str, str], str] = {}
         self._known_characters = 0
         self._finding: dict[tuple[str, str, str], asyncio.Task[str]] = {}
-        """The running queries, by (type, md5sum, gateway)."""
+        """The running queries, keyed by (type, md5sum, gateway)."""
         self._shares: WeakValueDictionary[str, asyncio.Semaphore] = WeakValueDictionary()
         self._querying = asyncio.Semaphore(MAX_QUERIES)
         self._rewriters: dict[tuple[str, str], FrameRewriter | None] = {}
@@ -76,7 +76,7 @@ class Definitions:
         return found.md5sum if found else ""
 
     async def text(self, name: str, md5sum: str) -> str:
-        """Return the locally known definition of a type, or "" if the definition is not known."""
+        """Return a type's definition, or "" if it is not known locally."""
         if (name, md5sum) not in self._known:
             installed = await self.texts.installed(name)
             if installed is None or installed.md5sum != md5sum:
@@ -101,7 +101,7 @@ class Definitions:
         return InterfaceType(name, md5sum, text)
 
     async def rewriter(self, name: str, md5sum: str) -> FrameRewriter | None:
-        """Return the rewriter for a type's frame ids, or None if the type has no frame ids or its definition is not known."""
+        """Return the rewriter for a type's frame ids. Return None if the type has no frame ids or is not known."""
         key = name, md5sum
         if key not in self._rewriters:
             text = await self.text(name, md5sum)

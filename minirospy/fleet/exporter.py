@@ -60,7 +60,7 @@ class Exporter:
         hidden: Callable[[], Collection[str]],
         spawn: Callable[[Coroutine[object, object, None]], object],
     ) -> None:
-        """Create the exporter. ``hidden`` contains the names of other robots, whose imported topics are not announced again."""
+        """Create the exporter. ``hidden`` contains the names of imported robots, whose topics are not announced again."""
         self.claim = claim
         self.duplicates: tuple[Claim, ...] = ()
         self.graph = RobotGraph(node, definitions, claim, rules, hidden)
@@ -83,7 +83,7 @@ class Exporter:
         self._declared: list[Deferred] = []
 
     async def start(self) -> None:
-        """Start announcing the robot, which continues until :meth:`close`.
+        """Start announcing the robot; continue until :meth:`close`.
 
         Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
@@ -191,8 +191,7 @@ class Exporter:
 
     async def _adjust(self) -> None:
         """Open and close outbound and inbound topics to match the graph and the readers' requests."""
-        # Use a copy: closing awaits the master, and other calls of this method may change both tables in the
-        # meantime.
+        # Use a copy: closing awaits the master, and concurrent calls of this method may change both tables.
         for topic, outbound in list(self.outbound.items()):
             token = self.graph.topics.get(topic)
             if self.outbound.get(topic) is outbound and (

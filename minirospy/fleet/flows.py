@@ -1,7 +1,7 @@
-"""Fair queues for messages to be sent or delivered. A full flow drops its oldest messages. Pure.
+"""Fair queues for outgoing and incoming messages. A full flow drops its oldest messages. Pure.
 
-At the sender, a flow contains the messages on a topic; at the receiver, the messages on one topic of one robot. Each flow
-keeps its newest messages, and flows are served round-robin, so that a flooding flow loses only its own messages.
+The sender has one flow per topic, the receiver one per robot and topic. Each flow keeps its newest messages, and flows
+are served round-robin, so that a flooding flow loses only its own messages.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class FlowQueue(Generic[_T]):
         return len(self._ready)
 
     def add(self, flow: Flow[_T], item: _T, size: int) -> int:
-        """Append a message; return how many of the flow's oldest messages were dropped."""
+        """Append a message; return the number of the flow's messages dropped to make room for it."""
         flow.waiting.append((size, item))
         flow.waiting_bytes += size
         dropped = 0

@@ -1,4 +1,4 @@
-"""Adds or removes a robot's prefix in the frame ids of serialized messages, as in ``robot1/base_link``. Pure.
+"""Adds a robot's prefix to the frame ids in serialized messages (``robot1/base_link``), or removes it. Pure.
 
 Frame ids are the ``frame_id`` of each std_msgs/Header, and each string field ``child_frame_id``. The bytes after the last
 frame id are copied unchanged, so that an image costs one copy.
@@ -21,7 +21,7 @@ _MAX_ELEMENTS = 1_000_000
 
 
 class _Skip(NamedTuple):
-    """A number of bytes to skip, because they contain no frame id and have a fixed length."""
+    """A fixed number of bytes to skip because they contain no frame id."""
 
     size: int
 
@@ -33,7 +33,7 @@ class _Text(NamedTuple):
 
 
 class _Array(NamedTuple):
-    """An array with ``steps`` for each element; ``length`` is None if the message itself contains the length."""
+    """An array; ``steps`` describe one element. ``length`` is None for an array of variable length."""
 
     length: int | None
     steps: tuple[_Step, ...]
@@ -146,7 +146,7 @@ def _run(
     change: Callable[[bytes], bytes],
     pieces: list[bytes],
 ) -> tuple[int, int]:
-    """Process ``data`` from ``at``. Return the offset up to which ``pieces`` contains a copy, and the offset after the steps."""
+    """Process ``data`` from offset ``at``. Return the end of the data copied so far, and the offset after the steps."""
     for step in steps:
         if isinstance(step, _Skip):
             at += step.size
@@ -168,7 +168,7 @@ def _run(
                 case ():
                     pass
                 case inner:
-                    # Each element is at least four bytes long, because it starts with a length of four bytes.
+                    # Each element is at least four bytes long, because it starts with a four-byte length.
                     if count * 4 > len(data) - at or count > _MAX_ELEMENTS:
                         raise DeserializationError(f"an array of {count} elements is longer than the message")
                     for _ in range(count):

@@ -1,4 +1,4 @@
-"""A gateway, which consists of one Zenoh session with a robot half, a control room half, or both."""
+"""A gateway: one Zenoh session with a robot half, a control room half, or both."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 __all__ = ["REGISTRATION_FAULT_LINES", "Gateway", "GatewayOptions"]
 
 REGISTRATION_FAULT_LINES = 1
-"""Maximum number of log lines in ten seconds from a gateway's node. If a master rejects the topics of 1,000 robots, a single
-line is logged.
+"""Maximum number of registration errors that a gateway's node logs in ten seconds.
+
+Thus, if a master rejects the topics of 1,000 robots, only one line is logged.
 """
 _log = logging.getLogger(__name__)
 
@@ -43,8 +44,8 @@ class GatewayOptions:
     """A gateway's settings.
 
     ``name`` is the robot's name, or "" for a gateway that is only a control room. If ``imports``, the fleet's robots are
-    shown here. ``ros1_namespace`` is the namespace of zenoh-bridge-ros1's keys if those are to be used as well, otherwise "".
-    ``clock`` returns the time in ns, ``host`` identifies the machine ("" for the default); tests replace both.
+    shown here. ``ros1_namespace`` is the namespace of zenoh-bridge-ros1's keys, or "" to not use those keys. ``clock``
+    returns the time in ns, ``host`` identifies the machine ("" for the default); tests replace both.
     """
 
     name: str = ""
@@ -84,7 +85,7 @@ class Gateway:
         self._failures = RateLimitedLogger(_log)
 
     async def connect(self) -> None:
-        """Open the session; wait for the router if one is configured. The node need not have been started.
+        """Open the session; wait for the router if one is configured. May be called before the node is started.
 
         Raise BridgeError if the configuration is invalid.
         """
@@ -92,7 +93,7 @@ class Gateway:
             self.network = await FleetNetwork.open(self.options.network)
 
     async def start(self) -> None:
-        """Connect to the fleet, unless :meth:`connect` has done so, and start forwarding, which continues until :meth:`close`.
+        """Connect to the fleet if not yet connected, and start forwarding; continue until :meth:`close`.
 
         Raise BridgeError if the fleet cannot be joined, MasterUnreachableError or RpcError if a call to the master fails,
         or ROSInterruptException if the node is shut down first.
@@ -178,7 +179,7 @@ class Gateway:
             self._receiver.close()
 
     def status(self) -> dict[str, object]:
-        """Return this gateway's configuration and counters, as values that JSON can represent."""
+        """Return this gateway's configuration and counters, as JSON-compatible values."""
         found: dict[str, object] = {
             "name": self.options.name,
             "gateway": self.id,

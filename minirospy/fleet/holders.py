@@ -15,8 +15,7 @@ from minirospy.fleet.keys import Claim, is_machine
 __all__ = ["HOLD_SECONDS", "Holders", "parse_machines"]
 
 HOLD_SECONDS = 10.0  # Zenoh's default lease time, after which it closes a silent link
-# maximum number of names to remember for HOLD_SECONDS after their robots have left; limited because peers choose the
-# names
+# maximum number of names to hold for robots that have left; limited because peers choose the names
 MAX_HOLDS = 5_000
 
 
@@ -28,12 +27,12 @@ class _Hold:
 
 
 class Holders:
-    """Selects one of the claims to each name, and remembers the selection."""
+    """Selects and remembers which claim to a name holds it."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         """Create an empty record. ``clock`` returns monotonic seconds."""
         self.machines: Mapping[str, str] = {}
-        """The machine that the operator has chosen for each robot, by robot name."""
+        """The machines that the operator has chosen, keyed by robot name."""
         self._clock = clock
         self._holds: dict[str, _Hold] = {}
         self._given_up: set[Claim] = set()
@@ -51,9 +50,9 @@ class Holders:
         return hold.claim if hold else None
 
     def choose(self, name: str, claims: Sequence[Claim]) -> Claim | None:
-        """Return the claim to use, or None if no claim is allowed.
+        """Select the claim that holds a name, or return None if no claim may hold it now.
 
-        ``claims`` are those present, in the order they were first seen.
+        ``claims`` lists the current claims, first seen first.
         """
         present = [claim for claim in claims if claim not in self._given_up] or list(claims)
         machine = self.machines.get(name)
@@ -110,7 +109,7 @@ class Holders:
 
 
 def parse_machines(value: object) -> dict[str, str]:
-    """Return the operator's choices (machines by robot name) from a parameter's value; ignore invalid entries."""
+    """Parse the operator's choices, a dict of machines keyed by robot name. Ignore invalid entries."""
     if not isinstance(value, dict):
         return {}
     return {str(name): machine for name, machine in value.items() if is_machine(machine)}

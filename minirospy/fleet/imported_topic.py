@@ -51,13 +51,13 @@ _QUEUE = 100
 _FRAME_TOPICS = ("/tf", "/tf_static")
 _MAX_MESSAGE = 256 << 20
 _MAX_OFFERS = 10
-# maximum number of topics to register concurrently, because each calls the master on its own connection
+# maximum number of concurrent registrations, because each uses its own connection to the master
 MAX_REGISTERING = 50
 
 
 @dataclass
 class Shared:
-    """The objects that all imported topics share."""
+    """The objects shared by all of the importer's topics."""
 
     node: Node
     network: FleetNetwork
@@ -75,7 +75,7 @@ class Shared:
 
 
 class ImportedTopic:
-    """One topic of one robot. Runs on the loop, except for the handling of messages."""
+    """One topic of one robot. Runs on the loop, except that messages are handled in other threads."""
 
     def __init__(self, shared: Shared, token: TopicToken, offset: Callable[[], ClockOffset | None]) -> None:
         """Create the topic. ``offset()`` returns the offset of the robot's clock, or None before it has been measured."""
@@ -107,7 +107,7 @@ class ImportedTopic:
 
     @property
     def needs_snapshot(self) -> bool:
-        """Return whether the topic's other publishers can be seen only in the local graph.
+        """Return whether only a snapshot of the local graph shows the topic's other publishers.
 
         This is the case if this gateway publishes the topic itself.
         """
@@ -115,7 +115,7 @@ class ImportedTopic:
 
     @property
     def dropped(self) -> int:
-        """Return how many of the robot's messages were dropped because local subscribers were too slow."""
+        """Return the number of the robot's messages dropped because local subscribers were too slow."""
         return self._flow.dropped
 
     @property
@@ -179,7 +179,7 @@ class ImportedTopic:
                 self._advertise(interface)
             elif token.is_subscribed:
                 self._subscribe()
-            # Limit the concurrent calls, because the master handles the 8,000 calls for a thousand robots one by one.
+            # Limit the concurrent calls: a thousand robots need 8,000, and the master handles them one by one.
             handle = self._publisher or self._subscription
             if handle is not None:
                 await handle.wait_until_registered()
@@ -239,7 +239,8 @@ class ImportedTopic:
             declared.undeclare()
         self._numbers.clear()
         if wanted and self._publisher and not self._is_global:
-            # The robot sends its latched message again to the next subscriber; the local copy may be outdated by then.
+            # Forget the local copy, which may become outdated: the robot resends its latched message to the next
+            # subscriber.
             self._publisher.forget_latched()
 
     def _arrived(self, key: str, message: bytes, attachment: bytes) -> None:
@@ -263,8 +264,8 @@ class ImportedTopic:
         if stamp:
             before = self._numbers.get("out")
             self._numbers["out"] = stamp.number
-            # The numbers restart after the robot has reopened the topic, so do not count a jump back or a huge jump
-            # as lost messages.
+            # The numbers restart when the robot reopens the topic, so a jump back or a huge jump does not mean lost
+            # messages.
             if before is not None and before < stamp.number <= before + 1_000_000:
                 self.lost += stamp.number - before - 1
             offset = self._offset()
@@ -299,8 +300,7 @@ class ImportedTopic:
         )
 
     async def _unsubscribe(self) -> None:
-        # Clear all attributes before the await, because the topic may be subscribed to again meanwhile, with another
-        # outflow.
+        # Clear all attributes before the await: during it, the topic may be subscribed to again, with a new outflow.
         subscription, self._subscription = self._subscription, None
         offers, self._offers = self._offers, {}
         outflow, self._outflow = self._outflow, None

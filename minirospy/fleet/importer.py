@@ -1,4 +1,4 @@
-"""The control room half of a gateway. It shows the fleet's robots in the local graph, each in a namespace with its name."""
+"""The control room half of a gateway. Shows each robot in the local graph, in a namespace of the same name."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["MACHINES", "ImportedRobot", "Importer"]
 
 MACHINES = "/fleet/machines"
-"""The parameter that contains the machine selected by the operator for each robot; `minirospy fleet takeover` sets it."""
+"""The parameter that maps robots to the machines the operator has chosen; set by `minirospy fleet takeover`."""
 
 _log = logging.getLogger(__name__)
 _SETTLE_SECONDS = 0.1
@@ -44,12 +44,12 @@ _PINGS = 5
 PING_SECONDS = 5.0
 _MAX_PING = 64  # maximum size in bytes of a reply to a ping; a valid reply has 8 bytes
 _CALL_SECONDS = 3600.0
-# seconds for a name's holder to reply after another gateway on the same machine has claimed the name
+# seconds for a name's holder to reply when another gateway on the same machine claims the name
 CHALLENGE_SECONDS = 2.0
-# number of removed names (some 4 MB) after which memory is returned to the system, and the seconds to wait before
-# that, because links are closed late
+# return memory to the system after this many names have been removed (some 4 MB), and after this many seconds,
+# because links close late
 TRIM_NAMES, TRIM_SECONDS = 500, 15.0
-MAX_ROBOT_NAMES = 2_000  # maximum number of names, of _MAX_IMPORTED, that one robot may use
+MAX_ROBOT_NAMES = 2_000  # maximum number of names that one robot may use, out of _MAX_IMPORTED
 # maximum number of a robot's names to close concurrently, because each needs a task and a call to the master
 MAX_CONCURRENT_NAMES = 100
 MAX_LISTED = 5  # maximum number of robots named in one log line
@@ -74,7 +74,10 @@ class ImportedRobot:
 
 
 class Importer:
-    """Shows the fleet's robots in the local graph. Runs on the node's loop, except for the handling of messages."""
+    """Shows the fleet's robots in the local graph.
+
+    Runs on the node's loop, except that messages are handled in other threads.
+    """
 
     def __init__(
         self,
@@ -126,7 +129,7 @@ class Importer:
         self._removed = 0  # names removed since memory was last returned to the system
         self._trimming: asyncio.TimerHandle | None = None
         self._machines: dict[str, str] = {}
-        """The machine that each robot was on when it was last shown."""
+        """The machines on which robots were last shown, keyed by robot name."""
         self._challenging: set[str] = set()
         self._is_closed = False
         self._reporter = ErrorReporter(_log, "showing the fleet's robots")
@@ -142,7 +145,7 @@ class Importer:
         return list(self.robots)
 
     async def start(self) -> None:
-        """Start showing robots, which continues until :meth:`close`.
+        """Start showing robots; continue until :meth:`close`.
 
         Raise MasterUnreachableError if no master responds, or RpcError if the call fails.
         """
@@ -228,7 +231,7 @@ class Importer:
             self._is_reconciling = False
         seconds = time.monotonic() - started
         if seconds > _SETTLE_SECONDS:
-            # While a thousand robots join, this pause leaves time on the loop for other tasks.
+            # This pause leaves time for other tasks while a thousand robots join.
             self._not_before = asyncio.get_running_loop().time() + 2 * seconds
             if self._reconciling is not None:
                 self._reconciling.cancel()
@@ -301,7 +304,10 @@ class Importer:
         self._machines[claim.name] = claim.host
 
     def _report_refused(self) -> None:
-        """Log once each gateway whose name is held by another gateway; challenge a holder on the same machine."""
+        """Log each gateway whose name is held by another gateway, once per gateway.
+
+        If both run on the same machine, challenge the holder instead.
+        """
         known, self._waiting = set(self._waiting), self.contents.waiting
         for refused in self._waiting:
             claim, holder = refused
@@ -404,7 +410,7 @@ class Importer:
         return False
 
     def _trim_soon(self, removed: int) -> None:
-        """Return the memory of removed names to the system after a delay, because links are closed late."""
+        """Schedule the return of removed names' memory to the system. Links close late, so wait first."""
         self._removed += removed
         if self._removed >= TRIM_NAMES and self._trimming is None and not self._is_closed:
             loop = asyncio.get_running_loop()
@@ -461,7 +467,7 @@ class Importer:
                     self._spawn(self._measure(shown))
 
     async def _snapshot(self) -> Snapshot | None:
-        """Return the local graph, or None if it is not needed because no robot publishes and subscribes to the same topic."""
+        """Return the local graph, or None if it is not needed: no robot both publishes and subscribes to a topic."""
         if any(topic.needs_snapshot for shown in self.robots.values() for topic in shown.topics.values()):
             return await fetch(self._node.call_master)
         return None

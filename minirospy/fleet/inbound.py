@@ -1,4 +1,4 @@
-"""A topic that a robot subscribes to and other gateways offer. The topic is published locally while a gateway offers it."""
+"""A topic that a robot subscribes to. It is published locally while another gateway offers it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _MAX_OFFERS = 100
 
 
 async def call_service(node: Node, token: ServiceToken, request: bytes) -> bytes:
-    """Call a service of this master for a remote client and return its response. Raise QueryFailed if the call fails."""
+    """Call a local service for a remote client and return the response. Raise QueryFailed if the call fails."""
     try:
         return await call_raw(node, token.service, token.md5sum, request)
     except ServiceException as error:
@@ -52,7 +52,7 @@ def run_on_loop(node: Node, work: Coroutine[object, object, None]) -> None:
 
 
 class InboundTopic:
-    """Publishes messages from writers, buffering them until the robot's subscribers are connected."""
+    """Publishes the messages that writers send. Buffers them until the robot's subscribers are connected."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Queries the fleet from a command, without a master, for its robots, their status, and their parameters."""
+"""Queries the fleet's robots, their status and their parameters, for commands that run without a master."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ _MAX_CONCURRENT = 16
 
 
 def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitable[_T]]) -> _T:
-    """Open a session, run ``question``, and return its result. Raise BridgeError if neither a gateway nor a router is reached."""
+    """Run ``question`` in a new session; return its result.
+
+    Raise BridgeError if neither a gateway nor a router is reached.
+    """
 
     async def asking() -> _T:
         network = await FleetNetwork.open(options, waits=False)
@@ -41,7 +44,7 @@ def inquire(options: NetworkOptions, question: Callable[[FleetNetwork], Awaitabl
 
 
 async def fleet_status(network: FleetNetwork, seconds: float) -> tuple[list[Answer], list[Answer]]:
-    """Return the robots and control rooms that are present, with their status; each gateway has ``seconds`` to reply."""
+    """Return the status of all robots, and of all control rooms. Wait at most ``seconds`` for each gateway's reply."""
     robots = await _claims(network, "robot", seconds)
     controls = await _claims(network, "control", seconds)
     limit = asyncio.Semaphore(_MAX_CONCURRENT)
@@ -86,7 +89,7 @@ async def _shown_claim(network: FleetNetwork, robot: str, seconds: float) -> Cla
     if len(claims) > 1:
         _, controls = await fleet_status(network, seconds)
         shown = [claim for claim in claims if is_shown(claim, controls)]
-        # Use the newest claim from each machine, because the token of the machine's previous gateway may still exist.
+        # Use each machine's newest claim: the token of its previous gateway may still exist.
         claims = (
             [max(shown, key=lambda claim: claim.start)] if len({each.host for each in shown}) == 1 else shown
         )

@@ -69,7 +69,7 @@ ROOT = "@minirospy/1"
 """The first chunk starts with ``@``, so that ``**`` does not match it. The second is the version of this key scheme."""
 
 UNKNOWN_MD5 = "-"
-"""Replaces the md5sum of a topic that has no publishers and whose type is not installed."""
+"""Stands for an unknown md5sum: the topic has no publishers, and its type is not installed."""
 
 _MAX_NAME = 256
 _ROBOT = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}", re.ASCII)
@@ -130,7 +130,7 @@ class Want(NamedTuple):
 
 
 class Offer(NamedTuple):
-    """A writer's offer of a topic that it publishes and to which the robot subscribes."""
+    """A writer's offer to publish a topic that the robot subscribes to."""
 
     topic: str
     writer: str
@@ -140,7 +140,7 @@ class Offer(NamedTuple):
 
 
 class Stamp(NamedTuple):
-    """A message's attachment: its sequence number on the topic, and the time when it was sent, in ns of the sender's clock."""
+    """A message's attachment: its sequence number on the topic, and its send time, in ns of the sender's clock."""
 
     number: int
     nanoseconds: int
@@ -152,12 +152,12 @@ def is_robot_name(name: str) -> bool:
 
 
 def is_machine(value: object) -> bool:
-    """Return whether a value is a valid machine id, which is the last part of a robot's token."""
+    """Return whether a value is a valid machine id, the last part of a robot's token."""
     return isinstance(value, str) and bool(_GATEWAY.fullmatch(value))
 
 
 def is_md5(text: str) -> bool:
-    """Return whether a string is an md5sum."""
+    """Return whether a string has the form of an md5sum."""
     return bool(_MD5.fullmatch(text))
 
 
@@ -187,7 +187,7 @@ def is_global_name(name: str) -> bool:
 
 
 def claim_key(claim: Claim, kind: str = "robot") -> str:
-    """Return the key of a robot's token or, if ``kind`` is "control", of a control room's token, whose name may be ``-``."""
+    """Return the key of a robot's token, or of a control room's if ``kind`` is "control"; its name may then be ``-``."""
     return f"{ROOT}/{kind}/{claim.name}/{claim.gateway}/{claim.start:x}/{claim.host}"
 
 
@@ -305,7 +305,7 @@ def out_key(robot: str, gateway: str, md5sum: str, topic: str) -> str:
 
 
 def replay_key(robot: str, gateway: str, md5sum: str, topic: str, reader: str) -> str:
-    """Return the key for a topic's latched messages that are sent to one reader."""
+    """Return the key on which a topic's latched messages are replayed to one reader."""
     return f"{ROOT}/replay/{robot}/{gateway}/{md5sum}/{mangled(topic)}/{reader}"
 
 

@@ -1,7 +1,7 @@
 """A gateway's Zenoh session, with its tokens, messages and queries. No other module calls Zenoh.
 
 Zenoh's callbacks run in Zenoh's own threads. This module calls its handlers on the event loop, except for messages, which
-are queued first. Calls to Zenoh may block, so all of them run in order in one thread, or in the thread for a priority
+are queued first. Calls to Zenoh may block, so they all run, in order, in a single thread, or in the thread for a priority
 (:mod:`sender`).
 """
 
@@ -65,14 +65,16 @@ MAX_TEXT = 16 << 20
 # maximum number of replies to a query; limited because peers choose the number, and a fleet has at most 5,000
 # gateways
 MAX_REPLIES = 10_000
-EARLY_SHARE = 0.9  # share of the timeout; a query that ends earlier without replies has lost its link
+# fraction of the timeout; a query that ends sooner than this without replies has lost its link
+EARLY_SHARE = 0.9
 RETRY_SECONDS = 1.0
 LINGER_SECONDS = 2.0
 MAX_QUERIES = 200
-"""Maximum number of service calls and parameter queries handled concurrently; additional ones are rejected."""
+"""Maximum number of concurrent service calls and parameter queries; further ones are rejected."""
 MAX_CONTROL_QUERIES = 50
-"""Maximum number of pings, status queries and definition queries handled concurrently. Their limit is separate, so that blocked
-service calls do not delay them.
+"""Maximum number of concurrent pings, status queries and definition queries.
+
+The limit is separate so that blocked service calls do not delay them.
 """
 
 
@@ -147,7 +149,7 @@ class FleetNetwork:
 
     @property
     def peers(self) -> int:
-        """Return the number of connected peers, that is, routers and gateways."""
+        """Return the number of connected routers and gateways."""
         if self._is_closed:
             return 0
         return len(self._session.info.routers_zid()) + len(self._session.info.peers_zid())
@@ -186,7 +188,7 @@ class FleetNetwork:
         )
 
     async def tokens(self, pattern: str, seconds: float) -> list[str]:
-        """Return the keys of the existing tokens, waiting at most ``seconds`` for them."""
+        """Query the existing tokens for at most ``seconds``; return their keys."""
         found: list[str] = []
 
         def arrived(reply: Reply) -> bool:
@@ -337,7 +339,7 @@ class FleetNetwork:
         size: int = MAX_TEXT,
         **options: object,
     ) -> Mapping[str, bytes | QueryFailed]:
-        """Return the replies by key: at most ``most`` replies, each of at most ``size`` bytes.
+        """Return a dict of replies keyed by key: at most ``most`` replies, each of at most ``size`` bytes.
 
         Zenoh's ``options`` override the defaults. Return as soon as ``most`` replies have arrived, without waiting for more.
         """
@@ -409,7 +411,7 @@ class FleetNetwork:
     def _start_answer(
         self, query: Query, handler: Callable[[str, bytes], Awaitable[bytes]], share: _Share, key: str = ""
     ) -> None:
-        # Check the limit here, because in a burst, all tasks are created before the first of them runs.
+        # Check the limit here: in a burst, all tasks are created before the first one runs.
         is_full = len(share.tasks) >= share.limit
         refusal = f"the gateway is answering {share.limit} other queries" if is_full else ""
         task = asyncio.ensure_future(self._answer(query, handler, key, refusal))

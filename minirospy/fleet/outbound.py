@@ -1,4 +1,4 @@
-"""Subscribes to a robot's topic that has readers in the fleet, and sends its messages to them."""
+"""Subscribes to a robot's topic and sends its messages to the fleet's readers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MAX_LATCHED = 100
 
 
 class OutboundTopic:
-    """Sends a topic's messages to the fleet, and resends the latched messages to each reader that arrives later."""
+    """Sends a topic's messages to the fleet, and resends the latched messages to each late reader."""
 
     def __init__(
         self,
@@ -40,7 +40,8 @@ class OutboundTopic:
     ) -> None:
         """Create the topic.
 
-        ``key`` is the key for the messages, or "" for the fleet's own key; if it is set, the topic may have no publisher yet.
+        ``key`` is the key for the messages, or "" for the fleet's own key. With a key, the topic need not have a
+        publisher yet.
 
         ``is_left_out(header)`` returns whether to ignore a publisher's messages.
         """
@@ -69,7 +70,7 @@ class OutboundTopic:
         self.outflow.close()
 
     def replay(self, key: str) -> None:
-        """Resend the latched messages, under the key of a reader that arrived later."""
+        """Resend the latched messages on ``key``, the key of a late reader."""
         self._forget_disconnected()
         for body in self._latched.values():
             self.outflow.send(key, body, always=True)

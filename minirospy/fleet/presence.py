@@ -1,8 +1,8 @@
-"""Finds gateways that no longer respond, because the Zenoh tokens of robots that are lost together may remain for minutes.
+"""Detects unresponsive gateways: if many robots are lost together, their Zenoh tokens may remain for minutes.
 
 All gateways are queried at regular intervals, and shortly after a robot has left. A gateway that has responded before and
-then misses two queries is considered lost until it responds again. A gateway that has never responded, for example because
-its access rights do not permit it to, is never considered lost. Runs on the node's loop.
+then misses two queries is considered lost until it responds again. A gateway that has never responded, perhaps for lack
+of access rights, is never considered lost. Runs on the node's loop.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from collections.abc import Awaitable, Callable, Collection
 __all__ = ["Presence"]
 
 REGULAR_SECONDS, LOST_SECONDS = 60.0, 10.0
-"""Seconds between checks: normally, and while a gateway is lost, in order to detect its return soon."""
+"""Seconds between checks: normally, and while a gateway is lost (to detect its return soon)."""
 _SETTLE_SECONDS = 2.0
-"""Seconds to wait after a robot has left, because robots that are lost together disappear one by one."""
+"""Seconds to wait after a robot has left: robots that are lost together disappear one by one."""
 _ROUNDS, ROUND_SECONDS = 2, 5.0
 
 

@@ -38,14 +38,14 @@ def parse_answer(data: bytes) -> Json:
 
 
 def is_shallow(value: object, levels: int = MAX_LEVELS) -> bool:
-    """Return whether a JSON value has at most ``levels`` nested levels; the JSON encoder recurses once per level."""
+    """Return whether a JSON value is nested at most ``levels`` deep. The JSON encoder recurses once per level."""
     if isinstance(value, dict):
         value = list(value.values())
     return not isinstance(value, list) or (levels > 0 and all(is_shallow(each, levels - 1) for each in value))
 
 
 def lines(robots: Iterable[Answer], controls: Iterable[Answer]) -> list[str]:
-    """Return human-readable lines: first the robots, then the control rooms, each with the robots that it receives."""
+    """Return the status as lines of text: the robots, then the control rooms with the robots that each receives."""
     robots, controls = list(robots), list(controls)
     found = [
         f"{_count(len({each.claim.name for each in robots}), 'robot')}, {_count(len(controls), 'control room')}"
@@ -82,7 +82,7 @@ def as_json(robots: Iterable[Answer], controls: Iterable[Answer]) -> str:
 
 
 def is_shown(claim: Claim, controls: Iterable[Answer]) -> bool:
-    """Return whether a control room shows the gateway's robot, or True if no control room shows a robot with this name."""
+    """Return whether a control room shows this gateway's robot. True if no control room shows a robot of that name."""
     shown = {
         _text(robot, "gateway")
         for control in controls

@@ -26,7 +26,7 @@ __all__ = ["RobotGraph"]
 _log = logging.getLogger(__name__)
 _MIN_REFRESH_INTERVAL, _MAX_REFRESH_INTERVAL = 0.25, 2.0
 _QUERY_SECONDS = 3.0
-"""Seconds after which the graph is announced without the types that are still unknown."""
+"""Seconds to wait for types; after that, the graph is announced without the unknown ones."""
 
 
 class RobotGraph:
@@ -43,9 +43,8 @@ class RobotGraph:
     ) -> None:
         """Create the graph.
 
-        ``hidden`` contains the names of robots whose topics are imported. ``gateways(snapshot)`` returns the other
-        gateways'
-        nodes, whose endpoints are ignored like this node's.
+        ``hidden`` contains the names of robots whose topics are imported. ``gateways(snapshot)`` returns the nodes of
+        other gateways; their endpoints, like this node's, are ignored.
         """
         self.is_master_reached = True
         self.topics: dict[str, TopicToken] = {}

@@ -7,8 +7,8 @@ Written from the source of that bridge (github.com/eclipse-zenoh/zenoh-plugin-ro
 
 HEX is the type name, with two hexadecimal digits per byte; NAME has no leading slash; NAMESPACE is ``*``, which matches
 every other namespace, unless bridges are separated. KIND is pub, sub or srv; cl would be a service client, which no
-bridge announces. A beacon is empty, and is put every second. A bridge may stop its own beacons while it receives the same
-key from another bridge: a beacon shows that some bridge has the resource, but not which one, nor how many.
+bridge announces. A beacon is empty, and is put every second. A bridge may stop its own beacons while another bridge sends
+the same key, so a beacon shows that some bridge has the resource, but not which one or how many.
 """
 
 from __future__ import annotations
@@ -78,14 +78,14 @@ class SharedTopic(NamedTuple):
     is_wanted: bool = False
 
     def has_type_of(self, other: TopicToken) -> bool:
-        """Return whether another token has the same type."""
+        """Return whether ``other`` has the same type as this topic."""
         return (self.token.type, self.token.md5sum) == (other.type, other.md5sum)
 
 
 def shared_topics(
     local: Mapping[str, TopicToken], remote: Iterable[Resource]
 ) -> tuple[dict[str, SharedTopic], dict[str, str]]:
-    """Return the local and remote topics by name, and the reasons why remote topics are ignored, by name.
+    """Return two dicts keyed by topic name: the shared topics, and why other remote topics are ignored.
 
     A remote topic is ignored if its type differs. The local type takes precedence; without one, the first remote type does.
     """
@@ -126,12 +126,12 @@ def beacon_key(resource: Resource, namespace: str) -> str:
 
 
 def beacon_pattern(namespace: str) -> str:
-    """Return the key expression that matches the beacons for bridges in a namespace."""
+    """Return the key expression that matches all beacons in a namespace."""
     return f"{_ROOT}/*/*/*/*/{namespace}/*/**"
 
 
 def parse_beacon(key: str) -> Resource | None:
-    """Return a beacon's resource, or None if the beacon has no type, as for a subscriber to any type.
+    """Return a beacon's resource, or None if the beacon has no type because it is for a subscriber to any type.
 
     Raise BridgeError if the beacon is invalid.
     """
@@ -166,7 +166,7 @@ class _Beacon:
 
 
 class Beacons:
-    """Schedules the beacons of local resources: one per period, which may be skipped while other bridges send it."""
+    """Schedules beacons for local resources: one per period, unless other bridges are sending the same beacon."""
 
     def __init__(self, random: Callable[[], float]) -> None:
         """Create an empty schedule. ``random()`` returns a number in [0, 1)."""
@@ -188,7 +188,7 @@ class Beacons:
             beacon.is_received = True
 
     def due(self, now: float) -> list[str]:
-        """Return the keys whose beacons are to be sent at ``now``, in seconds."""
+        """Return the keys whose beacons are due at time ``now``, in seconds."""
         found = []
         for key, beacon in self._beacons.items():
             if beacon.due > now:

@@ -50,7 +50,7 @@ __all__ = ["Ros1Side"]
 
 _log = logging.getLogger(__name__)
 _MARKER = "/minirospy/ros1_keys"
-"""A topic to which each gateway that uses zenoh-bridge-ros1's keys subscribes first, so that gateways on the same master detect
+"""Each gateway that uses zenoh-bridge-ros1's keys subscribes to this topic first, so that gateways on the same master detect
 each other.
 """
 _MARKER_TYPE = InterfaceType("std_msgs/Empty", "d41d8cd98f00b204e9800998ecf8427e")
@@ -65,7 +65,7 @@ _MAX_ERROR = 2_000
 class Ros1Side:
     """Forwards topics and services between a master and zenoh-bridge-ros1's keys.
 
-    Runs on the node's loop, except for the handling of messages and beacons.
+    Runs on the node's loop, except that messages and beacons are handled in other threads.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class Ros1Side:
         self._tasks: list[asyncio.Task[None]] = []
 
     async def start(self) -> None:
-        """Start forwarding topics and services, which continues until :meth:`close`.
+        """Start forwarding topics and services; continue until :meth:`close`.
 
         Raise BridgeError if another node on this master already uses these keys, or MasterUnreachableError or RpcError if a
         call to the master fails.
@@ -172,7 +172,7 @@ class Ros1Side:
         return changed
 
     def status(self) -> dict[str, object]:
-        """Return counters and resources as values that JSON can represent."""
+        """Return counters and resources as JSON-compatible values."""
         with self._lock:
             seen, announced = len(list(self.sightings)), len(self._beacons)
         return {
@@ -238,7 +238,7 @@ class Ros1Side:
             self._beacons.update(keys, time.monotonic())
 
     async def _beat(self) -> None:
-        """Send the beacons that are due, and update the topics and services from received beacons."""
+        """Send due beacons, and update topics and services from received beacons."""
         expected = time.monotonic()
         while True:
             now = time.monotonic()
@@ -246,7 +246,7 @@ class Ros1Side:
             with self._lock:
                 due = self._beacons.due(now)
                 if late > PERIOD:
-                    # The process was paused, and the beacons sent in that time have not been delivered yet.
+                    # The process was paused; beacons sent during the pause have not been delivered yet.
                     self.sightings.extend(late, now)
                 has_news = self.sightings.forget_lost(now) or self._has_news
             for key in due:

@@ -29,15 +29,16 @@ No gateway sends these publishers' messages back to the keys.
 """
 
 _REPLAY_SECONDS = 0.5
-"""Seconds from a subscriber's first beacon to sending the latched messages, because its bridge may subscribe only after the
-beacon.
+"""Seconds to wait after a subscriber's first beacon before sending latched messages:
+
+its bridge may subscribe only after the beacon.
 """
 _WRITER = ""
 
 
 @dataclass
 class Shared:
-    """The objects that all topics share."""
+    """The objects shared by all topics that use zenoh-bridge-ros1's keys."""
 
     node: Node
     network: FleetNetwork
@@ -50,7 +51,7 @@ class Shared:
 
 
 class Ros1Topic:
-    """One topic with one type. Runs on the loop, except for the handling of messages."""
+    """One topic with one type. Runs on the loop, except that messages are handled in other threads."""
 
     def __init__(self, shared: Shared, topic: SharedTopic) -> None:
         self.token = topic.token
@@ -67,7 +68,7 @@ class Ros1Topic:
         self._is_closed = False
 
     async def update(self, topic: SharedTopic) -> None:
-        """Update the topic's local and remote use."""
+        """Open and close handles for a change in the topic's local or remote use."""
         before, self._topic = self._topic, topic
         self.token = topic.token
         if topic.is_wanted and not before.is_wanted and self.outbound:
@@ -107,7 +108,7 @@ class Ros1Topic:
         return self._topic.is_wanted or (self.token.is_published and self._is_matched)
 
     def _adjust(self) -> None:
-        """Open the handles that are needed now, and close those that can be closed without an await."""
+        """Open newly needed handles, and close those that can be closed without an await."""
         if self._is_closed:
             return
         shared, token = self._shared, self.token

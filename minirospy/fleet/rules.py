@@ -60,7 +60,7 @@ _BULK_TYPES = {
 }
 
 
-# seconds without a command before a zero velocity is published; two commands at a shorter interval form a stream
+# seconds without a command before a zero velocity is published; commands closer together form a stream
 STOP_SECONDS = 0.5
 
 
@@ -112,8 +112,8 @@ class Throttle:
         """Return whether a message may be sent at ``now``, in monotonic seconds."""
         if now < self._next:
             return False
-        # Add the period to the due time instead of the current time: otherwise a limit of 10 Hz would let through
-        # only 7.5 of 30 messages per second. After a pause, restart from the current time.
+        # Add the period to the due time, not to the current time: otherwise a limit of 10 Hz would pass only 7.5 of
+        # 30 messages per second. After a pause, restart from the current time.
         self._next = max(self._next + self._period, now)
         if self._next <= now:
             self._next = now + self._period
@@ -157,9 +157,9 @@ def parse_priorities(words: Iterable[str]) -> list[tuple[str, Priority]]:
 def exported_topics(
     snapshot: Snapshot, own: Collection[str], allows: Callable[[str], bool], hidden: Iterable[str] = ()
 ) -> dict[str, Export]:
-    """Return the topics that a robot announces, which are those with a known type that nodes other than gateways use.
+    """Return the topics that a robot announces: those with a known type and a node other than a gateway.
 
-    ``own`` contains the nodes of gateways, ``hidden`` the namespaces of other robots' topics, which are not announced again.
+    ``own`` contains the gateways' nodes, ``hidden`` the namespaces of imported robots, whose topics are not announced again.
     """
     starts = tuple(f"/{name}/" for name in hidden)
     found = {}

@@ -1,4 +1,4 @@
-"""Threads with queues that transfer messages to and from Zenoh, so that neither direction waits for the event loop."""
+"""Queues with threads that pass messages to and from Zenoh, so that neither direction waits for the event loop."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MAX_WAITING = {Priority.TELEOP: 10, Priority.DATA: 100, Priority.BULK: 2}
 _MAX_BYTES = {Priority.TELEOP: 1 << 20, Priority.DATA: 8 << 20, Priority.BULK: 32 << 20}
 _INTAKE_MESSAGES, _INTAKE_BYTES = 200, 32 << 20
 MAX_OUTLETS = 64
-"""Maximum number of Zenoh publishers that a flow caches: one for its own key, and others for replaying latched messages.
+"""Maximum number of Zenoh publishers cached per flow: one for its own key, others to replay latched messages.
 
 The least recently used publisher is dropped.
 """
@@ -84,7 +84,7 @@ class Outflow:
 
     @property
     def dropped(self) -> int:
-        """Return how many messages were dropped in favour of newer ones because the network was too slow."""
+        """Return the number of messages dropped in favour of newer ones because the network was too slow."""
         return self._flow.dropped
 
     def send(self, key: str, message: bytes, *, always: bool = False) -> None:
@@ -160,7 +160,7 @@ class _PriorityWorker(_Worker):
 
 
 class Sender:
-    """Sends messages, using one thread per priority, so that a large message that takes a second does not delay a command."""
+    """Sends messages. Each priority has its own thread, so that a large message does not delay a command."""
 
     def __init__(self, network: FleetNetwork, clock: Callable[[], int] = time.time_ns) -> None:
         """Create the queues. ``clock`` returns the time in ns that is attached to each message."""
@@ -184,7 +184,7 @@ _Arrival: TypeAlias = tuple[Callable[[bytes, bytes], object], bytes, bytes]
 
 
 class Flows:
-    """A receiver's flows by key. Their number is limited: the least recently used flow is removed. Thread-safe."""
+    """A receiver's flows by key. At the limit, the least recently used idle flow is removed. Thread-safe."""
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -209,7 +209,7 @@ class Flows:
 class Receiver(_Worker):
     """Queues received messages until they are published, round-robin between robots' topics.
 
-    Publishing to a slow subscriber may block for some milliseconds; in Zenoh's own thread, this would delay all robots.
+    Publishing to a slow subscriber may block for some milliseconds, which in Zenoh's own thread would delay all robots.
     """
 
     def __init__(self) -> None:

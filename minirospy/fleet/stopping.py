@@ -1,7 +1,7 @@
-"""Stops a robot, by publishing a zero velocity, when velocity commands no longer arrive over the fleet, as the dashboard does.
+"""Stops a robot when velocity commands stop arriving, by publishing a zero velocity, like the dashboard.
 
 Only streams of commands are guarded; a single velocity stays in effect, as it does without a gateway. The guard's thread
-publishes the zero velocity, so that this works even if the event loop is blocked.
+publishes the zero velocity, so a blocked event loop does not prevent it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _HEADER = 16
 
 
 def at_rest(type_: str, body: bytes) -> bytes | None:
-    """Return the zero message for a command, or None if the command is zero already, or is not valid."""
+    """Return the zero-velocity message for a command, or None if the command is already zero or is invalid."""
     find = _FIELDS.get(type_)
     if find is None:
         return None
@@ -48,7 +48,7 @@ def at_rest(type_: str, body: bytes) -> bytes | None:
     return bytes(rest) if moves else None
 
 
-_Part = tuple[int, int, str]  # start and end offsets of the numbers in a message, and their struct format
+_Part = tuple[int, int, str]  # (start offset, end offset, struct format) of the numbers in a message
 
 
 def _twist(_: bytes) -> list[_Part]:
@@ -84,7 +84,7 @@ _FIELDS: dict[str, Callable[[bytes], list[_Part]]] = {
 
 
 class CommandStream:
-    """Publishes the commands for one topic in order, and a zero velocity after a stream of commands stops. Thread-safe."""
+    """Publishes one topic's commands in order, and a zero velocity when a stream of commands stops. Thread-safe."""
 
     def __init__(
         self,

@@ -27,13 +27,13 @@ __all__ = ["Origin", "exported", "listed", "modules", "overlay_files", "write_ov
 
 PACKAGE = Path(__file__).parents[1]
 _ALSO = {"RPi": PACKAGE / "board" / "pins"}
-"""Python modules that belong to no ROS package, and the folders that contain them."""
+"""Maps Python modules that belong to no ROS package to their folders."""
 _NAMED_OTHERWISE = {
     "camera_info_manager_py": ("camera_info_manager",),
     "python_orocos_kdl": ("PyKDL",),
     "urdfdom_py": ("urdf_parser_py",),
 }
-"""ROS packages whose Python modules have a different name than the package."""
+"""ROS packages whose Python module is not named after the package."""
 _INTERNAL = {
     "PyKDL": "frames functions vectors",
     "actionlib": "aio client goal_id handle machine server simple_client simple_server spec states statuses waiting",
@@ -68,7 +68,7 @@ _HOOKS = {"__getattr__", "__dir__"}
 
 
 class Origin(NamedTuple):
-    """The place from which a name is imported: ``from module import name``, or ``import module`` if ``name`` is empty."""
+    """Where a name is imported from: ``from module import name``, or ``import module`` if ``name`` is empty."""
 
     module: str
     name: str
@@ -118,7 +118,7 @@ def overlay_files() -> dict[str, str]:
 
 @functools.cache
 def modules() -> dict[str, Path]:
-    """Return a dict from each module that programs import, such as ``rosgraph.names``, to the file that defines its names."""
+    """Return a dict that maps each module, such as ``rosgraph.names``, to the file that defines its names."""
     roots = dict(_ALSO)
     for folder in sorted((PACKAGE / "ros").iterdir()):
         if folder.is_dir():
@@ -135,7 +135,7 @@ def modules() -> dict[str, Path]:
 
 
 def _python_modules(package: Path) -> Iterator[str]:
-    """Yield a ROS package's Python modules, which are its folders that contain an ``__init__.py`` and have a module's name."""
+    """Yield a ROS package's Python modules: folders that have a valid module name and contain an ``__init__.py``."""
     named = {package.name, *_NAMED_OTHERWISE.get(package.name, ())}
     for folder in package.iterdir():
         if folder.name in named and (folder / "__init__.py").exists():
@@ -143,7 +143,7 @@ def _python_modules(package: Path) -> Iterator[str]:
 
 
 def exported(source: Path) -> dict[str, Origin]:
-    """Return the names that the module in `overlay/` re-exports, with the place from which each is imported."""
+    """Return the names that the module in `overlay/` re-exports, each with the module it is imported from."""
     read = _read(source)
     names = dict.fromkeys([*(read.public or ()), *sorted(read.passed_on)])
     return {name: _origin(Origin(_dotted(source), name)) for name in names}
@@ -212,7 +212,7 @@ def listed(source: Path) -> list[str]:
 
 
 def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
-    """Return a dict from each name that a star import from the module brings from other modules to `MODULE` or `MODULE:NAME`."""
+    """Return the names from other modules that a star import also brings, as a dict to `MODULE` or `MODULE:NAME`."""
     found = {}
     for place, names in PASSED_ON.get(module, {}).items():
         for each in names.split():
@@ -222,7 +222,7 @@ def _passed_on(module: str, own: Iterable[str]) -> dict[str, str]:
 
 
 def _submodules(package: str) -> dict[str, str]:
-    """Return a dict from the names of a package's submodules to the submodules' full names."""
+    """Return a dict that maps the names of a package's submodules to their full names."""
     depth = package.count(".") + 1
     names = [
         each.rpartition(".")[2]
@@ -235,7 +235,7 @@ def _submodules(package: str) -> dict[str, str]:
 
 
 def _text_of_later(module: str, names: dict[str, str], starred: list[str], *, has_hook: bool) -> list[str]:
-    """Return source lines that look up these names at first use; type checkers and editors do not see the names."""
+    """Return source lines that look up these names at first use. Type checkers and editors do not see such names."""
     missing = f"raise AttributeError(f\"module '{module}' has no attribute {{name!r}}\")"
     return [
         "",
@@ -257,7 +257,7 @@ def _text_of_later(module: str, names: dict[str, str], starred: list[str], *, ha
 
 
 def _wrapped(words: Iterable[str]) -> list[str]:
-    """Return the words as wrapped, indented lines, with a comma after each word."""
+    """Join the words with commas into wrapped, indented lines."""
     lines: list[str] = []
     for word in words:
         if lines and len(lines[-1]) + len(word) + 2 <= _WIDTH:
@@ -282,7 +282,7 @@ def _dotted(source: Path) -> str:
 
 @functools.cache
 def _by_source() -> dict[str, tuple[str, Path]]:
-    """Return a dict from each module's dotted name in this package to its name in the overlay and its file."""
+    """Return a dict keyed by dotted name in this package, with each module's name in the overlay and its file."""
     return {_dotted(source): (name, source) for name, source in modules().items()}
 
 

@@ -108,7 +108,7 @@ def layout_of(
 
 
 class _Pairing:
-    """Traverses two specs in parallel and pairs their fields."""
+    """Walks two specs in parallel and pairs their fields."""
 
     def __init__(self, ros1_lookup: Lookup, ros2_lookup: Lookup, rules: Rules) -> None:
         self._ros1 = ros1_lookup
@@ -187,7 +187,7 @@ class _Pairing:
 
 
 class _Ordering:
-    """Traverses in parallel two specs that :class:`_Pairing` has accepted, to find the order of their fields."""
+    """Walks two specs in parallel, once :class:`_Pairing` has accepted them, to determine the order of their fields."""
 
     def __init__(self, ros1_lookup: Lookup, ros2_lookup: Lookup, rules: Rules) -> None:
         self._ros1 = ros1_lookup

@@ -1,7 +1,7 @@
 """The mapping of types and their fields between ROS 1 and ROS 2. Pure.
 
-Most types have the same name and fields on both sides. Exceptions are listed here. Users can add exceptions in a file
-that has the format of ros1_bridge's mapping rules. Source: https://github.com/ros2/ros1_bridge/blob/master/doc/index.rst.
+Most types have the same name and fields on both sides. Special cases are listed here. Users can add more in a file in the
+format of ros1_bridge's mapping rules. Source: https://github.com/ros2/ros1_bridge/blob/master/doc/index.rst.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["BUILT_IN", "Rules", "TypeRule", "parse_rules", "snake_case"]
 
 @dataclass(frozen=True)
 class TypeRule:
-    """The exceptions for a ROS 1 type.
+    """The special cases in how a ROS 1 type maps to ROS 2.
 
     ``names`` are its possible names in ROS 2, as ``pkg/Name``. ``fields`` maps all forwarded fields to ROS 2's fields.
     If ``fields`` is None, fields are matched by name, except for ``only_ros1`` and ``only_ros2``, which the other side lacks.

@@ -95,9 +95,9 @@ def require_rclpy() -> None:
 
 
 _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
-"""Environment variables for Fast DDS's settings file.
+"""Environment variables that name Fast DDS's settings file.
 
-The second one is for Fast DDS version 2 and older, which the _OLD_DISTRIBUTIONS use.
+Fast DDS 2 and older, used by the _OLD_DISTRIBUTIONS, reads the second one.
 """
 _OLD_DISTRIBUTIONS = ("humble", "iron", "jazzy")
 _PACKAGE = re.compile(r"[a-z](_?[a-z0-9]+)*")

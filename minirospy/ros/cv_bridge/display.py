@@ -36,7 +36,7 @@ _LEGACY = {
     "CV_16UC3": "bgr16",
     "CV_16UC4": "bgra16",
 }
-"""Encodings without color information, and the encodings as which they are interpreted."""
+"""Maps encodings without color information to those they are interpreted as."""
 
 
 def cvtColorForDisplay(
@@ -88,7 +88,7 @@ def cvtColorForDisplay(
 
 
 def _guessed(encoding: str) -> str:
-    """Return bgr8. Raise RuntimeError if an image with that encoding cannot be displayed."""
+    """Return bgr8 as the output encoding. Raise RuntimeError if an image with this encoding cannot be displayed."""
     bits = 0
     try:
         number = type_of_encoding(encoding)
@@ -101,7 +101,7 @@ def _guessed(encoding: str) -> str:
 
 
 def _labels(image: Pixels) -> Pixels:
-    """Return an image of labels as a color image."""
+    """Convert an image of labels to a color image."""
     import numpy as np
 
     colors = np.frombuffer(_LABEL_COLORS, np.uint8).reshape(-1, 3)[:, ::-1]
@@ -111,7 +111,7 @@ def _labels(image: Pixels) -> Pixels:
 
 
 def _scaled(image: Pixels, low: float, high: float) -> Pixels:
-    """Return an 8-bit image, in which ``low`` becomes 0 and ``high`` 255; NaN becomes 0."""
+    """Scale an image to 8 bits: map ``low`` to 0, ``high`` to 255, and NaN to 0."""
     import numpy as np
 
     values = image.astype(np.float64) - low

@@ -1,4 +1,4 @@
-"""The programs of diagnostic_aggregator, which sort the nodes' statuses into a tree.
+"""diagnostic_aggregator's programs. They sort the nodes' statuses into a tree.
 
 Source: http://wiki.ros.org/diagnostic_aggregator.
 """

@@ -53,7 +53,7 @@ def main() -> int:
 def analyzer_loader() -> int:
     """Return 0 if all analyzers in the private parameters can be created, else 1.
 
-    This is a test program: `<test pkg="diagnostic_aggregator" type="analyzer_loader">` in a launch file with the parameters.
+    Test program; a launch file sets the parameters and runs `<test pkg="diagnostic_aggregator" type="analyzer_loader">`.
     """
     import unittest
 
@@ -139,7 +139,10 @@ class Aggregator:
             self._warned.add(names)
 
     def _add(self, request: AddDiagnosticsRequest) -> AddDiagnosticsResponse:
-        """Create analyzers from the parameters in another namespace, until the bond with the requesting node breaks."""
+        """Create analyzers from the parameters in another namespace.
+
+        Remove them when the bond with the requesting node breaks.
+        """
         namespace: str = request.load_namespace
         if not namespace.startswith("/"):
             return AddDiagnosticsResponse(

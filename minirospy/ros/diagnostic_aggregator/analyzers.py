@@ -1,4 +1,4 @@
-"""Analyzers, which select statuses and report on them. Pure: times are arguments, in seconds.
+"""Analyzers select statuses and report on them. Pure: times are arguments, in seconds.
 
 A tree of analyzers is built from parameters. Source: http://wiki.ros.org/diagnostic_aggregator, and the output of ROS's
 aggregator_node.
@@ -212,7 +212,7 @@ class DiscardAnalyzer(GenericAnalyzer):
 
 
 class IgnoreAnalyzer:
-    """Accepts and reports nothing; used to disable a part of the parameters."""
+    """Accepts and reports nothing. Used to disable some of the parameters."""
 
     path = name = ""
 
@@ -246,7 +246,7 @@ class OtherAnalyzer(_Items):
 
 
 class AnalyzerGroup:
-    """A group of analyzers with a header. Parameters: path, and analyzers, which has one namespace per analyzer."""
+    """A group of analyzers with a header. Parameters: path, and analyzers, with one namespace per analyzer."""
 
     def __init__(self, base_path: str, params: Params, namespace: str, now: float, log: Log) -> None:
         """Create the analyzers and report errors; ``is_complete`` is False if an analyzer cannot be created."""
@@ -352,7 +352,7 @@ _TYPES: dict[str, Callable[[str, Params, str, float, Log], Analyzer]] = {
 
 
 def strip_prefix(name: str, prefix: str) -> str:
-    """Return a name without ``prefix`` at the start of its last part, and without the colon and spaces after the prefix."""
+    """Remove ``prefix`` from the start of a name's last part, together with the following colon and spaces."""
     if not prefix:
         return name
     at = name.rfind("/") + 1

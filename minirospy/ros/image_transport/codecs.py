@@ -1,4 +1,4 @@
-"""Encoding and decoding images for the transports compressed and compressedDepth. Pure.
+"""Encodes and decodes images for the transports compressed and compressedDepth. Pure.
 
 A CompressedImage's format names the original encoding: ``rgb8; jpeg compressed bgr8``. In compressedDepth, 12 bytes
 precede the PNG: an enum, and the two floats that convert 32-bit depths to 16 bits: inverse = A / depth + B.

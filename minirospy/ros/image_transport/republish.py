@@ -87,7 +87,7 @@ def _warn_without_library() -> None:
 
 
 def list_main() -> int:
-    """Print the transports as the program list_transports does; return the exit status."""
+    """Print the transports, like the program list_transports; return the exit status."""
     print("Declared transports:")
     for name in _TRANSPORTS:
         print(f"image_transport/{name}")
@@ -156,7 +156,10 @@ class Republisher:
 
 
 def settings_of(values: Mapping[str, object]) -> Settings:
-    """Return the settings from parameters, clamped to their limits. Raise CodecError if a parameter has the wrong type."""
+    """Read the settings from parameters, and clamp them to their limits.
+
+    Raise CodecError if a parameter has the wrong type.
+    """
     chosen: dict[str, object] = {}
     for name, value in values.items():
         if name in _NUMBERS:
@@ -181,7 +184,7 @@ def _class_of(kind: str) -> type[Image] | type[CompressedImage]:
 
 
 def _bytes_of(cls: type[Image] | type[CompressedImage]) -> type[AnyMsg]:
-    """Return a message class with the type of ``cls`` whose messages stay serialized."""
+    """Return a message class of the same type as ``cls`` whose messages stay serialized."""
     fields = {"_type": cls._type, "_md5sum": cls._md5sum, "_full_text": cls._full_text, "__slots__": []}
     return type("PassedImage", (AnyMsg,), fields)
 

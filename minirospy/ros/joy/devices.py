@@ -1,4 +1,4 @@
-"""Joysticks connected to this machine: on Linux through /dev/input/js* and its protocol, elsewhere through pygame-ce.
+"""Accesses joysticks connected to this machine: on Linux through /dev/input/js*, elsewhere through pygame-ce.
 
 Protocol: https://www.kernel.org/doc/html/latest/input/joydev/joystick-api.html.
 """
@@ -72,7 +72,7 @@ def open_device(path: str, feedback_path: str = "") -> Device:
 
 
 class LinuxDevice:
-    """A joystick on Linux: a device file from which each event is read as eight bytes."""
+    """A joystick on Linux: a device file that yields eight bytes per event."""
 
     def __init__(self, path: str, feedback_path: str = "") -> None:
         self._feedback_path = feedback_path or event_device(path)
@@ -230,7 +230,7 @@ class PygameDevice:
 def state_events(
     before: Sequence[tuple[int, int, int]], after: Sequence[tuple[int, int, int]]
 ) -> list[Event]:
-    """Return the events that lead from one state to the next; if ``before`` is empty, return the initial events."""
+    """Return the events that lead from state ``before`` to the next; the initial events if ``before`` is empty."""
     if not before:
         return [Event(kind | EVENT_INIT, number, value) for kind, number, value in after]
     return [Event(*each) for old, each in zip(before, after, strict=True) if old != each]

@@ -24,7 +24,7 @@ from minirospy.ros.joy.rumble import RumbleError
 
 __all__ = ["JoyNode", "Motors", "main"]
 
-_LOOK_SECONDS = 0.2  # maximum delay in seconds before the node notices a shutdown
+_LOOK_SECONDS = 0.2  # maximum seconds until the node notices a shutdown
 
 _RETRY_SECONDS = 1.0
 _DIAGNOSTIC_SECONDS = 1.0
@@ -214,7 +214,7 @@ class Motors:
         self._wanted = strong, weak
 
     def run(self, device: Device, now: float) -> None:
-        """Apply a change to the device and restart motors before the device stops them; ``now`` is in seconds."""
+        """Apply the requested state to the device, and restart motors before the device stops them. ``now`` is in seconds."""
         wanted = self._wanted
         if wanted == self._running and (wanted == (0.0, 0.0) or now < self._again):
             return

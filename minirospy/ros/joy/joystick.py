@@ -1,4 +1,4 @@
-"""joy_node's rules for publishing, which convert events and times to messages. Pure: the clock is an argument, in seconds.
+"""joy_node's publishing rules: converts events and times to messages. Pure: the clock is an argument, in seconds.
 
 Source: http://wiki.ros.org/joy. Button events are published immediately. Axis events, and a device's initial events, are
 published after ``coalesce_interval``. If ``autorepeat_rate`` is set, the state is republished while no event occurs.
@@ -81,7 +81,7 @@ class Joystick:
         self._published(now + _FIRST_SECONDS)
 
     deadline: float | None
-    """The time at which to publish the state if no event occurs; None if it is not to be published without an event."""
+    """When to publish the state if no event occurs; None to publish only on events."""
 
     def handle(self, event: Event, now: float) -> bool:
         """Process an event; return whether to publish the state immediately. Raise ValueError if the event's type is unknown."""

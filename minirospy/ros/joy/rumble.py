@@ -1,4 +1,4 @@
-"""Runs a joystick's motors on Linux, through the force feedback of its event device, with the kernel's structures.
+"""Runs a joystick's motors on Linux, through its event device's force feedback and the kernel's structs.
 
 Source: https://www.kernel.org/doc/html/latest/input/ff.html, linux/input.h.
 """
@@ -35,7 +35,7 @@ class RumbleError(MinirospyError):
 
 
 def event_device(joystick: str, folder: Path = _INPUT) -> str:
-    """Return the event device for the joystick at a path (`/dev/input/js0`), or "" if the joystick has no event device."""
+    """Return the event device of the joystick at a path such as `/dev/input/js0`, or "" if there is none."""
     found = sorted((folder / Path(joystick).name / "device").glob("event*"))
     return f"/dev/input/{found[0].name}" if found else ""
 

@@ -1,4 +1,4 @@
-"""Converts a map's YAML file and pixels to occupancies, and occupancies to PGM and YAML. Pure.
+"""Converts a map's YAML file and pixels to an occupancy grid, and a grid to PGM and YAML. Pure.
 
 Source: http://wiki.ros.org/map_server. Row 0 is at the top of an image, but at the bottom of a grid.
 """
@@ -126,7 +126,10 @@ def _finite(text: str) -> float:
 
 
 def to_grid(pixels: Pixels, settings: MapSettings) -> NDArray[np.int8]:
-    """Return an image's occupancies, row by row from the bottom: 0 to 100, -1 for unknown; in mode raw, the grey levels."""
+    """Convert an image to occupancies from 0 to 100 (-1: unknown), row by row from the bottom.
+
+    In mode raw, return the grey levels.
+    """
     values, has_alpha = pixels
     channels = values.shape[2]
     # In mode trinary the alpha channel counts as one more color, as in the real program.
@@ -158,7 +161,7 @@ def quaternion_of_yaw(yaw: float) -> tuple[float, float]:
 
 
 def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
-    """Return the rotation about z in radians; 0 if the pitch is a right angle, as tf2's getEulerYPR does.
+    """Return the rotation about z in radians; 0 if the pitch is a right angle, like tf2's getEulerYPR.
 
     Also return 0 for the unset quaternion 0, 0, 0, 0. The real program writes `-nan`, which no map_server can read.
     """
@@ -175,7 +178,7 @@ def yaw_of_quaternion(x: float, y: float, z: float, w: float) -> float:
 def pgm_of_grid(
     data: Sequence[int], width: int, height: int, resolution: float, occupied: int, free: int
 ) -> bytes:
-    """Return a grid as a PGM image: cells up to ``free`` are free, cells from ``occupied`` are occupied.
+    """Convert a grid to a PGM image. Cells up to ``free`` are free, cells from ``occupied`` are occupied.
 
     Raise MapError if the grid is invalid.
     """

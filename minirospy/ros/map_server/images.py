@@ -42,7 +42,7 @@ class Pixels(NamedTuple):
 
 
 def read_image(data: bytes) -> Pixels:
-    """Return an image file's pixels. Raise ImageError if the file cannot be decoded."""
+    """Decode an image file to pixels. Raise ImageError if the file cannot be decoded."""
     if not data:
         raise ImageError("Unsupported image format: the file is empty")
     if data[:2] in _CHANNELS and data[2:3].isspace():
@@ -124,7 +124,7 @@ def _read_by_pillow(data: bytes) -> Pixels:
 
 
 def _pixels_of(image: Image.Image) -> Pixels:
-    """Return an image's bytes as SDL_image does: palette indices, and the upper byte of 16-bit values."""
+    """Return an image's bytes in SDL_image's format: palette indices, and the upper byte of 16-bit values."""
     if image.mode.startswith("I"):
         values = np.asarray(image).astype(np.int64)
         return Pixels(np.clip(values >> 8, 0, 255).astype(np.uint8)[..., None], has_alpha=False)

@@ -27,7 +27,7 @@ _USAGE = """Usage:
 
 
 class SaverOptions(NamedTuple):
-    """The files' name without suffix, the lowest occupancy of an occupied cell, and the highest of a free cell."""
+    """The file name without suffix, and the thresholds: lowest occupancy of occupied cells, highest of free cells."""
 
     name: str = "map"
     occupied: int = 65

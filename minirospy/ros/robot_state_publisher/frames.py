@@ -67,7 +67,7 @@ class RobotFrames:
 
 
 def prefixed(prefix: str, frame: str) -> str:
-    """Return a frame's name with the tf_prefix; if the name starts with a slash, only remove the slash."""
+    """Add the tf_prefix to a frame's name. If the name starts with a slash, only remove the slash."""
     if frame.startswith("/"):
         return frame[1:]
     return f"{prefix.removeprefix('/')}/{frame}" if prefix else frame

@@ -21,7 +21,7 @@ NAMES = (
 
 
 class JointParameters(NamedTuple):
-    """The parsed parameters.
+    """The node's parameters, parsed and checked.
 
     ``rate`` is in messages per second, ``delta`` in radians or metres per message; ``sources`` are topics.
     """
@@ -34,7 +34,7 @@ class JointParameters(NamedTuple):
 
 
 def read_parameters(param: Callable[[str, object], object], zeros: Sequence[object]) -> JointParameters:
-    """Return the parameters. ``param(name, default)`` returns a value; ``zeros`` are the values of zeros, the private one first.
+    """Read the parameters. ``param(name, default)`` returns a value; ``zeros`` are the values of zeros, private first.
 
     Raise JointError if a parameter is invalid.
     """

@@ -1,4 +1,4 @@
-"""joint_state_publisher: publishes joint_states, from a description's joints, their zeros, and joint states from other nodes.
+"""joint_state_publisher: publishes joint_states from a description, zero positions and other nodes' joint states.
 
 Parameters, private or in the node's namespace: robot_description, rate (10 Hz), dependent_joints
 (``{joint: {parent, factor, offset}}``), use_mimic_tags, use_smallest_joint_limits (true), source_list (topics), zeros

@@ -1,4 +1,4 @@
-"""A description's adjustable joints, and their state. Pure: converts parameters to the values in a JointState.
+"""Tracks a description's adjustable joints. Pure: converts parameters to the values in a JointState.
 
 Source: http://wiki.ros.org/joint_state_publisher. Like that node, it parses the description leniently: an incomplete
 robot, or a COLLADA file, is accepted.
@@ -70,7 +70,7 @@ class Dependent:
 
 @dataclass(frozen=True)
 class JointOptions:
-    """The parameters for joint_state_publisher that determine the joints; the fields have the parameters' names."""
+    """joint_state_publisher's parameters that determine the joints. The fields have the parameters' names."""
 
     dependent_joints: Mapping[str, Dependent] = field(default_factory=dict)
     use_mimic_tags: bool = True
@@ -262,7 +262,7 @@ def _below(element: Element) -> Iterator[Element]:
 
 
 def _collada_joints(root: Element, warn: Callable[[str], object]) -> dict[str, FreeJoint]:
-    """Return the revolute joints in a COLLADA description, whose limits are in degrees."""
+    """Return the revolute joints in a COLLADA description. COLLADA's limits are in degrees."""
     models = [each for each in _below(root) if each.tag == "kinematics_model"]
     techniques = [each for model in models[:1] for each in _below(model) if each.tag == "technique_common"]
     found = {}

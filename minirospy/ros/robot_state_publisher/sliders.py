@@ -1,4 +1,4 @@
-"""Sliders for joints, moved with keys: the selected slider, the effect of each key, and the lines to show. Pure.
+"""Keyboard-controlled sliders for joints: the selection, the effect of each key, and the lines to show. Pure.
 
 Source: http://wiki.ros.org/joint_state_publisher_gui, which has the same sliders, Center and Randomize.
 """

@@ -50,7 +50,7 @@ def main(name: str = "robot_state_publisher") -> int:
 
 
 def _warn_of(robot: Robot) -> None:
-    """Log warnings, worded as in ROS, about features of a robot that frames cannot represent."""
+    """Warn, in ROS's words, about features of a robot that frames cannot represent."""
     if robot.links[robot.root].inertial:
         rospy.logwarn(
             "The root link %s has an inertia specified in the URDF, but KDL does not support a root link with an inertia.  "
@@ -97,7 +97,7 @@ class StatePublisher:
         )
 
     def publish(self, state: JointState) -> None:
-        """Publish the frames for a joint state, unless its joints were published less than a period ago."""
+        """Publish the frames for a joint state, unless they were published less than a period ago."""
         if not self._is_valid(state):
             return
         now = rospy.Time.now()

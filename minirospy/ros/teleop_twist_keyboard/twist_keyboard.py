@@ -93,7 +93,7 @@ class Motion(NamedTuple):
 
 
 class KeyTeleop:
-    """Converts keys to motions and lines to print. Pure."""
+    """Converts keys to motions, and to the lines to print. Pure."""
 
     def __init__(
         self, speed: float, turn: float, speed_limit: float = 1000, turn_limit: float = 1000

@@ -1,4 +1,4 @@
-"""The server's record of its goals: one StatusTracker per goal, and ServerGoalHandles for user code.
+"""The server's goals: one StatusTracker per goal, and ServerGoalHandles for user code.
 
 The transitions are a table in `minirospy.core.graph.goals`.
 """
@@ -33,7 +33,7 @@ _WHERE_FROM = {
 
 
 class StatusTracker:
-    """A goal in the server's list, or the ID of a goal that was cancelled before it arrived."""
+    """Tracks a goal in the server's list, or the ID of a goal that was cancelled before it arrived."""
 
     def __init__(
         self, goal_id: GoalID | None = None, status: int | None = None, goal: ActionGoal | None = None
@@ -43,7 +43,7 @@ class StatusTracker:
         self.id_generator = GoalIDGenerator()
         self.ended_at = 0  # nanoseconds in ROS time; 0 until the goal ends
         self._bytes: bytes | None = None
-        self._serialized: tuple[object, ...] = ()  # the values in `_bytes`
+        self._serialized: tuple[object, ...] = ()  # the field values serialized in `_bytes`
         self.status = GoalStatus()
         if goal is None:
             self.status.goal_id = goal_id or GoalID()
@@ -70,7 +70,7 @@ class StatusTracker:
         self._bytes = None
 
     def serialize(self) -> bytes:
-        """Return the serialized status. The bytes are cached once the goal has ended, because the status rarely changes then."""
+        """Serialize the status. Once the goal has ended, cache the bytes, because the status then rarely changes."""
         if not self.ended_at:
             return status_bytes(self.status)
         status = self.status
@@ -82,7 +82,7 @@ class StatusTracker:
 
 
 class _Server(Protocol):
-    """The methods of the action server that the handles of its goals call."""
+    """The action server's methods that goal handles call."""
 
     ActionResultType: type[Message]
 
@@ -147,7 +147,7 @@ class ServerGoalHandle:
             self.action_server.publish_status()
 
     def set_canceled(self, result: Message | None = None, text: str = "") -> None:
-        """End the goal after a cancel request, as RECALLED if it had not been accepted, otherwise as PREEMPTED."""
+        """End the goal after a cancel request: as RECALLED if it was never accepted, otherwise as PREEMPTED."""
         self._log("Setting status to canceled on goal, id: %s, stamp: %.2f")
         self._finish(GoalEvent.CANCEL, result, text)
 

@@ -1,4 +1,4 @@
-"""The client's record of its goals: one CommStateMachine per goal, owned by the GoalManager and read through a ClientGoalHandle.
+"""The client's goals: one CommStateMachine per goal, owned by the GoalManager and read through a ClientGoalHandle.
 
 The transitions are tables in `minirospy.core.graph.goals`. Source: http://wiki.ros.org/actionlib/DetailedDescription.
 """
@@ -28,7 +28,7 @@ FeedbackCallback = Callable[["ClientGoalHandle", Any], object]
 
 _DONE = CommState.DONE
 _MAY_BE_MISSING = (CommState.WAITING_FOR_GOAL_ACK, CommState.WAITING_FOR_RESULT, CommState.DONE)
-"""States in which a goal may be missing from the server's list, because it is not listed yet or no longer listed."""
+"""States in which the server may not list a goal, either not yet or no longer."""
 
 
 class ClientGoalHandle:

@@ -99,7 +99,7 @@ class ActionServer:
         self.auto_start = auto_start
         self.started = False
 
-        # All goals whose status is published. Programs change the list
+        # all goals whose status is published; programs modify this list
         self.status_list: list[StatusTracker] = []
         self._indexed: list[StatusTracker] = []  # the content of `status_list` when `_by_id` was built
         self._by_id: dict[str, StatusTracker] = {}
@@ -200,7 +200,7 @@ class ActionServer:
             self._publish(self.feedback_pub, message)
 
     def publish_status(self) -> None:
-        """Publish all goals' statuses, immediately if they are few, otherwise after a pause."""
+        """Publish all goals' statuses. If there are many, wait for a pause first."""
         with self.lock:
             pause = len(self.status_list) * _SECONDS_A_STATUS
             now = time.monotonic()
@@ -210,7 +210,7 @@ class ActionServer:
                 self._status_thread.hurry(self._published_at + pause - now)
 
     def publish_status_now(self) -> None:
-        """Publish all goals' statuses, first removing goals that ended longer ago than the status list timeout."""
+        """Remove goals that ended longer ago than the status list timeout, then publish all statuses."""
         with self.lock:
             now = rospy.get_rostime()
             self._forget_old(now)

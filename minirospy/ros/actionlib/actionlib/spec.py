@@ -18,15 +18,14 @@ __all__ = [
 ]
 
 
-# Connection header field by which minirospy clients announce, on goal topics, that they accept fast responses.
+# Connection header field on goal topics, set by minirospy clients to announce that they accept fast responses.
 TAKES_FAST_ANSWERS = {"takes_fast_answers": "1"}
 
-# Seconds by which the server delays goals from non-minirospy clients: Python actionlib drops results that arrive
-# before send_goal returns.
+# Seconds by which the server delays goals from other clients: Python actionlib drops results that arrive before
+# send_goal returns.
 SEND_SECONDS = 1e-3
 
-# Seconds by which cancel requests are delayed, because a goal that was sent earlier uses another connection and is
-# itself delayed.
+# Seconds by which cancel requests are delayed: the goal, sent earlier on another connection, is itself delayed.
 CANCEL_SECONDS = 3 * SEND_SECONDS
 
 # Seconds for a server to reconnect after its connection has ended. After that, its goals are LOST.
@@ -38,7 +37,7 @@ class ActionException(MinirospyError):
 
 
 class ActionTypes(NamedTuple):
-    """An action's message classes; the classes named ``action_...`` are those of the topics."""
+    """An action's message classes; those named ``action_...`` are used on its topics."""
 
     action_goal: type[ActionGoal]
     action_result: type[ActionResult]
@@ -49,7 +48,7 @@ class ActionTypes(NamedTuple):
 
 
 def action_types(action: type[Action]) -> ActionTypes:
-    """Return the message classes for an action class, such as ``runningLedAction``.
+    """Return the message classes of an action class, such as ``runningLedAction``.
 
     Raise ActionException if ``action`` is not an action class.
     """

@@ -17,7 +17,7 @@ __all__ = [
 ]
 
 NO_TRANSITION, INVALID_TRANSITION = -1, -2
-"""Entries in the transition table of ROS's client: for a status that changes nothing, and for an invalid status.
+"""Entries in the transition table of ROS's client: the status changes nothing, or the status is invalid.
 
 minirospy's table is in :mod:`minirospy.core.graph.goals`. Programs may use these names after `from actionlib import *`.
 """
@@ -34,7 +34,7 @@ def get_name_of_constant(C: type, n: int) -> str:
 
 
 class CommState:
-    """The communication states in which a client's goal can be."""
+    """The communication states of a client's goal."""
 
     WAITING_FOR_GOAL_ACK = int(ClientState.WAITING_FOR_GOAL_ACK)
     PENDING = int(ClientState.PENDING)
@@ -69,7 +69,7 @@ class TerminalState:
 
 
 class SimpleGoalState:
-    """The states in which the simple client's goal can be."""
+    """The states of the simple client's goal."""
 
     PENDING = int(SimpleState.PENDING)
     ACTIVE = int(SimpleState.ACTIVE)

@@ -1,4 +1,4 @@
-"""A serialized actionlib_msgs/GoalStatusArray: composed from serialized statuses, and parsed only on demand.
+"""An actionlib_msgs/GoalStatusArray built from serialized statuses and parsed only on demand.
 
 A server publishes each goal's status for a few seconds after the goal has ended, so a busy server publishes thousands of
 statuses at a time. A client needs only those of its own goals.
@@ -22,7 +22,7 @@ _STATUS_AND_LENGTH = struct.Struct("<BI")
 
 
 def status_bytes(status: GoalStatus) -> bytes:
-    """Return a serialized status."""
+    """Serialize a status."""
     buffer = BytesIO()
     status.serialize(buffer)
     return buffer.getvalue()
@@ -35,7 +35,7 @@ def _parse(data: bytes) -> GoalStatus:
 
 
 class StatusList(GoalStatusArray):
-    """A GoalStatusArray that is composed from serialized statuses, and parsed on first access."""
+    """A GoalStatusArray built from serialized statuses and parsed on first access."""
 
     _takes_memoryview = False
 
@@ -117,7 +117,7 @@ class StatusList(GoalStatusArray):
         return bounds
 
     def _fail(self, data: bytes) -> None:
-        # For the same data, the generated class raises DeserializationError with the usual error text.
+        # The generated class raises DeserializationError for this data, with the usual error text.
         GoalStatusArray().deserialize(data)
 
 

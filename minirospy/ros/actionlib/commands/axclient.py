@@ -1,7 +1,7 @@
 """axclient.py: send a goal to an action server from the terminal, with a form generated from the goal's type.
 
-Source: http://wiki.ros.org/actionlib (Tools). ROS's axclient.py opens a window; this one reads and prints lines, so that
-scripts can use it too.
+Source: http://wiki.ros.org/actionlib (Tools). ROS's axclient.py opens a window; this one reads and prints lines, so
+scripts can also use it.
 """
 
 from __future__ import annotations

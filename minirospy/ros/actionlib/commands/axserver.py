@@ -64,7 +64,7 @@ def _axserver(action: str, type: str) -> None:
 
 
 def _answer(server: SimpleActionServer) -> bool:
-    """Prompt the user for actions on the goal until it has ended; at end of input, abort the goal and return False."""
+    """Prompt the user for actions until the goal has ended. At end of input, abort the goal and return False."""
     types = server.action_server
     endings: dict[str, Callable[..., None]] = {
         "s": server.set_succeeded,

@@ -1,4 +1,4 @@
-"""angles: distances between angles, with and without limits. All angles are in radians. Source: http://wiki.ros.org/angles."""
+"""angles: distances between angles in radians, with and without limits. Source: http://wiki.ros.org/angles."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def shortest_angular_distance(from_angle: float, to_angle: float) -> float:
 
 
 def two_pi_complement(angle: float) -> float:
-    """Return the rotation to the same angle in the opposite direction, in the range -2 pi to 2 pi."""
+    """Return the rotation in the opposite direction that leads to the same angle, from -2 pi to 2 pi."""
     if abs(angle) > _TURN:
         angle = fmod(angle, _TURN)
     return angle - _TURN if angle > 0 else angle + _TURN
@@ -50,7 +50,7 @@ def two_pi_complement(angle: float) -> float:
 def shortest_angular_distance_with_limits(
     from_angle: float, to_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float]:
-    """Return (success, rotation): the shortest rotation to an angle that stays within the limits, if there is one.
+    """Return (success, rotation): the shortest rotation to ``to_angle`` within the limits, if there is one.
 
     All angles are from -pi to pi. The limits run counter-clockwise from left to right: [0.25, -0.25] contains pi, but not 0.
     """
@@ -75,7 +75,7 @@ def shortest_angular_distance_with_limits(
 def shortest_angular_distance_with_large_limits(
     from_angle: float, to_angle: float, left_limit: float, right_limit: float
 ) -> tuple[bool, float]:
-    """Return (success, rotation) as :func:`shortest_angular_distance_with_limits` does; the limits may exceed -pi and pi.
+    """Like :func:`shortest_angular_distance_with_limits`, but the limits may exceed -pi and pi.
 
     The left limit must be less than the right one.
     """

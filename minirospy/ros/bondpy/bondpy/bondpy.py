@@ -111,11 +111,11 @@ class Bond:
     # --- timeouts, which can be changed until the bond is started
 
     def get_connect_timeout(self) -> Seconds:
-        """Return the maximum time for the bond to form."""
+        """Return the maximum time that the bond may take to form."""
         return self._seconds[Event.CONNECT_TIMEOUT]
 
     def set_connect_timeout(self, dur: Seconds) -> None:
-        """Set the maximum time for the bond to form."""
+        """Set the maximum time that the bond may take to form."""
         self._set(Event.CONNECT_TIMEOUT, dur)
 
     connect_timeout = property(get_connect_timeout, set_connect_timeout)
@@ -167,12 +167,12 @@ class Bond:
             self._has_started = True
 
     def set_formed_callback(self, on_formed: Callback | None) -> None:
-        """Set the callback for when the bond forms."""
+        """Set the callback to call when the bond forms."""
         with self.lock:
             self.on_formed = on_formed
 
     def set_broken_callback(self, on_broken: Callback | None) -> None:
-        """Set the callback for when the bond breaks."""
+        """Set the callback to call when the bond breaks."""
         with self.lock:
             self.on_broken = on_broken
 

@@ -8,7 +8,7 @@ __all__ = ["Action", "Event", "State", "next_state"]
 
 
 class State(enum.Enum):
-    """A state; its value is the name in ``repr(bond)``."""
+    """A bond's state. The values are the names shown by ``repr(bond)``."""
 
     WAITING = "SM.WaitingForSister"
     ALIVE = "SM.Alive"
@@ -54,5 +54,5 @@ _TABLE: dict[tuple[State, Event], tuple[State, tuple[Action, ...]]] = {
 
 
 def next_state(state: State, event: Event) -> tuple[State, tuple[Action, ...]]:
-    """Return the state after an event, and the actions to perform. If the event has no transition, the state does not change."""
+    """Return the next state and the actions to perform. If the event has no transition, the state stays the same."""
     return _TABLE.get((state, event), (state, ()))

@@ -1,4 +1,4 @@
-"""convert: convert a calibration file to the other format, as ROS's program of the same name does."""
+"""convert: convert a calibration file to the other format, like ROS's program of that name."""
 
 from __future__ import annotations
 

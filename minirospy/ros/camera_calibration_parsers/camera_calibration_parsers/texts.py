@@ -22,7 +22,7 @@ _MATRICES = (
     ("rectification_matrix", "R", (3, 3)),
     ("projection_matrix", "P", (3, 4)),
 )
-"""Keys, CameraInfo fields and shapes of the matrices; None accepts any shape."""
+"""(key, CameraInfo field, shape) of each matrix; None accepts any shape."""
 _INI_COUNTS = {"width": 1, "height": 1, "camera matrix": 9, "rectification": 9, "projection": 12}
 _INI_FIELDS = {"camera matrix": "K", "distortion": "D", "rectification": "R", "projection": "P"}
 _MAX_DIGITS = 100  # maximum number of digits in the width or height, including leading zeros
@@ -56,7 +56,7 @@ def parse_yaml(text: str) -> tuple[str, CameraInfo]:
 
 
 def yaml_of(name: str, info: CameraInfo) -> str:
-    """Return a calibration as the text of a YAML file, as ROS writes it."""
+    """Format a calibration as YAML, in the same way as ROS."""
     lines = [f"image_width: {info.width}", f"image_height: {info.height}", f"camera_name: {_quoted(name)}"]
 
     def matrix(key: str, values: Sequence[float], rows: int) -> None:
@@ -100,7 +100,7 @@ def parse_ini(text: str) -> tuple[str, CameraInfo]:
 
 
 def ini_of(name: str, info: CameraInfo) -> str:
-    """Return a calibration as the text of an .ini file, as ROS writes it.
+    """Format a calibration as an .ini file, in the same way as ROS.
 
     Raise CalibrationError if the model is not plumb_bob.
     """
@@ -127,7 +127,7 @@ def _pixels(word: object) -> int:
 
 
 def _matrix(tree: dict[str, object], key: str, shape: tuple[int, int] | None) -> tuple[float, ...]:
-    """Return a matrix's numbers; ``shape`` None accepts any shape."""
+    """Return a matrix's numbers. If ``shape`` is None, accept any shape."""
     found = tree.get(key)
     if not isinstance(found, dict):
         raise CalibrationError(f"{key} is missing")
@@ -152,7 +152,7 @@ def _numbers(words: Sequence[object]) -> tuple[float, ...]:
 
 
 def _number(value: float) -> str:
-    """Return a number with all its digits, as yaml-cpp writes it."""
+    """Format a number with all its digits, like yaml-cpp."""
     if math.isfinite(value):
         return f"{value:.17g}"
     return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"

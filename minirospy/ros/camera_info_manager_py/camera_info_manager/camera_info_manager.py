@@ -1,4 +1,4 @@
-"""camera_info_manager.camera_info_manager: CameraInfoManager, and the functions that it uses.
+"""camera_info_manager.camera_info_manager: CameraInfoManager and its helper functions.
 
 URLs: ``file:///FILE``, ``package://PACKAGE/FILE``, or "" for the default. ``${NAME}`` is the camera's name and
 ``${ROS_HOME}`` the folder for ROS's files. Source: http://wiki.ros.org/camera_info_manager_py. The file format is that of
@@ -132,7 +132,7 @@ class CameraInfoManager:
 
 
 def genCameraName(from_string: str) -> str:
-    """Return a valid camera name, in which ``_`` replaces every character except letters and digits."""
+    """Convert a string to a valid camera name: replace all characters except letters and digits by ``_``."""
     return re.sub(r"\W", "_", from_string, flags=re.ASCII)
 
 

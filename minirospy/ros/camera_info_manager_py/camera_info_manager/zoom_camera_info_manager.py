@@ -89,7 +89,7 @@ class ApproximateZoomCameraInfoManager(ZoomCameraInfoManager):
         url: str = "",
         namespace: str = "",
     ) -> None:
-        """Set the fields of view.
+        """Set the fields of view at both ends of the zoom range.
 
         ``min_fov`` and ``max_fov`` are the horizontal fields of view in degrees, at the highest and at the lowest zoom level.
         """
@@ -145,7 +145,7 @@ class InterpolatingZoomCameraInfoManager(ZoomCameraInfoManager):
         url: str = "",
         namespace: str = "",
     ) -> None:
-        """Set the calibrated levels: ``zoom_levels``. ``calibration_url_template`` is a URL with ``%d`` for the zoom level."""
+        """Set the calibrated zoom levels. ``calibration_url_template`` is a URL with ``%d`` for the level."""
         super().__init__(min(zoom_levels), max(zoom_levels), cname, url, namespace)
         self._calibration_url_template = calibration_url_template
         self._zoom_levels = zoom_levels

@@ -27,10 +27,10 @@ def find_in_workspaces(
     workspace_to_source_spaces: object = None,
     source_path_to_packages: object = None,
 ) -> list[str]:
-    """Return the existing folders ``search_dirs`` in the workspaces, or the files ``path`` in them, for package ``project``.
+    """Return the folders ``search_dirs`` that exist for package ``project``, or the files ``path`` in them.
 
-    ``search_dirs`` may contain etc, include, libexec and share; if ``project`` is None, also bin and lib. All searched paths
-    are appended to ``considered_paths``. Raise ValueError if ``search_dirs`` contains any other folder.
+    ``search_dirs`` may contain etc, include, libexec and share; if ``project`` is None, also bin and lib. The function
+    appends all searched paths to ``considered_paths``. Raise ValueError if ``search_dirs`` contains any other folder.
     """
     chosen = _checked(search_dirs, project)
     found: list[str] = []

@@ -11,7 +11,7 @@ CATKIN_MARKER_FILE = ".catkin"
 
 
 def get_workspaces() -> list[str]:
-    """Return the folders in CMAKE_PREFIX_PATH that are catkin devel or install folders."""
+    """Return the catkin devel and install folders in CMAKE_PREFIX_PATH."""
     folders = os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep)
     return [folder for folder in folders if folder and Path(folder, CATKIN_MARKER_FILE).is_file()]
 

@@ -1,4 +1,4 @@
-"""catkin_create_pkg and catkin_init_workspace: create a package's or a workspace's first files."""
+"""catkin_create_pkg and catkin_init_workspace: create the initial files of a package or workspace."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ _PLACES: dict[str, Callable[[str], str]] = {
     "libexec": lambda project: f"lib/{project}",
     "share": lambda project: f"share/{project}",
 }
-"""Search folders, each with a function from a package's name to its path in a workspace's devel or install folder."""
+"""Maps each kind of folder to a function that returns a package's path, relative to a devel or install folder."""
 
 _WITHOUT_PROJECT = ("bin", "etc", "include", "lib", "share")
 _WITH_PROJECT = ("etc", "include", "libexec", "share")
@@ -97,7 +97,7 @@ def _find(
 
 
 def _workspaces() -> Iterator[Path | None]:
-    """Yield the prefixes of the sourced workspaces, topmost overlay first; then yield None for minirospy's own packages."""
+    """Yield the sourced workspaces' prefixes, topmost overlay first, then None for minirospy's own packages."""
     for prefix in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep):
         if prefix and Path(prefix, ".catkin").is_file():
             yield Path(prefix)

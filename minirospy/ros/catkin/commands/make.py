@@ -45,7 +45,7 @@ def catkin_make_isolated(argv: Sequence[str] | None = None) -> int:
 
 
 class _MakeParser(Parser):
-    """Removes CMake arguments from the command line, and returns the variables that they set as the argument ``variables``."""
+    """A parser that removes CMake arguments, and returns the variables they set as the argument ``variables``."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return the arguments by name. Raise CommandLineError if an argument is invalid."""
@@ -182,7 +182,7 @@ def _check_folders(command: str, workspace: Workspace) -> None:
 
 
 def _where_to_build(command: str, workspace: Workspace) -> str:
-    """Return advice on where to build, for a workspace without a folder src.
+    """Return advice on where to build if the workspace has no folder src.
 
     Usually, the current folder is src or devel itself.
     """

@@ -33,8 +33,8 @@ def run_tests(workspace: Workspace, plans: Sequence[Plan], chosen: Collection[st
 
     Raise BuildError or NotFoundError if a test cannot be run, MinirospyError on Ctrl-C.
 
-    To choose a single test, use its target name in catkin, such as ``PACKAGE_rostest_test_x.test``. The results are JUnit XML
-    files in ``build/test_results/PACKAGE``.
+    To choose a single test, use its target name in catkin, such as ``PACKAGE_rostest_test_x.test``. Results are written
+    to ``build/test_results/PACKAGE`` as JUnit XML files.
     """
     targets = {name: plan for plan in plans for test in (None, *plan.tests) for name in _targets(plan, test)}
     wanted = {_flat(name) for name in chosen or [plan.name for plan in plans]}
@@ -123,7 +123,7 @@ def _targets(plan: Plan, test: Test | None) -> list[str]:
 
 
 def _flat(name: str) -> str:
-    """Return a name with underscores in place of other separators, because CMake target names contain no slashes."""
+    """Replace separators in a name by underscores, because CMake target names contain no slashes."""
     return re.sub(r"\W", "_", name)
 
 
@@ -156,7 +156,7 @@ _COMMANDS = {"pytest": _pytest, "rostest": _rostest, "roslaunch-check": _launch_
 
 
 def _environment(workspace: Workspace) -> dict[str, str]:
-    """Return the environment, with the workspace's folders prepended as its setup file does."""
+    """Return the environment with the workspace's folders prepended, as after sourcing its setup file."""
 
     def before(variable: str, path: Path) -> str:
         return os.pathsep.join(filter(None, [str(path), os.environ.get(variable, "")]))

@@ -74,7 +74,7 @@ class _Settings(NamedTuple):
         )
 
     def write(self, workspace: Workspace) -> None:
-        """Save the settings."""
+        """Save the settings in the workspace."""
         given = {name: value for name, value in self._asdict().items() if value is not None}
         (workspace.root / ".catkin_tools").mkdir(exist_ok=True)
         (workspace.root / _SETTINGS).write_text(json.dumps(given, indent=1), encoding="utf-8")
@@ -89,7 +89,7 @@ class _Settings(NamedTuple):
 
 
 class _CatkinParser(Parser):
-    """A verb's parser. It removes CMake arguments, and returns those that start with -D as the argument ``cmake_words``."""
+    """A verb's parser. Removes CMake arguments, and returns those starting with -D as the argument ``cmake_words``."""
 
     def __init__(self, verb: str, description: str, *, takes_cmake_words: bool = False) -> None:
         super().__init__(f"catkin {verb}", description)

@@ -1,4 +1,4 @@
-"""Code shared by catkin_make and catkin: a workspace's folders; building, installing and removing."""
+"""Code shared by catkin_make and catkin: lists a workspace's folders; builds, installs and removes packages."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TEST_TARGETS = {"run_tests", "test", "tests"}
 
 
 def without_cmake(words: Sequence[str]) -> list[str]:
-    """Return the words without CMake arguments, which :func:`cmake_variables` parses."""
+    """Remove CMake arguments from ``words``; :func:`cmake_variables` parses them."""
     return [word for word in words if not word.startswith(("-D", "-W", "-G"))]
 
 
@@ -54,7 +54,7 @@ def build_packages(
     with_deps: Collection[str] = (),
     variables: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Plan]:
-    """Build the chosen packages, or all, printing a line for each; return all packages' plans."""
+    """Build the chosen packages, or all, and print a line for each. Return the plans for all packages."""
     white = [name for name in variables.get("CATKIN_WHITELIST_PACKAGES", "").split(";") if name]
     plans = read_plans(workspace.source, {**_places(workspace), **variables})
     names = {plan.name for plan in plans}
@@ -81,8 +81,7 @@ def build_packages(
         for warning in report.warnings:
             print(f"WARNING: {warning}", file=sys.stderr)
 
-    # As catkin does, write the setup files first, so that the workspace can be sourced even if a package fails to
-    # build.
+    # Like catkin, write the setup files first, so that the workspace can be sourced even if a package fails to build.
     write_set_up(workspace.devel, (workspace.source,))
     build(workspace, plans, Packages(), only or None, show)
     if not plans:

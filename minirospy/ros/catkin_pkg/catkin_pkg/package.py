@@ -156,11 +156,11 @@ class GroupDependency(_Group):
 
 
 class GroupMembership(_Group):
-    """The membership of the package in a group."""
+    """A package's membership in a group."""
 
 
 class Export(_Conditional):
-    """A tag in ``<export>``; ``content`` is the XML inside the tag."""
+    """A tag inside ``<export>``; ``content`` is the XML inside that tag."""
 
     __slots__ = ["attributes", "content", "evaluated_condition", "tagname"]
 
@@ -297,7 +297,7 @@ class Package:
         return types[0] if types else "catkin"
 
     def get_unconditional_build_types(self) -> list[str]:
-        """Return the build tools that ``<export>`` specifies without a condition."""
+        """Return the build tools that ``<export>`` specifies unconditionally."""
         exports = (each for each in self.exports if each.tagname == "build_type" and each.condition is None)
         return [each.content or "" for each in exports]
 
@@ -385,20 +385,26 @@ def package_exists_at(path: str) -> bool:
 
 
 def parse_package(path: str, warnings: list[str] | None = None) -> Package:
-    """Return the package of a folder or of a package.xml. Raise InvalidPackage, or OSError if there is no file."""
+    """Parse a package.xml, given its path or its folder. Raise InvalidPackage, or OSError if there is no file."""
     filename = _file_of(path)
     with open(filename, "rb") as file:
         return parse_package_string(file.read(), filename, warnings)
 
 
 def has_ros_schema_reference(path: str) -> bool:
-    """Return whether the package.xml of a folder, or the file ``path``, refers to ROS's schema. Raise OSError without a file."""
+    """Return whether a package.xml, given its path or its folder, refers to ROS's schema.
+
+    Raise OSError if there is no file.
+    """
     with open(_file_of(path), "rb") as file:
         return has_ros_schema_reference_string(file.read())
 
 
 def has_ros_schema_reference_string(data: str | bytes) -> bool:
-    """Return whether the text of a package.xml refers to ROS's schema in an `xml-model` instruction; False if it is not XML."""
+    """Return whether a package.xml's text refers to ROS's schema in an `xml-model` instruction.
+
+    Return False if the text is not XML.
+    """
     hrefs: list[str] = []
 
     def found(target: str, text: str) -> None:

@@ -29,9 +29,9 @@ def find_package_paths(
     exclude_subspaces: bool = False,
     ignore_markers: Collection[str] = DEFAULT_IGNORE_MARKERS,
 ) -> list[str]:
-    """Return the folders of packages, relative to ``basepath``, without packages inside other packages.
+    """Return the packages' folders, relative to ``basepath``. Ignore packages inside other packages.
 
-    ``exclude_subspaces``: skip folders that contain a file ``.catkin``, because a build has created them.
+    ``exclude_subspaces``: skip folders that a build has created, which contain a file ``.catkin``.
     """
     paths = []
     excluded = {os.path.realpath(path) for path in exclude_paths or ()}
@@ -56,7 +56,7 @@ def find_packages(
     warnings: list[str] | None = None,
     ignore_markers: Collection[str] = DEFAULT_IGNORE_MARKERS,
 ) -> dict[str, Package]:
-    """Return a dict from relative folder to package.
+    """Return a dict of packages keyed by relative folder.
 
     Raise RuntimeError if two packages have the same name, InvalidPackage if a package.xml is invalid.
     """
@@ -84,7 +84,7 @@ def find_packages_allowing_duplicates(
     warnings: list[str] | None = None,
     ignore_markers: Collection[str] = DEFAULT_IGNORE_MARKERS,
 ) -> dict[str, Package]:
-    """Return a dict from relative folder to package. Raise InvalidPackage if a package.xml is invalid."""
+    """Return a dict of packages keyed by relative folder. Raise InvalidPackage if a package.xml is invalid."""
     paths = find_package_paths(basepath, exclude_paths, exclude_subspaces, ignore_markers)
     files = {path: os.path.join(basepath, path, PACKAGE_MANIFEST_FILENAME) for path in paths}
     return {path: parse_package(file, warnings) for path, file in files.items()}

@@ -1,4 +1,4 @@
-"""catkin_pkg.python_setup: provides the arguments for setup() that are defined in package.xml.
+"""catkin_pkg.python_setup: derives the arguments for setup() from package.xml.
 
 Source: http://docs.ros.org/en/noetic/api/catkin/html/user_guide/setup_dot_py.html.
 """
@@ -62,32 +62,32 @@ def _persons(kind: str, persons: list[Person]) -> dict[str, object]:
 
 
 def get_global_bin_destination() -> str:
-    """Return the folder for commands of all packages, relative to the install prefix."""
+    """Return the folder shared by all packages' commands, relative to the install prefix."""
     return "bin"
 
 
 def get_global_etc_destination() -> str:
-    """Return the folder for configuration files of all packages, relative to the install prefix."""
+    """Return the folder shared by all packages' configuration files, relative to the install prefix."""
     return "etc"
 
 
 def get_global_include_destination() -> str:
-    """Return the folder for header files of all packages, relative to the install prefix."""
+    """Return the folder shared by all packages' header files, relative to the install prefix."""
     return "include"
 
 
 def get_global_lib_destination() -> str:
-    """Return the folder for libraries of all packages, relative to the install prefix."""
+    """Return the folder shared by all packages' libraries, relative to the install prefix."""
     return "lib"
 
 
 def get_global_libexec_destination() -> str:
-    """Return the folder for programs of all packages, relative to the install prefix."""
+    """Return the folder shared by all packages' programs, relative to the install prefix."""
     return "lib"
 
 
 def get_global_share_destination() -> str:
-    """Return the folder for data files of all packages, relative to the install prefix."""
+    """Return the folder shared by all packages' data files, relative to the install prefix."""
     return "share"
 
 

@@ -20,9 +20,9 @@ def topological_order(
     blacklisted: Collection[str] | None = None,
     underlay_workspaces: Sequence[str] | None = None,
 ) -> list[tuple[str | None, Package | str]]:
-    """Return (relative folder, package) for each package below a folder, after the packages on which it depends.
+    """Return (relative folder, package) for each package below a folder, dependencies first.
 
-    If packages depend on each other in a cycle, the last entry is (None, names). Raise the errors that find_packages raises.
+    If there is a dependency cycle, the last entry is (None, names). Raise the errors that find_packages raises.
     """
     return topological_order_packages(find_packages(root_dir), whitelisted, blacklisted)
 
@@ -33,7 +33,7 @@ def topological_order_packages(
     blacklisted: Collection[str] | None = None,
     underlay_packages: Mapping[str, Package] | None = None,
 ) -> list[tuple[str | None, Package | str]]:
-    """Return (relative folder, package) for each package, after those on which it depends; see :func:`topological_order`."""
+    """Return (relative folder, package) for each package, dependencies first. See :func:`topological_order`."""
     by_name = {package.name: (path, package) for path, package in packages.items()}
     manifests = {
         name: read_manifest(Path(package.filename or path)) for name, (path, package) in by_name.items()

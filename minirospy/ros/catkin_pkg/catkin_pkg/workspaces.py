@@ -12,7 +12,7 @@ _DEVEL_MARKER = ".catkin"
 
 
 def get_spaces(paths: Sequence[str] | None = None) -> list[str]:
-    """Return the folders that contain the packages of the workspaces ``paths``, by default those in CMAKE_PREFIX_PATH."""
+    """Return the package folders of the workspaces ``paths``, by default those in CMAKE_PREFIX_PATH."""
     if paths is None:
         text = os.environ.get("CMAKE_PREFIX_PATH", "")
         paths = [path for path in text.split(os.pathsep) if path]
@@ -28,7 +28,7 @@ def get_spaces(paths: Sequence[str] | None = None) -> list[str]:
 
 
 def order_paths(paths_to_order: Sequence[str], prefix_paths: Sequence[str]) -> list[str]:
-    """Return the paths in the order of the prefixes that contain them; paths outside all prefixes come last."""
+    """Sort the paths by the prefix that contains them, in the prefixes' order. Put paths outside all prefixes last."""
     groups: dict[str, list[str]] = {prefix: [] for prefix in prefix_paths}
     others = []
     for path in paths_to_order:

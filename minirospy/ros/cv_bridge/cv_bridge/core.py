@@ -64,7 +64,7 @@ class CvBridge:
         return self.cvtype2_to_dtype_with_channels(self.encoding_to_cvtype2(encoding))
 
     def imgmsg_to_cv2(self, img_msg: Image, desired_encoding: str = "passthrough") -> Pixels:
-        """Return the image in a message as an array.
+        """Convert an image message to an array.
 
         The array is a read-only view into the message's data, without a copy, unless the encoding or byte order has to change.
         Padding between the rows (``step``) is skipped. Raise CvBridgeError if the encoding is unknown, the conversion
@@ -81,7 +81,7 @@ class CvBridge:
     def cv2_to_imgmsg(
         self, cvim: Pixels, encoding: str = "passthrough", header: Header | None = None
     ) -> Image:
-        """Return an array as an image message.
+        """Convert an array to an image message.
 
         Raise CvBridgeError if the array's type does not match the encoding, TypeError if ``cvim`` is not an array.
         """
@@ -115,7 +115,7 @@ class CvBridge:
         return _converted(image, f"{kind}{8 * image.dtype.itemsize}", desired_encoding)
 
     def cv2_to_compressed_imgmsg(self, cvim: Pixels, dst_format: str = "jpg") -> CompressedImage:
-        """Return an array as a compressed message, in format jpg, png, bmp, tiff, webp or another that OpenCV supports.
+        """Convert an array to a compressed message in format jpg, png, bmp, tiff, webp or another that OpenCV supports.
 
         Raise CvBridgeError if the format does not support the array, TypeError if ``cvim`` is not an array.
         """

@@ -55,7 +55,7 @@ class DiagnosticStatusWrapper(DiagnosticStatus):
         self.level = max(self.level, level)
 
     def add(self, key: str, val: object) -> None:
-        """Append a key with its value, which is converted to a string."""
+        """Append a key and its value, converted to a string."""
         self.values.append(KeyValue(key, str(val)))
 
 

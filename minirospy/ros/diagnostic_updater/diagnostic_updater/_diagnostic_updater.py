@@ -43,7 +43,7 @@ class DiagnosticTask:
         self.name = name
 
     def getName(self) -> str:
-        """Return the name."""
+        """Return the task's name."""
         return self.name
 
     def run(self, stat: Status) -> Status:
@@ -64,7 +64,7 @@ class FunctionDiagnosticTask(DiagnosticTask):
 
 
 class CompositeDiagnosticTask(DiagnosticTask):
-    """Combines several tasks into one status, which has all their values, the highest level, and the merged messages."""
+    """Combines several tasks into one status, with all their values, the highest level and the merged messages."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)

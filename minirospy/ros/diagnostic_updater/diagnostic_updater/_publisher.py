@@ -40,7 +40,7 @@ class HeaderlessTopicDiagnostic(CompositeDiagnosticTask):
         self.freq.tick()
 
     def clear_window(self) -> None:
-        """Reset the counts."""
+        """Reset the event counts."""
         self.freq.clear()
 
 

@@ -27,7 +27,7 @@ class FrequencyStatusParam:
     """The limits of FrequencyStatus."""
 
     def __init__(self, freq_bound: Mapping[str, float], tolerance: float = 0.1, window_size: int = 5) -> None:
-        """Set the limits. ``freq_bound``: a mapping with "min" and optionally "max", in Hz, which is read at each run.
+        """Set the limits. ``freq_bound``: a mapping with "min" and optionally "max" in Hz, read at each run.
 
         ``tolerance``: the fraction by which a frequency may exceed the bounds; ``window_size``: the number of runs over
         which the frequency is measured.
@@ -47,7 +47,7 @@ class FrequencyStatus(DiagnosticTask):
         self.clear()
 
     def clear(self) -> None:
-        """Reset the counts."""
+        """Reset the event counts."""
         with self.lock:
             size = self.params.window_size
             self.count = 0
@@ -110,7 +110,7 @@ class TimeStampStatusParam:
 
 
 class TimeStampStatus(DiagnosticTask):
-    """Reports time stamps since the last run that are zero, too old or too far in the future; counts such runs."""
+    """Reports time stamps that are zero, too old or too far in the future. Counts the runs with such time stamps."""
 
     def __init__(self, params: TimeStampStatusParam | None = None, name: str = "Timestamp Status") -> None:
         super().__init__(name)
@@ -179,6 +179,6 @@ class Heartbeat(DiagnosticTask):
         super().__init__("Heartbeat")
 
     def run(self, stat: Status) -> Status:
-        """Fill a status."""
+        """Set the status to OK and "Alive"."""
         stat.summary(OK, "Alive")
         return stat

@@ -21,7 +21,7 @@ Values: TypeAlias = Mapping[str, Any]
 """Values by parameter name; ``groups``, if present, contains the tree of groups or their states."""
 
 GroupTree: TypeAlias = Mapping[str, Any]
-"""A group, either from a type's description or decoded, with its ID, name, state, parameters and subgroups."""
+"""A group with its ID, name, state, parameters and subgroups, either from a type's description or decoded."""
 
 
 class Entry(TypedDict, total=False):

@@ -126,7 +126,7 @@ class Client:
         return decode_config(answer, self.get_group_descriptions())
 
     def update_groups(self, changes: Values) -> Config | None:
-        """Return the tree of the server's groups, with the states in ``changes``, which maps group names to states."""
+        """Return the tree of the server's groups with changed states. ``changes`` maps group names to states."""
         description = self.get_group_descriptions()
         groups = [description] if description else []
         while groups:
@@ -166,7 +166,7 @@ class Client:
     description_callback = property(get_description_callback, set_description_callback)
 
     def _wait(self, is_there: Callable[[], bool], timeout: float | None) -> bool:
-        """Wait until ``is_there()`` is truthy; return the last value that it returned.
+        """Wait until ``is_there()`` is truthy; return its last result.
 
         If ``timeout`` is None or 0, wait until the node shuts down.
         """
@@ -222,7 +222,10 @@ class Client:
 
 
 def _constants(edit_method: str) -> list[dict[str, Any]]:
-    """Return an enum's constants. The string is a Python dict from another node, so parse it without executing it."""
+    """Return an enum's constants.
+
+    ``edit_method`` is Python source from another node, so parse it without executing it.
+    """
     try:
         found = ast.literal_eval(edit_method)["enum"] if edit_method else []
     except (ValueError, SyntaxError, KeyError, TypeError, MemoryError, RecursionError):

@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser(verb: str, usage: str = "", *more: str, missing: Mapping[str, str] | None = None) -> Parser:
-    """Return the parser for a verb whose arguments are a node's name, and ``more``."""
+    """Return the parser for a verb that takes a node's name and the arguments ``more``."""
     parser = Parser(
         f"dynparam {verb}",
         ros_usage=(usage or f"%prog {verb} [options] node{''.join(f' {each}' for each in more)}").replace(
@@ -188,7 +188,7 @@ def _dump(node: str, file: str, timeout: float | None) -> None:
 
 
 def _plain(value: object) -> object:
-    """Return a configuration as plain dicts, which YAML dumps without tags."""
+    """Convert a configuration to plain dicts, which YAML dumps without tags."""
     return {key: _plain(each) for key, each in value.items()} if isinstance(value, dict) else value
 
 

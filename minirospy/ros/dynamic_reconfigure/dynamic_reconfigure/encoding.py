@@ -93,7 +93,7 @@ def encode_description(descr: ConfigType) -> ConfigDescription:
 
 
 def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
-    """Return a group from a type's description as a message, followed by all its subgroups."""
+    """Convert a group from a type's description, and all its subgroups, to messages."""
     parameters = [
         ParamDescription(*(each[key] for key in ("name", "type", "level", "description", "edit_method")))
         for each in group["parameters"]
@@ -103,7 +103,7 @@ def encode_groups(parent: Group | None, group: GroupTree) -> list[Group]:
 
 
 def encode_config(config: Values, flat: bool = True) -> ConfigMsg:
-    """Return a configuration as a message. Values other than bool, int, float, str and groups are omitted.
+    """Convert a configuration to a message. Omit values other than bool, int, float, str and groups.
 
     If ``flat``, the key ``groups`` contains a tree, and all groups in the tree are added; otherwise, it contains a dict of the
     groups.
@@ -215,7 +215,7 @@ def initial_config(msg: ConfigMsg, description: GroupTree | None = None) -> Conf
 
 
 def decode_config(msg: ConfigMsg, description: GroupTree | None = None) -> Config:
-    """Return a configuration. If a type's description is given, the groups also contain their parameters' values."""
+    """Decode a configuration. If ``description`` is given, the groups also contain their parameters' values."""
     config = _values(msg)
     if msg.groups and description is not None:
         config["groups"] = get_tree(msg)
@@ -236,7 +236,7 @@ def _values(msg: ConfigMsg) -> Config:
 
 
 def _groups_in(group: GroupTree) -> list[GroupTree]:
-    """Return a group's subgroups. In a type's description they are a list, in a decoded one a dict."""
+    """Return a group's subgroups: a list in a type's description, a dict in a decoded one."""
     groups = group["groups"]
     return list(groups.values()) if isinstance(groups, dict) else list(groups)
 

@@ -61,7 +61,7 @@ See http://wiki.ros.org/dynamic_reconfigure/Tutorials"""
 
 
 def check_description(description: str) -> None:
-    """Raise Exception, as ROS does, if a description contains a quote, because ROS's C++ header cannot represent one."""
+    """Raise Exception if a description contains a quote, as ROS does: its C++ header cannot represent one."""
     if "'" in description or '"' in description:
         raise Exception(f"quotes not allowed in description string `{description}`")
 
@@ -76,14 +76,14 @@ def check_name(name: str) -> None:
 
 
 class ParameterGenerator:
-    """A node's parameters, organized in groups. ``generate`` writes the files for programs."""
+    """Defines a node's parameters, organized in groups. ``generate`` writes the generated files."""
 
     minval: Mapping[str, Value] = {int_t: -0x80000000, double_t: -float("inf"), str_t: "", bool_t: False}
     maxval: Mapping[str, Value] = {int_t: 0x7FFFFFFF, double_t: float("inf"), str_t: "", bool_t: True}
     defval: Mapping[str, Value] = {int_t: 0, double_t: 0.0, str_t: "", bool_t: False}
 
     class Group:
-        """Parameters that are shown together, and subgroups."""
+        """A group of parameters that are shown together. May have subgroups."""
 
         def __init__(
             self, gen: ParameterGenerator, name: str, type: str, state: bool, id: int, parent: int
@@ -200,7 +200,10 @@ class ParameterGenerator:
         self.dynconfpath, self.binary_dir, self.cpp_gen_dir, self.py_gen_dir = sys.argv[1:5]
 
     def _groups(self) -> dict[int, ParameterGenerator.Group]:
-        """Return the groups by ID. It is created here, since ddynamic_reconfigure_python's subclass does not call __init__."""
+        """Return the groups keyed by ID.
+
+        Create the dict here, because ddynamic_reconfigure_python's subclass does not call __init__.
+        """
         groups: dict[int, ParameterGenerator.Group] = self.__dict__.setdefault("_groups_by_id", {})
         return groups
 

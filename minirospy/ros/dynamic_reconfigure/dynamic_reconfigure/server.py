@@ -51,7 +51,9 @@ _TYPES: dict[str, tuple[type, ...]] = {
 
 
 class Server:
-    """Serves a configuration: ``callback(config, level)`` is called initially and on each change, and returns the configuration.
+    """Serves a configuration.
+
+    Calls ``callback(config, level)`` at the start and on each change. The callback returns the configuration.
 
     ``level`` combines the bits of all changed parameters; it is -1 in the first call. Values are clamped to the limits.
     """
@@ -171,7 +173,7 @@ def _fits(param: Entry, value: object) -> bool:
 
 
 def _converted(param: Entry, value: Value) -> Value:
-    """Return a value as the Python type that its message field requires."""
+    """Convert a value to the Python type that its message field requires."""
     if param["type"] == "double":
         return float(value)
     return bool(value) if param["type"] == "bool" else value

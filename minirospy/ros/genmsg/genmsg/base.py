@@ -1,4 +1,4 @@
-"""genmsg.base: constants for definition files, and the exception for a definition that cannot be parsed."""
+"""genmsg.base: constants for definition files, and the exception raised if a definition cannot be parsed."""
 
 from __future__ import annotations
 

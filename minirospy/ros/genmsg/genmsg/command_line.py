@@ -8,7 +8,7 @@ __all__ = ["includepath_to_dict"]
 
 
 def includepath_to_dict(includepath: Iterable[str] | None) -> dict[str, list[str]]:
-    """Convert the ``package:folder`` values of option ``-I`` to a dict from package to folders.
+    """Convert the ``package:folder`` values of option ``-I`` to a dict of folder lists keyed by package.
 
     The key is '' for a value without a package.
     """

@@ -1,4 +1,4 @@
-"""genmsg.deps: the files on which a definition depends, for build rules. Source: http://docs.ros.org/api/genmsg/html/."""
+"""genmsg.deps: finds a definition's dependencies, for build rules. Source: http://docs.ros.org/api/genmsg/html/."""
 
 from __future__ import annotations
 

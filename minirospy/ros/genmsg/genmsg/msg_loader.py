@@ -89,7 +89,7 @@ class MsgNotFound(Exception):
 
 
 class MsgContext:
-    """The known messages, their files, and the message types that each uses."""
+    """Stores the known messages, their files, and the message types that each one uses."""
 
     def __init__(self) -> None:
         self._specs: dict[str, MsgSpec] = {}
@@ -134,7 +134,7 @@ class MsgContext:
         return self._depends.get(full_msg_type)
 
     def get_all_depends(self, full_msg_type: str) -> list[str]:
-        """Return all messages that a message uses, directly or indirectly, each before those that it uses.
+        """Return all messages that a message uses, directly or indirectly. Each precedes those that it uses itself.
 
         Raise KeyError if :func:`load_depends` has not been called.
         """
@@ -234,7 +234,7 @@ def load_srv_by_type(msg_context: MsgContext, srv_type: str, search_path: Search
 
 
 def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_path: SearchPath) -> list[str]:
-    """Load all messages that a message or service uses into the context; return its fields' types, without duplicates.
+    """Load all messages that a message or service uses. Return its fields' types, without duplicates.
 
     Raise InvalidMsgSpec if a definition is invalid, MsgNotFound if a definition is missing, ValueError if ``spec`` is not a
     message or service.
@@ -266,12 +266,12 @@ def load_depends(msg_context: MsgContext, spec: MsgSpec | SrvSpec, msg_search_pa
 
 
 def lookup_in(msg_context: MsgContext) -> digest.Lookup:
-    """Return a function that looks up a message in a context and returns it as a MessageSpec, or raises KeyError."""
+    """Return a function that looks up a message in ``msg_context``, and returns a MessageSpec or raises KeyError."""
     return lambda name: parsed_message(msg_context.get_registered(name))
 
 
 def parsed_message(spec: MsgSpec) -> MessageSpec:
-    """Return a message as minirospy's MessageSpec. Raise InvalidMsgSpec if the definition is invalid."""
+    """Convert a message to minirospy's MessageSpec. Raise InvalidMsgSpec if the definition is invalid."""
     return _parsed(spec.text, spec.full_name)
 
 

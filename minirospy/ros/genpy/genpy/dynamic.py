@@ -14,7 +14,7 @@ __all__ = ["MsgGenerationException", "generate_dynamic"]
 
 
 def generate_dynamic(core_type: str, msg_cat: str) -> dict[str, type[Message]]:
-    """Return the classes for a full definition and for all types in it, by name.
+    """Generate the classes for all types in a full definition; return them keyed by name.
 
     Raise InvalidMsgSpec if the definition is invalid, MsgNotFound if a type is missing, MsgGenerationException if a part of
     the definition has no type name.

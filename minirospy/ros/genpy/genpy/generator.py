@@ -80,7 +80,7 @@ def compute_outfile_name(outdir: str, infile_name: str, ext: str) -> str:
 
 
 def compute_pkg_type(package: str, type_: str) -> tuple[str, str]:
-    """Return the package and name of a type, as used in ``package``. Raise MsgGenerationException if the name is invalid."""
+    """Return a type's package and name, resolved in ``package``. Raise MsgGenerationException if the name is invalid."""
     words = type_.split("/")
     if len(words) > 2:
         raise MsgGenerationException(f"illegal message type: {type_}")
@@ -88,7 +88,7 @@ def compute_pkg_type(package: str, type_: str) -> tuple[str, str]:
 
 
 def make_python_safe(spec: MsgSpec) -> MsgSpec:
-    """Return a message whose fields and constants are renamed if they are Python keywords."""
+    """Rename a message's fields and constants that are Python keywords; return the new message."""
     constants = [
         Constant(each.type, _remap_reserved(each.name), each.val, each.val_text) for each in spec.constants
     ]

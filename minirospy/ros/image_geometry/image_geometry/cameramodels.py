@@ -1,4 +1,6 @@
-"""image_geometry.cameramodels: models for one and for two cameras. Pixels are (u, v), points are (x, y, z) in meters.
+"""image_geometry.cameramodels: models of a single camera and of a stereo pair.
+
+Pixels are (u, v), points are (x, y, z) in meters.
 
 K is the raw image's camera matrix, D its distortion, R the rotation to the rectified image, P the rectified image's
 projection. Source: http://wiki.ros.org/image_geometry, http://wiki.ros.org/image_pipeline/CameraInfo.
@@ -56,7 +58,7 @@ class PinholeCameraModel:
         self.stamp: genpy.Time | None = None
 
     def fromCameraInfo(self, msg: CameraInfo) -> None:
-        """Set the camera's parameters."""
+        """Set the camera's parameters from a CameraInfo."""
         self.K = mkmat(3, 3, msg.K)
         self.D = mkmat(len(msg.D), 1, msg.D) if msg.D else None
         self.R = mkmat(3, 3, msg.R)
@@ -219,7 +221,7 @@ class StereoCameraModel:
         self.right = PinholeCameraModel()
 
     def fromCameraInfo(self, left_msg: CameraInfo, right_msg: CameraInfo) -> None:
-        """Set the parameters of both cameras."""
+        """Set both cameras' parameters from their CameraInfos."""
         import numpy as np
 
         self.left.fromCameraInfo(left_msg)
@@ -260,7 +262,7 @@ class StereoCameraModel:
 
 
 def _ratio(above: float, below: float) -> float:
-    """Return a quotient. If the divisor is zero, return inf or nan as numpy does, but without a warning."""
+    """Divide two numbers. If the divisor is zero, return inf or nan like numpy, but without its warning."""
     if below:
         return above / below
     if above == 0 or math.isnan(above):

@@ -59,7 +59,10 @@ def undistorted(uv: Sequence[float], K: Values, D: Distortion, R: Values, P: Val
 
 
 def distorted(u: Values, v: Values, K: Values, D: Distortion, R: Values, P: Values) -> tuple[Values, Values]:
-    """Return the raw pixels for rectified pixels, as two arrays u and v. Raise ValueError if the length of D is not supported."""
+    """Return the raw pixels for rectified pixels, as two arrays u and v.
+
+    Raise ValueError if the number of coefficients in D is not supported.
+    """
     import numpy as np
 
     k = _coefficients(D)
@@ -130,7 +133,7 @@ def _tilt(tau_x: float, tau_y: float) -> Values:
 
 
 def _remapped(raw: Values, map_x: Values, map_y: Values) -> Values:
-    """Return an image whose pixels are read from ``raw`` at the positions in the maps, with bicubic interpolation.
+    """Return an image with pixels read from ``raw`` at the positions in the maps. Interpolation is bicubic.
 
     Positions outside ``raw`` become black.
     """
@@ -181,7 +184,7 @@ def _weights() -> Values:
 
 @functools.cache
 def _fixed_weights() -> Values:
-    """Return the weights as integers with sum ``_ONE``, rounded as in OpenCV."""
+    """Return the weights as integers that sum to ``_ONE``, rounded as in OpenCV."""
     import numpy as np
 
     table: Values = np.rint(_weights() * np.float32(_ONE)).astype(np.int32)

@@ -28,7 +28,7 @@ Callback = Callable[[InteractiveMarkerFeedback], object]
 
 _QUEUE_SIZE = 100
 _KEEP_ALIVE = 0.5  # seconds between keep-alive updates to viewers
-_TURN = 1.0  # seconds after feedback from one viewer for which feedback from other viewers is ignored
+_TURN = 1.0  # seconds for which one viewer's feedback blocks feedback from other viewers
 _UNCHANGED: Callback | int = -1
 
 
@@ -102,7 +102,7 @@ class InteractiveMarkerServer:
     def setCallback(
         self, name: str, feedback_cb: Callback | None, feedback_type: int = DEFAULT_FEEDBACK_CB
     ) -> bool:
-        """Set the callback for one type of feedback, or for all types without a specific callback.
+        """Set the callback for one type of feedback, or the fallback for all types without a callback.
 
         None removes the callback. The change takes effect immediately. Return whether the marker exists.
         """
@@ -200,9 +200,9 @@ class InteractiveMarkerServer:
     # --- messages from and to viewers
 
     def processFeedback(self, feedback: InteractiveMarkerFeedback) -> None:
-        """Move a marker as a viewer has requested, and call the program's callback.
+        """Move a marker at a viewer's request, and call the program's callback.
 
-        Ignore feedback from other viewers for one second after that.
+        For the next second, ignore other viewers' feedback on that marker.
         """
         with self.mutex:
             context = self.marker_contexts.get(feedback.marker_name)

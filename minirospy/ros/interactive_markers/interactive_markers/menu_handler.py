@@ -31,7 +31,7 @@ class EntryContext:
 
 
 class MenuHandler:
-    """A menu, which ``apply`` attaches to markers. Entries are identified by handles, numbered from 1."""
+    """A menu. ``apply`` attaches it to markers. Entries are identified by handles, numbered from 1."""
 
     NO_CHECKBOX = 0
     CHECKED = 1
@@ -63,7 +63,7 @@ class MenuHandler:
         return handle
 
     def doInsert(self, title: str, command_type: int, command: str, feedback_cb: Callback | None) -> int:
-        """Create an entry that is not in a menu yet; return its handle."""
+        """Create an entry without adding it to a menu; return its handle."""
         handle = self.current_handle_
         self.current_handle_ += 1
         self.entry_contexts_[handle] = EntryContext(title, command, command_type, feedback_cb=feedback_cb)
@@ -136,7 +136,7 @@ class MenuHandler:
         return True
 
     def makeEntry(self, context: EntryContext, handle: int, parent_handle: int) -> MenuEntry:
-        """Return an entry's message; its title includes the checkbox."""
+        """Return the MenuEntry message for an entry, with the checkbox in its title."""
         box = {self.CHECKED: "[x] ", self.UNCHECKED: "[ ] "}.get(context.check_state, "")
         return MenuEntry(
             id=handle,

@@ -86,7 +86,7 @@ class Chain:
 
 
 class Tree:
-    """A robot's segments below its root."""
+    """A robot's tree of segments, without the root link."""
 
     def __init__(self, root_name: str = "root") -> None:
         self._root = root_name

@@ -57,7 +57,7 @@ class LaserProjection:
         range_cutoff: float = -1.0,
         channel_options: int = ChannelOption.DEFAULT,
     ) -> PointCloud2:
-        """Return a scan's cloud, in the scan's frame; ranges outside the scan's limits are omitted.
+        """Convert a scan to a cloud in the scan's frame. Omit ranges outside the scan's limits.
 
         ``range_cutoff``: omit ranges from this distance in meters; if negative, only the scan's limit applies.
         ``channel_options``: the fields, from ``ChannelOption``; ``INTENSITY`` is ignored if the scan has no intensities.
@@ -102,11 +102,13 @@ class LaserProjection:
         range_cutoff: float = -1.0,
         channel_options: int = ChannelOption.DEFAULT,
     ) -> PointCloud2:
-        """Return a scan's cloud in another frame. Each point is transformed with the laser's pose at the time it was measured.
+        """Convert a scan to a cloud in another frame.
 
-        The transforms for the first and last beam are looked up in a tf2 buffer, and interpolated in between, as in the
-        C++ class. ROS's Python module lacks this method. Raise an exception as ``lookup_transform`` does, if there is no
-        transform.
+        Each point is transformed by the laser's pose at the time when the point was measured.
+
+        As in the C++ class, the transforms for the first and last beam come from a tf2 buffer; those in between are
+        interpolated. ROS's Python module lacks this method. If there is no transform, raise the same exception as
+        ``lookup_transform``.
         """
         import numpy as np
 

@@ -37,7 +37,7 @@ class Input(Protocol):
 
 
 class SimpleFilter:
-    """The base class for filters: stores callbacks, and calls them with the messages that pass."""
+    """The base class of filters: stores callbacks, and calls them with the messages that pass."""
 
     def __init__(self) -> None:
         self.callbacks: dict[int, tuple[Callback, tuple[object, ...]]] = {}
@@ -55,7 +55,7 @@ class SimpleFilter:
 
 
 class Subscriber(SimpleFilter):
-    """Passes on a topic's messages. The arguments and all other attributes are those of rospy.Subscriber."""
+    """Forwards a topic's messages. Has the same arguments and attributes as rospy.Subscriber."""
 
     def __init__(self, *args: object, **kwargs: object) -> None:
         super().__init__()
@@ -64,7 +64,7 @@ class Subscriber(SimpleFilter):
         self.sub: rospy.Subscriber[Message] = rospy.Subscriber(*args, **kwargs)  # type: ignore[arg-type]
 
     def callback(self, msg: object) -> None:
-        """Pass a message on."""
+        """Forward a message to the callbacks."""
         self.signalMessage(msg)
 
     def getTopic(self) -> object:
@@ -79,7 +79,7 @@ class Subscriber(SimpleFilter):
 
 
 class Cache(SimpleFilter):
-    """Stores the last ``cache_size`` messages from a filter for look-up by time, and passes each message on."""
+    """Caches the last ``cache_size`` messages from a filter for look-up by time. Forwards each message."""
 
     def __init__(self, f: Input, cache_size: int = 1, allow_headerless: bool = False) -> None:
         """Create a cache.
@@ -99,7 +99,7 @@ class Cache(SimpleFilter):
         self.incoming_connection = f.registerCallback(self.add)
 
     def add(self, msg: object) -> None:
-        """Store a message, and pass the message on."""
+        """Cache a message and forward it to the callbacks."""
         stamp = _stamp_of(msg, self.allow_headerless)
         if stamp is None:
             return
@@ -122,11 +122,11 @@ class Cache(SimpleFilter):
         return [msg for time, msg in self._stored() if from_stamp <= time <= to_stamp]
 
     def getElemAfterTime(self, stamp: Time) -> object | None:
-        """Return the first stored message that is not older than ``stamp``, or None."""
+        """Return the earliest message at or after ``stamp``, or None."""
         return next((msg for time, msg in self._stored() if time >= stamp), None)
 
     def getElemBeforeTime(self, stamp: Time) -> object | None:
-        """Return the last stored message that is not newer than ``stamp``, or None."""
+        """Return the latest message at or before ``stamp``, or None."""
         return next((msg for time, msg in reversed(self._stored()) if time <= stamp), None)
 
     def getLatestTime(self) -> Time | None:
@@ -154,13 +154,13 @@ class Cache(SimpleFilter):
 
 
 class TimeSynchronizer(SimpleFilter):
-    """Passes on sets of messages with the same time stamp, one from each input.
+    """Forwards sets of messages with equal time stamps, one from each input.
 
     A callback's arguments are one message per input. Callbacks do not run concurrently.
     """
 
     def __init__(self, fs: Iterable[Input], queue_size: int, reset: bool = False) -> None:
-        """Connect the inputs. ``queue_size``: the number of messages per input that are queued until the other inputs' arrive.
+        """Connect the inputs. ``queue_size``: how many messages to queue per input while waiting for the other inputs.
 
         ``reset``: if simulated time jumps back, discard the input's queued messages.
         """
@@ -184,7 +184,7 @@ class TimeSynchronizer(SimpleFilter):
         ]
 
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
-        """Store a message from an input; pass on each complete set.
+        """Store a message from an input; forward each complete set.
 
         Raise AttributeError if the message has no header.
         """
@@ -215,7 +215,7 @@ class TimeSynchronizer(SimpleFilter):
 
 
 class ApproximateTimeSynchronizer(TimeSynchronizer):
-    """Passes on sets of messages, one from each input, whose time stamps differ by less than ``slop`` seconds.
+    """Forwards sets of messages, one from each input, whose time stamps differ by less than ``slop`` seconds.
 
     A new message is matched with the closest messages from the other inputs. If several sets are possible, the one that ROS
     would try first is used.
@@ -239,7 +239,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         super().__init__(fs, queue_size, reset)
 
     def add(self, msg: object, my_queue: Queue, my_queue_index: int | None = None) -> None:
-        """Store a message from an input; if it completes a set, pass the set on."""
+        """Store a message from an input; if it completes a set, forward the set."""
         try:
             stamp: Time = msg.header.stamp  # type: ignore[attr-defined]
         except AttributeError:
@@ -284,7 +284,7 @@ class ApproximateTimeSynchronizer(TimeSynchronizer):
         return rospy.Time(*divmod(self._last_added, 1_000_000_000))
 
     def _match(self, my_queue_index: int | None, nanoseconds: int) -> list[object]:
-        """Remove from the queues the set that a time stamp completes, and return its messages; [] if there is no such set."""
+        """Remove the set that a time stamp completes from the queues; return its messages, or [] if there is no set."""
         # Use ``_stamp_queues``, because a subclass may have replaced ``queues`` by its own list of dicts.
         queues = self._stamp_queues
         if self.queues is not queues:

@@ -1,4 +1,4 @@
-"""Queues of messages by time stamp, and the search for a set of stamps that are close together. Pure."""
+"""Queues of messages keyed by time stamp, and the search for sets of stamps that are close together. Pure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["StampQueue", "closest_stamps"]
 
 
 class StampQueue(MutableMapping[Time, object]):
-    """One input's messages by time stamp: a dict as in ROS, which also contains a sorted list of the stamps."""
+    """One input's messages, keyed by time stamp: a dict as in ROS, plus a sorted list of the stamps."""
 
     __slots__ = ("_entries", "order")
 
@@ -130,7 +130,7 @@ def closest_stamps(
     if last - first < slop:
         return nearest
 
-    # Stamps that differ by less than `slop` lie in a window of that width that starts at one of them.
+    # Stamps that differ by less than `slop` lie in a window of width `slop` that starts at one of them.
     candidates = [
         [stamp] if at == index else queue.between(stamp - slop, stamp + slop)
         for at, queue in enumerate(queues)

@@ -45,19 +45,19 @@ class Rotation:
 
     @staticmethod
     def RotX(angle: float) -> Rotation:
-        """Return a rotation about x."""
+        """Return a rotation about the x axis."""
         c, s = math.cos(angle), math.sin(angle)
         return Rotation(1, 0, 0, 0, c, -s, 0, s, c)
 
     @staticmethod
     def RotY(angle: float) -> Rotation:
-        """Return a rotation about y."""
+        """Return a rotation about the y axis."""
         c, s = math.cos(angle), math.sin(angle)
         return Rotation(c, 0, s, 0, 1, 0, -s, 0, c)
 
     @staticmethod
     def RotZ(angle: float) -> Rotation:
-        """Return a rotation about z."""
+        """Return a rotation about the z axis."""
         c, s = math.cos(angle), math.sin(angle)
         return Rotation(c, -s, 0, s, c, 0, 0, 0, 1)
 
@@ -97,7 +97,7 @@ class Rotation:
 
     @staticmethod
     def Quaternion(x: float, y: float, z: float, w: float) -> Rotation:
-        """Return the rotation for a quaternion, which is not normalized first."""
+        """Return the rotation for a quaternion. The quaternion is not normalized first."""
         xx, yy, zz, ww = x * x, y * y, z * z, w * w
         return Rotation(
             ww + xx - yy - zz, 2 * x * y - 2 * w * z, 2 * x * z + 2 * w * y,

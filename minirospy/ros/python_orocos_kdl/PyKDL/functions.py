@@ -35,7 +35,7 @@ def Equal(a: object, b: object, eps: float = EPSILON) -> bool:
 
 
 def SetToZero(a: Vector | Twist | Wrench) -> None:
-    """Set all numbers to zero."""
+    """Set all components of ``a`` to zero."""
     for index in range(3 if isinstance(a, Vector) else 6):
         a[index] = 0.0
 
@@ -62,7 +62,7 @@ def diff(a: Any, b: Any, dt: float = 1) -> Any:
 
 
 def addDelta(a: _Geometry, da: Any, dt: float = 1) -> _Geometry:
-    """Return ``a`` after moving it with the velocity ``da`` for ``dt``; the inverse of :func:`diff`."""
+    """Return ``a`` moved with velocity ``da`` for time ``dt``; the inverse of :func:`diff`."""
     if isinstance(a, Frame):
         return Frame(addDelta(a.M, da.rot, dt), addDelta(a.p, da.vel, dt))
     if isinstance(a, Rotation):

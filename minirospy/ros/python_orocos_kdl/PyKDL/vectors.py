@@ -267,10 +267,10 @@ class Wrench(Screw):
 
 
 def are_near(a: Sequence[float], b: Sequence[float], eps: float = EPSILON) -> bool:
-    """Return whether all pairs of numbers differ by less than ``eps``, which is KDL's criterion for equality."""
+    """Return whether all pairs of numbers differ by less than ``eps``, KDL's criterion for equality."""
     return all(abs(x - y) < eps for x, y in zip(a, b, strict=True))
 
 
 def numbers_text(values: list[float]) -> str:
-    """Return numbers formatted as KDL prints them, in columns 12 characters wide."""
+    """Format numbers like KDL, in columns 12 characters wide."""
     return f"[{','.join(f'{each:12.6g}' for each in values)}]"

@@ -16,7 +16,7 @@ _TIMEOUT = 60.0  # seconds without data before a server counts as unreachable
 
 
 def get(url: str) -> bytes:
-    """Return the data at a URL: ``package://PACKAGE/FILE``, ``file:///FILE``, or one that urllib can open (http, https, ...).
+    """Fetch a URL: ``package://PACKAGE/FILE``, ``file:///FILE``, or any that urllib can open (http, https, ...).
 
     Raise Exception, as ROS does, if there is no such resource, ResourceNotFound if the package is not found, ValueError if
     ``url`` is not a URL.

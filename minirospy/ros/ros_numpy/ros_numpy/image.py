@@ -18,7 +18,7 @@ __all__ = ["image_to_numpy", "numpy_to_image"]
 
 @converts_to_numpy(Image)
 def image_to_numpy(msg: Image) -> Array:
-    """Return an image as an array, which is a read-only view into the message if the byte order is native.
+    """Convert an image to an array: a read-only view into the message if the byte order is native.
 
     Raise TypeError if the image cannot be converted.
     """
@@ -27,7 +27,7 @@ def image_to_numpy(msg: Image) -> Array:
 
 @converts_from_numpy(Image)
 def numpy_to_image(arr: Array, encoding: str) -> Image:
-    """Return an array as an image with this encoding. Raise TypeError if the array's type does not match."""
+    """Convert an array to an image with this encoding. Raise TypeError if the array's type does not match."""
     dtype, channels = CvBridge().encoding_to_dtype_with_channels(encoding)
     if arr.ndim not in (2, 3):
         raise TypeError("Array must be two or three dimensional")

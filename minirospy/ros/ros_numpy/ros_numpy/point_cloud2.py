@@ -102,7 +102,7 @@ def pointcloud2_to_array(cloud_msg: PointCloud2, squeeze: bool = True) -> Array:
 def array_to_pointcloud2(
     cloud_arr: Array, stamp: Time | None = None, frame_id: str | None = None
 ) -> PointCloud2:
-    """Return a structured array as a cloud; the cloud is marked as dense if all values are finite."""
+    """Convert a structured array to a cloud. Mark the cloud as dense if all values are finite."""
     cloud_arr = np.atleast_2d(cloud_arr)
     cloud = PointCloud2()
     if stamp is not None:

@@ -1,4 +1,4 @@
-"""ros_numpy.registry: the conversion functions, by message type."""
+"""ros_numpy.registry: the conversion functions, keyed by message type."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _F = TypeVar("_F", bound=_Function)
 
 _to_numpy: dict[tuple[str, bool], _Function] = {}
 _from_numpy: dict[tuple[str, bool], _Function] = {}
-"""Conversion functions by (type name, whether they convert lists).
+"""Conversion functions, keyed by (type name, whether they convert lists).
 
-The keys are names, because messages in a bag have other classes.
+The keys are names because messages read from a bag have other classes.
 """
 
 

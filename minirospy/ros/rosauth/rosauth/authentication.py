@@ -57,7 +57,7 @@ def main() -> int:
 
 
 def mac_of(request: AuthenticationRequest, secret: str) -> str:
-    """Return the MAC that a client with the secret sends in this request: a SHA-512 hash in hexadecimal."""
+    """Compute the MAC that a client with the secret sends in this request: a SHA-512 hash in hexadecimal."""
     text = f"{secret}{request.client}{request.dest}{request.rand}{request.t.secs}{request.level}{request.end.secs}"
     return hashlib.sha512(text.encode("utf-8", "surrogateescape")).hexdigest()
 

@@ -28,7 +28,7 @@ _ONE = {
 }
 # maximum number of characters produced per load, because an arg that repeats another arg doubles the size
 _MAX_SUBSTITUTED = 64 * 1024 * 1024
-_MAX_SHOWN = 200  # maximum number of characters shown of a string in an error message
+_MAX_SHOWN = 200  # maximum length of a string quoted in an error message
 _VERBS = (*_ONE, "optenv", "dirname", "eval")
 
 

@@ -62,7 +62,7 @@ def roslaunch_deps(
     use_test_depends: bool = False,
     ignore_unset_args: bool = False,
 ) -> tuple[str | None, dict[str, RoslaunchDeps], dict[str, set[str]]]:
-    """Return the first file's package, each file's dependencies, and by package, the dependencies missing in package.xml.
+    """Return the first file's package, each file's dependencies, and those missing from each package's package.xml.
 
     Raise RoslaunchDepsException if a file or package.xml is invalid.
     """

@@ -95,7 +95,7 @@ def _no_node_to_ping() -> Misuse:
     except MasterUnreachableError:
         return Misuse("please enter a node to ping", "Please enter a node to ping")
     available = "".join(f"\n{name}" for name in nodes)
-    # Print the error twice, as ROS does, because its list of nodes contains the error message.
+    # Print the error twice, as ROS does: ROS also includes the error message in its list of nodes.
     ros = f"Please enter a node to ping. Available nodes are:{available}\n{_ping_parser().usage_line()}\n\n"
     return Misuse(
         f"please enter a node to ping: {' '.join(nodes) or 'there are none'}",

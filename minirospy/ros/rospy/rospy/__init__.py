@@ -82,7 +82,7 @@ if TYPE_CHECKING:
     from minirospy.ros.rospy.rospy import core as core
     from minirospy.ros.rospy.rospy import exceptions as exceptions
     from minirospy.ros.rospy.rospy import impl as impl
-    from minirospy.ros.rospy.rospy import live as _live  # completes the modules of minirospy.client
+    from minirospy.ros.rospy.rospy import live as _live  # imported for its side effects
     from minirospy.ros.rospy.rospy import msg as msg
     from minirospy.ros.rospy.rospy import msproxy as msproxy
     from minirospy.ros.rospy.rospy import names as names

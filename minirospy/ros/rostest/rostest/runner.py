@@ -55,7 +55,7 @@ _run = _Run()
 
 
 class RosTestCase(unittest.TestCase):
-    """The attributes of the class that :func:`createUnitTest` returns. Programs may also build such classes themselves."""
+    """Declares the attributes of :func:`createUnitTest`'s classes. Programs may also define such classes."""
 
     config: ROSLaunchConfig
     test_file: str

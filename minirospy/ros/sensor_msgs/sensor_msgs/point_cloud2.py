@@ -22,7 +22,7 @@ from std_msgs.msg import Header
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Values: TypeAlias = NDArray[Any]  # the values of points, of any type that fields can have
+    Values: TypeAlias = NDArray[Any]  # point values, of any type that a field can have
 
 __all__ = [
     "_DATATYPES",
@@ -150,7 +150,9 @@ def read_points_numpy(
 def create_cloud(
     header: Header, fields: Sequence[PointField], points: Sequence[Iterable[float]] | Values
 ) -> PointCloud2:
-    """Return a cloud of these points. Each point has one value per field; an array has one row per point.
+    """Return a cloud of these points.
+
+    Each point has one value per field. ``points`` may be an array with one row per point.
 
     Raise struct.error if a point has a different number of values, or a value does not fit the field's type.
     """

@@ -76,7 +76,7 @@ class Transformer:
         self._buffer.set_transform(transform, authority)
 
     def canTransform(self, target_frame: str, source_frame: str, time: Moment) -> int | tuple[int, str]:
-        """Return whether there is a transform (1 or 0)."""
+        """Return 1 if the transform is available, else 0."""
         return self._buffer.can_transform(
             strip_leading_slash(target_frame), strip_leading_slash(source_frame), time
         )
@@ -84,7 +84,7 @@ class Transformer:
     def canTransformFull(
         self, target_frame: str, target_time: Moment, source_frame: str, source_time: Moment, fixed_frame: str
     ) -> int | tuple[int, str]:
-        """Return whether there is a transform between two times (1 or 0)."""
+        """Return 1 if the transform between two times is available, else 0."""
         target, source, fixed = map(strip_leading_slash, (target_frame, source_frame, fixed_frame))
         return self._buffer.can_transform_full(target, target_time, source, source_time, fixed)
 

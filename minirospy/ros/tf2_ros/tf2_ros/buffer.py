@@ -83,7 +83,9 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Moment = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> int | tuple[int, str]:
-        """Return whether there is a transform (1 or 0), waiting up to ``timeout``; if ``return_debug_tuple``, also the reason.
+        """Wait up to ``timeout`` for a transform; return 1 if it is available, else 0.
+
+        If ``return_debug_tuple``, return a tuple of this result and the reason.
 
         Raise ROSInterruptException and ROSTimeMovedBackwardsException as :meth:`lookup_transform` does.
         """
@@ -103,7 +105,7 @@ class Buffer(BufferCore, BufferInterface):
         timeout: Moment = NO_WAIT,
         return_debug_tuple: bool = False,
     ) -> int | tuple[int, str]:
-        """Return whether there is a transform between two times (1 or 0); wait and return as :meth:`can_transform` does."""
+        """Like :meth:`can_transform`, for a transform between two times."""
 
         def possible() -> tuple[int, str]:
             return self.can_transform_full_core(

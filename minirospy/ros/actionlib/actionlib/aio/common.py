@@ -1,4 +1,4 @@
-"""Code shared by the asyncio action client and server: the action's class, topics and tasks."""
+"""Code shared by the asyncio action client and server: handling of the action's class, topics and tasks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _G_co = TypeVar("_G_co", covariant=True)
 _R_co = TypeVar("_R_co", covariant=True)
 _F_co = TypeVar("_F_co", covariant=True)
 
-WAITING = 1000  # queue length in messages, for each of an action's topics and for a goal's unread feedback
+WAITING = 1000  # queue size in messages: of each of an action's topics, and of a goal's unread feedback
 
 
 class _WithGoal(Protocol[_G_co]):
@@ -38,7 +38,7 @@ class _WithFeedback(Protocol[_F_co]):
 
 
 class ActionClass(Protocol[_G_co, _R_co, _F_co]):
-    """The attributes of an action class such as ``runningLedAction``, which refer to its goal, result and feedback classes."""
+    """The attributes of an action class that refer to its goal, result and feedback classes."""
 
     @property
     def action_goal(self) -> _WithGoal[_G_co]: ...
@@ -53,8 +53,8 @@ class ActionClass(Protocol[_G_co, _R_co, _F_co]):
 class GoalError(MinirospyError):
     """The goal was not reached. ``text`` and ``result`` (if any) come from the server; ``state`` is the final state.
 
-    A server's ``execute`` raises this error to abort the goal with a status text and a result. The result may have any type
-    that ``execute`` may return.
+    A server's ``execute`` raises this error to abort the goal with a status text and a result. ``result`` may have any
+    type that ``execute`` may return.
     """
 
     def __init__(self, text: str = "", result: object = None, state: GoalState = GoalState.ABORTED) -> None:
@@ -65,7 +65,7 @@ class GoalError(MinirospyError):
 
 
 class ActionEnd(Handle):
-    """The common base class of client and server, which manages their topics and the tasks that read the topics."""
+    """The base class of client and server. Manages their topics, and the tasks that read the topics."""
 
     def __init__(self, node: Node, name: str, action: object) -> None:
         self.name = node.resolve(name)

@@ -51,7 +51,7 @@ class ServerGoal(Generic[_G, _F]):
 
     @property
     def id(self) -> str:
-        """The goal's ID."""
+        """Return the goal's ID."""
         return self._status.goal_id.id
 
     @property
