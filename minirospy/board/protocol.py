@@ -66,7 +66,7 @@ class MovePerson(NamedTuple):
 
 
 class Request(NamedTuple):
-    """A request to perform ``operation``; with None, the only effect is a Done message."""
+    """A request to perform ``operation``. If it is None, the server only replies with Done."""
 
     number: int
     operation: Operation | MovePerson | None
@@ -151,7 +151,7 @@ class Stream:
 
 
 def encode_board(pins: list[Pin], person: Position | None) -> bytes:
-    """Return a board as one block of bytes, for the file that stores it."""
+    """Serialize a board to the bytes stored in its file."""
     return serialize(Welcome(VERSION, pins, person))
 
 

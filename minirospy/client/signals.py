@@ -185,7 +185,7 @@ class SignalWatchdog:
         return number in self._previous and signal.getsignal(number) == self.on_signal
 
     def _new_signals(self) -> int:
-        """Return the number of signals from the user that the machine has not counted yet.
+        """Return the number of user signals that the state machine has not counted yet.
 
         If an event loop has replaced the file descriptor, only the handler reports signals.
         """

@@ -171,7 +171,7 @@ class SubscribedTopic(SharedTopic):
 
     @property
     def is_new(self) -> bool:
-        """Return whether no message has arrived, and the last Subscriber was created just before."""
+        """Return whether the latest Subscriber was created a moment ago and no message has arrived since."""
         has_received = any(link.received for link in self.links)
         return not has_received and time.monotonic() - self._since < _NEW_SECONDS
 

@@ -114,7 +114,9 @@ def _check_counts(text: str, max_values: int, max_collections: int) -> None:
 
 
 class _PiecewiseDecoder(json.JSONDecoder):
-    """The library's pure-Python decoder, which lets other threads run, but which uses the C parser for long arrays of numbers."""
+    """The standard library's pure-Python decoder, which lets other threads run, except that the C parser reads long arrays of
+    numbers.
+    """
 
     def __init__(self) -> None:
         super().__init__()

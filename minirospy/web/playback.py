@@ -60,7 +60,7 @@ class PlayerPlayback:
 
 
 class PlayerBridge:
-    """A bridge for a player, on a separate loop. A context manager. Raise BridgeError if the bridge cannot start."""
+    """Context manager that runs a player's bridge on a separate loop. Raise BridgeError if the bridge cannot start."""
 
     def __init__(self, player: Player, span: tuple[int, int], port: int) -> None:
         self._playback = PlayerPlayback(player, span)

@@ -53,7 +53,8 @@ LOCK_SECONDS = 3.0
 # lock
 _LOCK_PAUSE = 0.02
 
-_RESTART_SECONDS = 600.0  # maximum age of a killed master's journal for its session to be continued
+# maximum age of a killed master's journal at which a new master still resumes its session
+_RESTART_SECONDS = 600.0
 
 _COLLECT_SECONDS = 60.0
 _COLLECT = (2000, 5, 1_000_000_000)
@@ -62,7 +63,7 @@ collected automatically.
 """
 
 SWEEP_SECONDS = 10.0  # seconds between checks for dead nodes if the master is nearly full
-_MAX_FORGOTTEN_PER_ITERATION = 20  # dead nodes to forget per loop iteration
+_MAX_FORGOTTEN_PER_ITERATION = 20  # maximum number of dead nodes to remove per loop iteration
 
 _OWN_NODE = "/rosout"
 

@@ -220,7 +220,7 @@ class SlaveProxy:
         return str(self.call("getMasterUri"))
 
     def shutdown(self, reason: str = "") -> None:
-        """Request the node to shut down."""
+        """Ask the node to shut down."""
         self.call("shutdown", reason)
 
     def get_subscriptions(self) -> list[tuple[str, str]]:

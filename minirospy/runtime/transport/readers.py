@@ -176,7 +176,7 @@ class _FrameSource:
         self._is_fast = False
 
     def read(self) -> Iterable[Frame]:
-        """Wait for the next frames. Small ones are valid until the next call, large ones permanently.
+        """Wait for the next frames. Small frames are valid only until the next call; large frames stay valid.
 
         Raise _Ended if the peer closes, OSError if the connection fails, WireError if the data is invalid.
         """

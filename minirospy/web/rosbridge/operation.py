@@ -77,7 +77,7 @@ class OperationSession(Protocol):
         """Send a status message, if the client has requested this level."""
 
     def count(self) -> None:
-        """Report the memory used for the client to the server's account."""
+        """Charge this client's memory use to the server's budget."""
 
     def spawn(self, work: Work) -> asyncio.Task[None]:
         """Start a task that is cancelled when the session ends."""

@@ -145,7 +145,7 @@ class RosbridgeSession:
     # --- sequential execution
 
     def count(self) -> None:
-        """Report the memory used for the client to the server's account."""
+        """Charge this client's memory use to the server's budget."""
         self.client.holds(
             self._inbox_size
             + self._fragments.size

@@ -158,7 +158,7 @@ class RosbridgeShared:
         return found[compression]
 
     def _encodings(self, topic: str, arrival: Arrival) -> dict[str, bytes]:
-        """Return the existing encodings of a message, by compression."""
+        """Return the message's cached encodings, keyed by compression."""
         known = self._encoded.get(topic)
         if known is None or known[0] is not arrival:
             known = self._encoded[topic] = arrival, {}

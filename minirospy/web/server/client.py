@@ -99,7 +99,7 @@ class Session(Protocol):
 
 
 class Endpoint(Protocol):
-    """A protocol over WebSocket."""
+    """One endpoint of the server: a protocol served over WebSocket."""
 
     def select(self, offered: Sequence[str]) -> str | None:
         """Return the sub-protocol to use, or None to use none. Raise LookupError, with the reason, to refuse the client."""

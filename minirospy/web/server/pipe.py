@@ -219,7 +219,7 @@ class TlsPipe(asyncio.Protocol):
 
     @property
     def is_full(self) -> bool:
-        """Return whether more data is waiting for the kernel than asyncio's limit."""
+        """Return whether the data buffered for sending exceeds asyncio's high-water mark."""
         return self._is_paused
 
     @property

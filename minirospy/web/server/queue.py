@@ -30,7 +30,7 @@ MAX_ANSWERS = 64_000_000
 
 
 _FILE_BYTES = 1000
-"""Bytes of memory for a file that has not been opened yet, including its entry."""
+"""Memory, in bytes, of a file that is queued but not yet opened, including its queue entry."""
 
 
 class _Entry(NamedTuple):

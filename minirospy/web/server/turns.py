@@ -39,7 +39,7 @@ EXPECTED_DECAY = 0.9  # decay of the expected seconds with each piece of work th
 IMMEDIATE_SHARE = 0.5  # share of the time for work that starts without being queued
 # Maximum burst of an interactive client in slices, 1 ms in total: a request takes 0.1 to 0.5 ms, 64 kB of empty
 # frames take 100 ms. A new client has one slice, and gets one more with each short burst, so that 250 new clients
-# that flood the server are served after its other clients as soon as each has had a slice.
+# that flood the server each get one slice, and are then served after its other clients.
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients: interactive clients alone may use 200 ms before bulk clients get a slice again
 MAX_DEBT_TURNS = 10
@@ -75,7 +75,7 @@ class Share:
         # seconds that the client's next piece of work may take, estimated from earlier pieces
         self.expected = 0.0
         self.pieces = 0  # number of pieces of work done while the client is new
-        self.burst = 0.0  # seconds used since the client last had nothing to do
+        self.burst = 0.0  # seconds used since the client was last idle
         self.last_burst = 0.0  # seconds used in the previous burst
         self.short_bursts = 0  # number of short bursts in succession, up to INTERACTIVE_SLICES
         self.is_queued = False
