@@ -220,7 +220,7 @@ class Node:
                     await server.cancel()
 
     def shutdown(self, reason: object = "") -> None:
-        """Request the node to shut down: :meth:`spin` and loops over messages return, and sleeps are interrupted. Thread-safe.
+        """Ask the node to shut down: :meth:`spin` and loops over messages return, and sleeps are interrupted. Thread-safe.
 
         The node leaves the graph at the end of its ``async with`` block. `rosnode kill` calls this too.
         """

@@ -44,7 +44,7 @@ _PEER = struct.Struct("iII")  # layout of the kernel's credentials for a peer, s
 
 
 class Peer(NamedTuple):
-    """The process id, user id and group id of a process."""
+    """Process id, user id and group id of the process at the other end of a socket."""
 
     process: int
     user: int

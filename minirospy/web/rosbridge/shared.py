@@ -79,11 +79,11 @@ class RosbridgeShared:
         self.graph = graph
         self.options = options or RosbridgeOptions()
         self.services: dict[str, ClientService] = {}
-        """The services that clients offer, by name."""
+        """The services that clients offer, keyed by name."""
         self.log = RateLimitedLogger(logging.getLogger(graph.node.log.name), _LOG_LINES)
 
         self.in_thread = _LargeWork("rosbridge-large")
-        """Runs work on large messages from clients, which wait for each other."""
+        """Runs work on large messages from clients, one at a time."""
         self.encode = _LargeWork("rosbridge-encode")
         """Runs work on large messages to clients."""
         self._closing: dict[str, asyncio.Task[None]] = {}
@@ -123,7 +123,7 @@ class RosbridgeShared:
         self._encoded.pop(topic, None)
 
     def class_of(self, arrival: Arrival) -> type[Message] | None:
-        """Return the class for a received message, or None if its definition is unknown."""
+        """Return the class of a received message, or None if its definition is unknown."""
         return self._types.of(arrival.header)
 
     @staticmethod
@@ -134,7 +134,10 @@ class RosbridgeShared:
         return len(body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
 
     def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
-        """Return a message as clients receive it, encoded once for all clients. Raise BridgeError if it cannot be encoded."""
+        """Return a message encoded for clients.
+
+        Each message is encoded once for all of them. Raise BridgeError if it cannot be encoded.
+        """
         found = self._encodings(topic, arrival)
         made = found.get(compression)
         if made is None:
@@ -144,7 +147,7 @@ class RosbridgeShared:
     async def encoded_large(
         self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str
     ) -> bytes:
-        """Return the same as :meth:`encoded`, but encode in a thread, so that only the receivers of this message wait."""
+        """Like :meth:`encoded`, but encode in a thread, so that only the receivers of this message wait."""
         found = self._encodings(topic, arrival)
 
         def encode() -> bytes:
