@@ -361,8 +361,7 @@ class Registrations:
             await self.call_master("getPid", self._name)
 
     async def _call_all(self, calls: Sequence[_Call]) -> None:
-        """Make all calls, ignoring their results; batch them if the master supports system.multicall, which not every master
-        does.
+        """Make all calls, ignoring their results. Batch them if the master supports system.multicall.
 
         Raise MasterUnreachableError if the master does not respond.
         """

@@ -116,9 +116,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             await asyncio.sleep(max(REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
     def topic_types(self) -> Mapping[str, str]:
-        """Return a dict from topic to the type known to the master, ``*`` if the topic only has subscribers that accept any
-        type.
-        """
+        """Return a dict from topic to the type that the master knows, or ``*`` if the topic only has subscribers to any type."""
         with self.graph() as graph:
             return graph.master.get_topic_types()
 
