@@ -220,7 +220,7 @@ class Node:
                     await server.cancel()
 
     def shutdown(self, reason: object = "") -> None:
-        """Request the node to shut down: :meth:`spin` and loops over messages return, and sleeps are interrupted. Thread-safe.
+        """Ask the node to shut down: :meth:`spin` and loops over messages return, and sleeps are interrupted. Thread-safe.
 
         The node leaves the graph at the end of its ``async with`` block. `rosnode kill` calls this too.
         """
@@ -348,7 +348,7 @@ class Node:
     async def publish(self, topic: str, message: Message) -> None:
         """Publish one message; the topic stays advertised.
 
-        Before the first message on a topic, wait up to a second for the subscribers that are registered with the master.
+        Before the first message on a topic, wait up to a second for subscribers to connect: those registered with the master.
         """
         resolved = self.resolve(topic)
         kept = self._kept.get(resolved)
@@ -543,7 +543,7 @@ class Node:
                     is_reported = True
                 await self.sleep(0.25)
             except RpcFault:
-                return  # the master does not support this call; @foxglove/ros1's master is an example
+                return  # some masters, such as @foxglove/ros1's, do not support this call
             else:
                 return
 

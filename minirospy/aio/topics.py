@@ -211,7 +211,7 @@ class Publisher(Handle, Generic[_M_co]):
             raise TimeoutError(text) from None
 
     async def wait_for_expected(self) -> None:
-        """Wait up to a second for the subscribers that the master reported at the registration to connect."""
+        """Wait up to a second for subscribers to connect: those that the master listed when the topic was registered."""
         await self
         state = self._state
         if state is None:

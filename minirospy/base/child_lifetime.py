@@ -28,7 +28,7 @@ class JobSystem(Protocol):
     """The system calls for job objects. Each method raises OSError if the call fails."""
 
     def create(self) -> int:
-        """Create a job; return its handle."""
+        """Create a Windows job object; return its handle."""
 
     def set_limits(self, job: int, flags: int) -> None:
         """Set a job's limits."""

@@ -32,7 +32,7 @@ _ASSIGNMENT = re.compile(r"^[~/A-Za-z_][\w/]*:=")
 
 
 def is_legal_name(name: str) -> bool:
-    """Return whether ``name`` is a legal graph resource name; the empty name resolves to the namespace."""
+    """Return whether ``name`` is a legal graph resource name. The empty name is legal: it resolves to the namespace."""
     return name == "" or (bool(_LEGAL.match(name)) and "//" not in name)
 
 

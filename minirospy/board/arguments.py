@@ -12,7 +12,7 @@ NO_BOUNCETIME = -666  # RPi.GPIO's default: no debouncing
 
 
 def channels_of(channel: object) -> list[int]:
-    """Return the list of channels in a single channel or a sequence. Raise ValueError if one is not an integer."""
+    """Convert a channel or a sequence of channels to a list. Raise ValueError if one is not an integer."""
     if isinstance(channel, int):
         return [channel]
     if not isinstance(channel, (list, tuple)):
@@ -23,7 +23,7 @@ def channels_of(channel: object) -> list[int]:
 
 
 def level_of(value: object) -> int:
-    """Convert an argument for a level to 0 or 1. Raise TypeError if it is neither an integer nor a bool."""
+    """Convert a level argument to 0 or 1. Raise TypeError if it is neither an integer nor a bool."""
     if isinstance(value, int):
         return 1 if value else 0
     if isinstance(value, (list, tuple, str, bytes)) or value is None or not hasattr(value, "__bool__"):
@@ -33,7 +33,7 @@ def level_of(value: object) -> int:
 
 
 def detector_of(channel: int, edge: int, bouncetime: int) -> Detector:
-    """Return a detector for an edge; ``bouncetime`` is in ms. Raise ValueError or TypeError if an argument is invalid."""
+    """Create a detector for an edge; ``bouncetime`` is in ms. Raise ValueError or TypeError if an argument is invalid."""
     # Require whole milliseconds: like RPi.GPIO, raise TypeError for a time in seconds such as 0.2.
     edge, bouncetime = operator.index(edge), operator.index(bouncetime)
     if edge not in {Slope.RISING, Slope.FALLING, Slope.BOTH}:

@@ -40,12 +40,12 @@ class BoardState:
     person: Position | None = None
 
     def level(self, pin: int) -> int:
-        """Return the level of ``pin``: 0 or 1."""
+        """Return the level at ``pin``: 0 or 1."""
         return self.pins[pin].level
 
 
 class Board:
-    """The board ``name`` (default: MINIROSPY_BOARD, else "default"); its server is started if it is not running.
+    """The board ``name`` (default: MINIROSPY_BOARD, else "default"). Starts the board's server if it is not running.
 
     Thread-safe. Pins are BCM numbers, 0 to 53. Every method raises BoardError if a pin does not exist or the board does
     not respond.
@@ -53,7 +53,7 @@ class Board:
 
     def __init__(self, name: str | None = None) -> None:
         directory = BoardDirectory.find(name)
-        # Use weak references, so that an abandoned watch receives no more edges.
+        # Use weak references, so that an abandoned watch receives no further edges.
         self._watchers: weakref.WeakSet[queue.SimpleQueue[Edge]] = weakref.WeakSet()
         self._lock = threading.Lock()
         self.name = directory.name
@@ -101,7 +101,7 @@ class Board:
         self.move_person(None)
 
     def get(self, pin: int) -> int:
-        """Return the level of ``pin``: 0 or 1."""
+        """Return the level at ``pin``: 0 or 1."""
         return self._link.levels[_checked(pin)]
 
     def levels(self) -> dict[int, int]:

@@ -78,7 +78,7 @@ class BoardDirectory:
 
     @property
     def address_path(self) -> Path:
-        """The path of the file in which a TCP server stores "port token"; only this user may read it."""
+        """The path of the file in which a TCP server stores "port token". Only this user may read it."""
         return self.folder / f"{self.name}.address"
 
     @property

@@ -1,4 +1,4 @@
-"""Edge detection: calls callbacks for the edges to report, one at a time in a single thread.
+"""Edge detection: calls the callbacks for reported edges, one at a time, in a single thread.
 
 Debouncing is RPi.GPIO's: the first edge is reported, then the pin is ignored for the bounce time.
 """
@@ -26,7 +26,7 @@ class Slope(IntEnum):
 
 
 class Detector:
-    """Watches one channel: decides which edges to report, and records that one has occurred.
+    """Watches one channel: decides which edges to report, and records whether one has occurred.
 
     ``bouncetime`` is in seconds, or None for no debouncing.
     """
@@ -51,7 +51,7 @@ class Detector:
         return True
 
     def excludes(self, waiter: Detector) -> bool:
-        """Return whether a wait with the detector ``waiter`` conflicts with this detector on the same channel."""
+        """Return whether waiting with the detector ``waiter`` would conflict with this detector on the same channel."""
         same = waiter.slope is self.slope
         return bool(self.callbacks) or (same and self._bouncetime not in (None, waiter._bouncetime))
 
@@ -72,7 +72,7 @@ class Detector:
 
 
 class CallbackThread:
-    """Runs callbacks in the order of their edges; if one raises, its exception is printed and the next one still runs."""
+    """Runs callbacks in the order of their edges. If a callback raises, prints the exception and runs the next one."""
 
     def __init__(self) -> None:
         self._due: queue.SimpleQueue[Detector | None] = queue.SimpleQueue()

@@ -59,7 +59,9 @@ sys.path.append(sys.argv[1])
 from minirospy.board.server import main
 sys.exit(main(sys.argv[2:]))
 """
-"""Code that does the same as `python -m minirospy.board.server`, but also finds a package imported from the current folder."""
+"""Code that does the same as `python -m minirospy.board.server`, but also works if the package was imported from the current
+folder.
+"""
 
 
 class Edge(NamedTuple):
@@ -73,7 +75,7 @@ class Edge(NamedTuple):
 class Link:
     """A connection to a board.
 
-    ``levels`` mirrors every pin's level and is always the same list, so that reading it is the fast way to read a pin.
+    ``levels`` mirrors every pin's level. It is always the same list, and the fastest way to read a pin.
     ``on_edge`` is called in the reader thread, for every edge on the board.
 
     Raise BoardError if no server can be started.
@@ -103,7 +105,8 @@ class Link:
     def call(self, operation: Operation | MovePerson | None, timeout: float = ANSWER_PATIENCE) -> None:
         """Perform ``operation``, and return when the mirror shows its effect.
 
-        None only waits for the operations sent before. Raise BoardError if the board refuses or does not respond within
+        If it is None, only wait for the operations sent before. Raise BoardError if the board refuses or does not respond
+        within
         ``timeout`` seconds.
         """
         with self._news:
@@ -236,7 +239,7 @@ class Link:
 
 
 class _Connection:
-    """A socket on which the server has sent Welcome, with ``pins`` and ``person``."""
+    """A connected socket after the server's Welcome, which contained ``pins`` and ``person``."""
 
     def __init__(self, link: socket.socket, stream: Stream, welcome: Welcome, more: list[Message]) -> None:
         self._socket = link
@@ -288,7 +291,7 @@ def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connecti
 
 
 def _connect(directory: BoardDirectory) -> _Connection | None:
-    """Return the connection, after Hello and Welcome, or None if no server responds."""
+    """Connect, and exchange Hello and Welcome. Return the connection, or None if no server responds."""
     token = ""
 
     try:

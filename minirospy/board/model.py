@@ -56,7 +56,7 @@ class Pull(IntEnum):
 
 
 class Pin(NamedTuple):
-    """One pin; ``world`` is the level to which the pin is driven from outside, or None if it is not driven."""
+    """One pin. ``world`` is the level to which it is driven from outside, or None if it is not driven."""
 
     function: Function = Function.IN
     pull: Pull = Pull.OFF
@@ -74,7 +74,7 @@ class Pin(NamedTuple):
 
 
 class Setup(NamedTuple):
-    """Set a pin's function; ``initial`` is an output's first level, or None to keep the latch."""
+    """Set a pin's function. ``initial`` is an output's first level, or None to keep the latch."""
 
     pin: int
     function: int

@@ -1,4 +1,4 @@
-"""Convert messages between a board's server and its clients to bytes (msgpack) and back. Pure.
+"""Serialize and parse the messages between a board's server and its clients (msgpack). Pure.
 
 Each message is an array: the number that identifies its kind, then its fields. A client first sends Hello and then
 Requests with increasing numbers. The server first sends Welcome (the whole board), and then, on each change, Changed or
@@ -66,7 +66,7 @@ class MovePerson(NamedTuple):
 
 
 class Request(NamedTuple):
-    """A request to perform ``operation``; with None, the only effect is a Done message."""
+    """A request to perform ``operation``. If it is None, the server only replies with Done."""
 
     number: int
     operation: Operation | MovePerson | None
@@ -124,7 +124,7 @@ _OPERATION_NUMBER = {kind: number for number, kind in enumerate(_OPERATIONS)}
 
 
 def serialize(message: Message) -> bytes:
-    """Return one message's bytes."""
+    """Serialize one message."""
     fields: tuple[object, ...] = message
     if isinstance(message, Request):
         operation = message.operation
@@ -135,7 +135,7 @@ def serialize(message: Message) -> bytes:
 
 
 class Stream:
-    """A decoder that turns the bytes received in one direction of a connection into messages."""
+    """A decoder that turns bytes received on a connection into messages."""
 
     def __init__(self) -> None:
         self._unpacker = msgpack.Unpacker(use_list=False, max_buffer_size=_MAX_BUFFER)
@@ -151,12 +151,12 @@ class Stream:
 
 
 def encode_board(pins: list[Pin], person: Position | None) -> bytes:
-    """Return a board as one block of bytes, for the file that stores it."""
+    """Serialize a board to the bytes stored in its file."""
     return serialize(Welcome(VERSION, pins, person))
 
 
 def decode_board(block: bytes) -> tuple[list[Pin], Position | None]:
-    """Return the pins and the person from :func:`encode_board`. Raise ProtocolError if the block is invalid."""
+    """Return the pins and the person serialized by :func:`encode_board`. Raise ProtocolError if the block is invalid."""
     messages = list(Stream().feed(block))
     if len(messages) != 1 or not isinstance(messages[0], Welcome) or messages[0].version != VERSION:
         raise ProtocolError("not a saved board")

@@ -109,7 +109,7 @@ HEADER = {
 
 
 class Gpio:
-    """The board as one program sees it: its numbering mode, the pins that it has set up, and its events."""
+    """The board as one program uses it: its numbering mode, the pins that it has set up, and its events."""
 
     def __init__(self, board: str | None = None) -> None:
         self._board = board
@@ -123,8 +123,8 @@ class Gpio:
         # fast.
         self._readable: dict[int, int] = {}
         self._writable: dict[int, int] = {}
-        # The channels that cleanup() has released in a signal handler, also with their BCM pins, so that the
-        # interrupted call still finds them.
+        # The channels that cleanup() has released in a signal handler, and their BCM pins, so that the interrupted
+        # call still finds them.
         self._interrupted: dict[int, int] = {}
         self._detectors: dict[int, Detector] = {}
         self._waiting: dict[int, Detector] = {}
@@ -178,7 +178,7 @@ class Gpio:
             self._linked().write(((pin, level),))
 
     def input(self, channel: int) -> int:
-        """Return the level of a configured channel, output or input: 0 or 1."""
+        """Return the level at a configured channel, output or input: 0 or 1."""
         try:
             return self._levels[self._readable[channel]]
         except (KeyError, TypeError):
@@ -286,7 +286,7 @@ class Gpio:
                 self._waiting.pop(pin, None)
 
     def event_detected(self, channel: int) -> bool:
-        """Return whether an edge has occurred since the last call."""
+        """Return whether an edge on the channel has occurred since the last call."""
         detector = self._detectors.get(self._pin(channel))
         return detector is not None and detector.take()
 
@@ -311,7 +311,7 @@ class Gpio:
         atexit.unregister(self.close)
 
     def output_pin(self, channel: int) -> int:
-        """Return a channel's BCM pin for a PWM. Raise the same exceptions as PWM()."""
+        """Return the BCM pin of a PWM's channel. Raise the same exceptions as PWM()."""
         pin = self._pin(channel)
         if pin in self._waves:
             raise RuntimeError("A PWM object already exists for this GPIO channel")
@@ -373,7 +373,7 @@ class Gpio:
         if pin in {2, 3} and pull != PUD_OFF:
             self._warn("A physical pull up resistor is fitted on this channel!", depth=3)
         with self._lock:
-            # Record the pin before calling the board: a Ctrl-C may interrupt that call, and cleanup() must then undo
+            # Record the pin before calling the board: Ctrl-C may interrupt that call, and cleanup() must then undo
             # its effect.
             self._directions[pin] = direction
 

@@ -49,7 +49,7 @@ class Circle(NamedTuple):
 
 
 class Scan(NamedTuple):
-    """One rotation: a range (``inf`` if nothing was hit) and an intensity for each beam, and which beams hit a reflector."""
+    """One rotation. For each beam: a range (``inf`` if nothing was hit), an intensity, and whether it hit a reflector."""
 
     ranges: list[float]
     intensities: list[float]
@@ -57,7 +57,7 @@ class Scan(NamedTuple):
 
     @property
     def nearest(self) -> float:
-        """The smallest range."""
+        """The smallest range of all beams."""
         return min(self.ranges)
 
     def fields(self) -> tuple[bool, bool]:
@@ -131,7 +131,7 @@ def _angle(beam: int) -> float:
 
 
 def _nearest_wall(angle: float, walls: Sequence[Wall]) -> tuple[float, float, bool]:
-    """Return the distance to the first wall that a beam hits, the wall's brightness, and whether it is a reflector."""
+    """Return the distance to the first wall that a beam hits, the wall's brightness, and whether the wall is a reflector."""
     dx, dy = math.cos(angle), math.sin(angle)
     nearest: tuple[float, float, bool] = (math.inf, 0.0, False)
     for wall in walls:

@@ -232,7 +232,7 @@ def _write_private(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def _locked(directory: BoardDirectory) -> Iterator[bool]:
-    """Yield whether this process has acquired the board's lock; wait briefly for a server that is about to exit."""
+    """Yield whether this process has acquired the board's lock. Waits briefly for a server that is about to exit."""
     deadline = time.monotonic() + LOCK_PATIENCE
     with os.fdopen(
         private_files.open_file(directory.lock_path, os.O_RDWR | os.O_CREAT, 0o600), "r+b"

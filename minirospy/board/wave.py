@@ -14,7 +14,7 @@ PWM_LIMIT = 50.0  # Hz; a faster PWM appears on the board with this frequency an
 
 
 class Output(Protocol):
-    """The interface to the output channels that a wave uses."""
+    """The output channels' interface for a wave."""
 
     def write(self, pin: int, level: int) -> None:
         """Set the level of a pin."""

@@ -55,7 +55,7 @@ def _missing_name() -> int:
 
 
 class Picture:
-    """A picture of a board for rich: its LEDs, its buttons, the person, and other pins in use."""
+    """A rich renderable that draws a board: its LEDs, its buttons, the motion sensor's person, and other pins in use."""
 
     def __init__(self, state: BoardState) -> None:
         self.state = state

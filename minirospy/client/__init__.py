@@ -1,4 +1,4 @@
-"""The rospy API: thin blocking wrappers over `minirospy.runtime`, which `import rospy` re-exports.
+"""The rospy API, which `import rospy` re-exports: thin blocking wrappers over `minirospy.runtime`.
 
 Source: http://wiki.ros.org/rospy/Overview.
 """
@@ -203,7 +203,7 @@ def get_node_uri() -> str | None:
 
 
 def is_shutdown_requested() -> bool:
-    """Return whether a shutdown has started; while the shutdown hooks run, is_shutdown() still returns False."""
+    """Return whether a shutdown has started. While the shutdown hooks run, is_shutdown() still returns False."""
     return current_session().lifecycle.is_shutdown_requested
 
 
@@ -224,12 +224,12 @@ def interrupting(interrupt: Callable[[], object]) -> AbstractContextManager[None
 
 
 def resolve_name(name: str, caller_id: str | None = None) -> str:
-    """Return ``name`` remapped and as a global name, resolved relative to this node or the node ``caller_id``."""
+    """Remap ``name`` and return it as a global name, resolved relative to this node or the node ``caller_id``."""
     return current_session().resolve(name and str(name), caller_id)
 
 
 def remap_name(name: str, caller_id: str | None = None, resolved: bool = True) -> str:
-    """Return ``name`` as remapped on the command line, as a global name; return ``name`` itself if it is not remapped."""
+    """Return ``name`` as remapped on the command line, as a global name, or ``name`` itself if it is not remapped."""
     return current_session().identity.remap(name, caller_id)
 
 

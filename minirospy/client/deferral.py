@@ -10,7 +10,7 @@ __all__ = ["Deferral", "is_main_thread"]
 
 
 class Deferral:
-    """A critical section in the main thread: ``with deferral:`` delays the dispatch of signals until the end of the block.
+    """A critical section in the main thread. ``with deferral:`` delays the dispatch of signals until the block ends.
 
     A shutdown hook may publish, log or register, so it must not run while the main thread is in the middle of such an
     operation. Has no effect in other threads, because signals do not interrupt them.

@@ -27,7 +27,7 @@ def report_waiting(*, is_leaving: bool) -> None:
 
 
 def report_interrupt(reason: str) -> None:
-    """Print that the main thread is interrupted, its location in the program, and the reason for the shutdown."""
+    """Print that the main thread is interrupted, its position in the program, and the reason for the shutdown."""
     main = threading.main_thread()
     place = _place(sys._current_frames().get(main.ident or 0))
     at = f" at {place}" if place else ""
@@ -40,7 +40,7 @@ def report_interrupt(reason: str) -> None:
 
 
 def _what_runs() -> str:
-    """Return the thread or process that delays this process's exit, and its location in the program."""
+    """Return the thread or process that delays this process's exit, and its position in the program."""
     main = threading.main_thread()
     threads = [main, *(t for t in threading.enumerate() if t is not main and not t.daemon)]
     frames = sys._current_frames()

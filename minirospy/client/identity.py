@@ -34,7 +34,7 @@ class Identity:
         # Programs may change this dict and `mappings`
         self.remappings: dict[str, str] = previous.remappings if previous else {}
         self._name: str | None = previous._name if previous else None
-        # The namespace that the program has set, or None
+        # The namespace set by the program, or None
         self._namespace: str | None = previous._namespace if previous else None
         self._mappings: dict[str, str] | None = previous._mappings if previous else None
         self._arguments: names.Arguments | None = previous._arguments if previous else None
@@ -88,12 +88,15 @@ class Identity:
         return names.namespace_of(self.name) if self._namespace is None else self._namespace
 
     def be_called(self, name: str, namespace: str | None = None) -> None:
-        """Use the global name ``name`` until :meth:`take_name` is called; report ``namespace``, if given, as its namespace."""
+        """Use the global name ``name`` until :meth:`take_name` is called.
+
+        If ``namespace`` is given, report it as the namespace.
+        """
         self._name = name
         self._namespace = namespace
 
     def resolve(self, name: str, caller_id: str | None = None) -> str:
-        """Return the global name of ``name``, resolved relative to this node or the node ``caller_id``."""
+        """Return ``name`` as a global name, resolved relative to this node or the node ``caller_id``."""
         node_name = caller_id or self.name
         if name and names.is_private(name):
             # As in rospy, keep a slash after `~`, so that `~/x` resolves to `/x`.
@@ -114,7 +117,7 @@ class Identity:
         return names.resolve(name, self.name, self.resolved_mappings(self.name))
 
     def remap(self, name: str, caller_id: str | None = None) -> str:
-        """Return the command line's remapping of ``name`` as written there, or ``name`` itself if there is none."""
+        """Return the command line's remapping of ``name`` as written there, or ``name`` itself if it is not remapped."""
         mapped = self.mappings.get(name)
         return name if mapped is None else names.resolve(mapped, caller_id or self.name)
 
@@ -165,7 +168,7 @@ def private_parameters(arguments: names.Arguments) -> dict[str, object]:
 
 
 def warn_of_illegal_name(name: str, stacklevel: int = 3) -> None:
-    """Warn, as rospy does, that a name is not legal in the graph; the master may refuse it later."""
+    """Warn, as rospy does, that a name is not a legal graph name; the master may refuse it later."""
     if not names.is_legal_name(name):
         warnings.warn(
             f"'{name}' is not a legal ROS graph resource name. This may cause problems with other ROS tools",

@@ -18,7 +18,7 @@ _LENGTH = struct.Struct("<I")
 
 
 def serialize_message(b: BytesIO, seq: int, msg: Message) -> None:
-    """Write ``msg`` with its length to ``b``. Set the header's ``seq``, and clear its frame_id if that was "0"."""
+    """Write ``msg``, preceded by its length, to ``b``. Set the header's ``seq``, and clear its frame_id if that was "0"."""
     number_header(msg, seq)
     start = b.tell()
     b.write(b"\0\0\0\0")

@@ -56,10 +56,10 @@ class _Interrupting:
 
 
 class Lifecycle:
-    """The node's shutdown: which functions it calls, and in which order."""
+    """The node's shutdown: the functions that it calls, and their order."""
 
     def __init__(self, leave: Callable[[], object]) -> None:
-        """Call ``leave()`` at a shutdown to remove the node from the graph."""
+        """Create the lifecycle. A shutdown calls ``leave()`` to remove the node from the graph."""
         self._leave = leave
         self._lock = threading.RLock()
         self._claim = threading.Lock()
@@ -78,7 +78,7 @@ class Lifecycle:
         self.interrupts: list[Callable[[], object]] = []
         """Called to unblock blocking calls, after is_shutdown() has become true and before the node leaves the graph."""
 
-        self.has_waited = False  # a thread has waited or slept in a call of rospy
+        self.has_waited = False  # True after a thread has waited or slept in a rospy call
         self.deferral = Deferral()
         self.machine = ShutdownMachine()
         self._this_thread = _ThisThread(self.machine.main)
@@ -153,7 +153,7 @@ class Lifecycle:
         return self._claim.locked()
 
     def is_shutdown(self) -> bool:
-        """Return whether the node has shut down."""
+        """Return whether the node has shut down, without recording that the calling thread polls."""
         return self.shutting_down.is_set()
 
     # --- notified threads
@@ -191,7 +191,7 @@ class Lifecycle:
         state.awareness = Awareness.CUT_SHORT
 
     def interrupted(self, text: str) -> ROSInterruptException:
-        """Mark the calling thread as notified of the shutdown, and return the exception for it to raise."""
+        """Mark the calling thread as notified of the shutdown; return the exception that it should raise."""
         self._this_thread.state.awareness = Awareness.NOTIFIED
         return ROSInterruptException(text)
 

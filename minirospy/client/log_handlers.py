@@ -1,4 +1,4 @@
-"""The handlers that write log lines to the terminal and to /rosout.
+"""The logging handlers for the terminal and for /rosout.
 
 Source: http://wiki.ros.org/rospy/Overview/Logging.
 """
@@ -50,7 +50,7 @@ class RosStreamHandler(DeferringHandler):
     def __init__(
         self, colorize: bool = True, stdout: TextIO | None = None, stderr: TextIO | None = None
     ) -> None:
-        """Print to ``stdout`` and ``stderr``, by default ``sys.stdout`` and ``sys.stderr`` at the time when a line is written."""
+        """Print to ``stdout`` and ``stderr``. By default, these are ``sys.stdout`` and ``sys.stderr`` when a line is written."""
         super().__init__()
         self._colorize = colorize
         self._stdout = stdout
@@ -124,7 +124,7 @@ class RosOutHandler(DeferringHandler):
 
 
 def check_message(record: logging.LogRecord) -> str:
-    """Return the record's text. If its arguments do not match the message, replace the text with one that names the fault."""
+    """Return the record's text. If its arguments do not match its message, return a text that names the fault."""
     try:
         return record.getMessage()
     except Exception as error:  # noqa: BLE001 - also what a program's own __str__() raises

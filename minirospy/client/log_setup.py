@@ -143,7 +143,7 @@ def configured_by_file(home: Path) -> bool:
 
 
 def _log_to_file(session: Session, path: Path) -> None:
-    """Write the output of all loggers to the node's log file, as rospy does. Prevent duplicate lines on the terminal."""
+    """Write all loggers' output to the node's log file, as rospy does. Prevent duplicate lines on the terminal."""
     from minirospy.runtime.master.log_file import LogFileHandler
 
     class RotatingFileHandler(DeferringHandler, LogFileHandler):
@@ -172,7 +172,7 @@ def _is_not_ours(record: logging.LogRecord) -> bool:
 
 
 def _link_latest(folder: Path) -> None:
-    """Create the link ``latest`` to a run's folder, in the same parent folder."""
+    """Create the link ``latest`` next to a run's folder, pointing to the folder."""
     link = folder.parent / "latest"
     # The file system does not support links, or another node created the link first.
     with contextlib.suppress(OSError, NotImplementedError):

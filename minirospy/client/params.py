@@ -65,7 +65,7 @@ def get_param(param_name: str, default: object = UNSPECIFIED) -> Any:
 
 
 def get_param_cached(param_name: str, default: object = UNSPECIFIED) -> Any:
-    """Return a parameter's value from a cache that the master keeps up to date. Before init_node, query the master instead."""
+    """Return a parameter's value from a cache that the master keeps up to date. Before init_node, query the master."""
     name = current_session().resolve(param_name)
     cache, node = current_session().parameters, current_session().node
     if node is None or current_session().is_shutdown():
@@ -151,7 +151,7 @@ def get_param_names() -> list[str]:
 
 
 class KeptParameters:
-    """The cache behind get_param_cached, for programs that read it or need notifications of changes.
+    """The cache that get_param_cached uses, for programs that read it or need notifications of changes.
 
     Such a program may replace :meth:`update` with its own function.
     """
@@ -161,14 +161,14 @@ class KeptParameters:
         current_session().parameter_listeners.append(self._dispatch)
 
     def get(self, key: str) -> Any:
-        """Return a parameter's value from the cache. Raise KeyError if get_param_cached has not read it before."""
+        """Return a parameter's cached value. Raise KeyError if get_param_cached has not read it before."""
         session = current_session()
         if session.node is None or session.resolve(key) not in session.node.parameters:
             raise KeyError(key)
         return get_param_cached(key)
 
     def set_notifier(self, notifier: Callable[[str, object], object] | None) -> None:
-        """Call ``notifier(key, value)`` when the master reports a change; the value of a deleted parameter is {}."""
+        """Call ``notifier(key, value)`` when the master reports a change. The value of a deleted parameter is {}."""
         self._notifier = notifier
 
     def update(self, key: str, value: object) -> None:
@@ -182,12 +182,12 @@ class KeptParameters:
 
 @functools.cache
 def get_param_server_cache() -> KeptParameters:
-    """Return the cache of this process."""
+    """Return this process's parameter cache."""
     return KeptParameters()
 
 
 def _get(name: str) -> object:
-    """Return the parameter's value, or NOT_SET."""
+    """Return the value of the parameter ``name``, or NOT_SET."""
     try:
         return _ask("get", name, lambda: current_session().master.get_param(name))
     except ROSException as error:
@@ -211,7 +211,7 @@ def _ask(verb: str, name: str, call: Callable[[], _T]) -> _T:
 
 
 def as_xmlrpc_client(value: object) -> object:
-    """Return a value whose bytes and dates are wrapped in xmlrpc.client's classes, as Python's own client does."""
+    """Wrap bytes and dates in a value in xmlrpc.client's classes, as Python's own client does."""
     if isinstance(value, dict):
         return {key: as_xmlrpc_client(item) for key, item in value.items()}
     if isinstance(value, list):
@@ -226,7 +226,7 @@ def as_xmlrpc_client(value: object) -> object:
 
 
 def check_sendable(value: object) -> None:
-    """If XML-RPC has no type for a value, raise the same exception as rospy."""
+    """Raise the same exception as rospy if XML-RPC has no type for a value."""
     if value is None:
         raise TypeError("cannot marshal None unless allow_none is enabled")
 

@@ -49,7 +49,7 @@ class SubscribeListener:
     def peer_subscribe(
         self, topic_name: str, topic_publish: Callable[..., None], peer_publish: Callable[..., None]
     ) -> None:
-        """Handle a new subscriber: ``topic_publish`` publishes to all subscribers, ``peer_publish`` to the new one only."""
+        """Handle a new subscriber. ``topic_publish`` publishes to all subscribers, ``peer_publish`` only to the new one."""
 
     def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
         """Handle the disconnection of a subscriber; ``num_peers`` remain."""
@@ -122,7 +122,7 @@ class Publisher(Topic[_M_co]):
                 state.publish(args_kwds_to_message(self.data_class, args, kwds))
 
     def wait_for_subscribers(self, count: int = 1, timeout: float | None = None) -> bool:
-        """Wait until ``count`` subscribers are connected; return False if that takes longer than ``timeout`` seconds.
+        """Wait until ``count`` subscribers are connected. Return False if that takes longer than ``timeout`` seconds.
 
         Messages published before a subscriber has connected do not reach it, unless the topic is latched.
         Raise ROSException before init_node and after unregister, ROSInterruptException if the node shuts down.
@@ -133,7 +133,7 @@ class Publisher(Topic[_M_co]):
 
 
 class PublishedTopic(SharedTopic):
-    """A topic published by this process; its Publishers share this object."""
+    """A topic published by this process. Its Publishers share this object."""
 
     def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:
         # Imported here, because the module imports asyncio.
@@ -208,12 +208,12 @@ class PublishedTopic(SharedTopic):
 
     @property
     def title(self) -> str:
-        """The name of the topic's publisher in error messages."""
+        """The name that error messages use for the topic's publisher."""
         return f"the publisher of {self.resolved_name}"
 
     @property
     def queue_size(self) -> int | None:
-        """The queue_size passed to the last Publisher; None if publish() waits until messages are written to the sockets."""
+        """The queue_size passed to the last Publisher. None if publish() waits until messages are written to the sockets."""
         return self.publication.queue_size
 
     @property
@@ -235,7 +235,7 @@ class PublishedTopic(SharedTopic):
         self.is_latch = True
 
     def add_subscriber_listener(self, l: SubscribeListener) -> None:  # noqa: E741 - as rospy calls it
-        """From now on notify ``l`` when subscribers connect and disconnect. If it is not a listener, warn and ignore it."""
+        """From now on, notify ``l`` when subscribers connect and disconnect. If ``l`` is not a listener, warn and ignore it."""
         if _is_listener(l):
             self.subscriber_listeners.append(l)
         else:
@@ -344,7 +344,7 @@ class PublishedTopic(SharedTopic):
         return pieces.frame()
 
     def _refused(self, message: Message, error: SerializationError) -> ROSSerializationException:
-        """Return the error for a message that does not match its type: rospy's error message, followed by the topic."""
+        """Return the error for a message that does not match its type: rospy's error message and the topic."""
         where = f"topic {self.resolved_name}, type {message._type}"
         return ROSSerializationException(f"{error}\n({where})")
 
@@ -377,19 +377,19 @@ class PublishedTopic(SharedTopic):
 
 
 def _notify(listener: SubscribeListener, event: str, *args: object) -> None:
-    """Call a listener's method for an event; a listener that lacks the method ignores the event."""
+    """Call a listener's method for an event. If the listener lacks the method, ignore the event."""
     method = getattr(listener, event, None)
     if method is not None:
         method(*args)
 
 
 def _is_listener(value: object) -> bool:
-    """Return whether an object has a SubscribeListener method; programs need not derive from the class."""
+    """Return whether an object has a SubscribeListener method. Programs need not derive from the class."""
     return any(hasattr(value, name) for name in ("peer_subscribe", "peer_unsubscribe"))
 
 
 def _not_a_listener(value: object) -> str:
-    """Return the warning about an argument that is not a listener; with it, rospy would reject every subscriber."""
+    """Return the warning about an argument that is not a listener. Given that argument, rospy would reject every subscriber."""
     text = f"subscriber_listener {value!r} is ignored: it has no method peer_subscribe or peer_unsubscribe."
     if isinstance(value, int):
         return f"{text} The third argument of Publisher is not the queue size: write queue_size={value!r}"
@@ -397,7 +397,7 @@ def _not_a_listener(value: object) -> str:
 
 
 def _checked_size(queue_size: int | None) -> int | None:
-    """Return a Publisher's queue_size; as in rospy, a negative one means unlimited.
+    """Check a Publisher's queue_size and return it. As in rospy, a negative size means unlimited.
 
     Raise ValueError if it is neither an integer nor None.
     """

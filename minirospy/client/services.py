@@ -88,7 +88,7 @@ class Service(Generic[_S_co]):
         self.handler = handler
         self.error_handler = error_handler or self._log_error
         self._takes_memoryview = getattr(self.request_class, "_takes_memoryview", False)
-        self.seq = 0  # the number of responses, which is the seq of responses whose first field is a header
+        self.seq = 0  # the number of responses, used as seq in responses that start with a header
         self._server: ServiceServer | None = None
         self._ended = SignalSafeEvent()
 
@@ -253,7 +253,7 @@ class ServiceProxy(Generic[_S_co]):
         self._takes_memoryview = getattr(self.response_class, "_takes_memoryview", False)
         self._client: ServiceClient | None = None
         self._client_session: Session | None = None
-        # Number of calls that reached the service, which is the seq of requests whose first field is a header.
+        # Number of calls that reached the service, used as seq in requests that start with a header.
         self._calls = 0
         self._transport: TCPROSTransport | None = (
             None  # a connection set by the program, or one that the program requested
@@ -294,7 +294,7 @@ class ServiceProxy(Generic[_S_co]):
 
     @property
     def protocol(self) -> TCPROSServiceClient:
-        """The connection header's fields and the class of the responses, for programs that create a TCPROSTransport."""
+        """The fields of the connection header, and the response class, for programs that create a TCPROSTransport."""
         if self._protocol is None:
             from minirospy.client.tcpros import TCPROSServiceClient
 
@@ -324,7 +324,7 @@ class ServiceProxy(Generic[_S_co]):
         self._transport, self._transport_is_own = transport, False
 
     def _get_service_uri(self, request: object) -> str:
-        """Return the service's URI; ``request`` has no effect here. Raise ServiceException if the service is not registered."""
+        """Return the service's URI. ``request`` has no effect here. Raise ServiceException if the service is not registered."""
         return self._find_uri()
 
     def wait_for_service(self, timeout: float | None = None) -> None:
@@ -332,7 +332,7 @@ class ServiceProxy(Generic[_S_co]):
         wait_for_service(self.resolved_name, timeout)
 
     def close(self) -> None:
-        """Close a persistent connection; if another thread is calling through it, that call fails."""
+        """Close a persistent connection. If another thread is calling through it, that call fails."""
         client = self._client
         if client and self._lock.locked():
             # Shut the socket down instead of closing it, because closing would not wake a thread that is reading from
@@ -400,7 +400,7 @@ class ServiceProxy(Generic[_S_co]):
         return buffer.getvalue()
 
     def _connect(self, request: bytes) -> ServiceClient:
-        """Return a connection for sending ``request``; the request may already have been sent on it."""
+        """Return a connection for sending ``request``. The request may already have been sent on it."""
         ahead = self._connect_ahead()
         try:
             return self._connect_by_master(ahead, request)
@@ -409,7 +409,7 @@ class ServiceProxy(Generic[_S_co]):
                 ahead.close()
 
     def _connect_ahead(self) -> ServiceClient | None:
-        """Return a connection to the service's last known address, opened while the master is queried for the current one.
+        """Connect to the service's last known address while the master is queried for the current one.
 
         Do this only for addresses on this machine, because connecting to other hosts may take long.
         """

@@ -1,4 +1,4 @@
-"""The process's single node: the state that rospy's functions share, in an object that is replaced and never reset.
+"""The process's single node: the state shared by rospy's functions. The object is replaced, never reset.
 
 Publishers, services, time and log register with the session; this module imports none of them.
 """
@@ -43,7 +43,7 @@ class Session:
     """The process's node before, during and after its lifetime: its name, lifecycle, clock, tables and event loop."""
 
     def __init__(self, previous: Session | None = None, *, is_fork: bool = False) -> None:
-        """Replace the session ``previous``; the previous name, clock and listeners remain in use until init_node is called."""
+        """Replace the session ``previous``. Its name, clock and listeners remain in use until init_node is called."""
         self.is_fork = is_fork
         self.is_abandoned = False  # True if this process is a fork, and the session belongs to its parent
         self._forked_from = previous.name if previous and is_fork else ""
@@ -68,9 +68,9 @@ class Session:
         self.parameter_listeners: list[Callable[[str, object], object]] = (
             previous.parameter_listeners if previous else []
         )
-        """Called with the name and the value of each parameter that the master reports as changed."""
+        """Functions to call with the name and value of each parameter that the master reports as changed."""
         self.on_replaced: list[Callable[[], object]] = previous.on_replaced if previous else []
-        """Called by the next init_node; each function removes something that this session installed in the process."""
+        """Functions to call in the next init_node; each one removes something that this session installed in the process."""
         # The arguments of init_node; None before it is called
         self.init_arguments: tuple[object, ...] | None = None
         self.node: Node | None = None  # set when init_node is done
@@ -89,7 +89,7 @@ class Session:
         return self.identity.name
 
     def resolve(self, name: str, caller_id: str | None = None) -> str:
-        """Return the global name of ``name``, resolved relative to this node or the node ``caller_id``."""
+        """Return ``name`` as a global name, resolved relative to this node or the node ``caller_id``."""
         return self.identity.resolve(name, caller_id)
 
     @property
@@ -137,7 +137,7 @@ class Session:
             function()
 
     def when_ready(self, function: Callable[[], object], handle: str = "") -> None:
-        """Call ``function`` now, or in init_node if that has not been called yet.
+        """Call ``function`` now, or from init_node if that has not been called yet.
 
         ``handle`` is the name of the handle that ``function`` registers, for :meth:`report_fork`.
         """
@@ -156,14 +156,14 @@ class Session:
         return self.is_fork and self.node is None and not self.is_shutdown()
 
     def why_fork_has_no_effect(self, handle: str) -> str:
-        """Return the error message for using a handle in a forked process, where it has no effect."""
+        """Return the error message for using a handle that has no effect, because this process is a fork."""
         return (
             f"{handle} has no effect in this process, which is a fork of node [{self._forked_from}]: call "
             "rospy.init_node() in the child process, and create it after that"
         )
 
     def report_fork(self, handle: str) -> None:
-        """Log, once per handle, that it has no effect in this fork of a node."""
+        """Log, once per handle, that the handle has no effect in this fork of a node."""
         if handle not in self._reported:
             self._reported.add(handle)
             logging.getLogger("rosout").error("%s", self.why_fork_has_no_effect(handle))
@@ -175,7 +175,7 @@ class Session:
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[], _T]:
         """Start ``coroutine`` on the node's loop; return a function that waits for its result.
 
-        Calls start their coroutines one at a time, in order.
+        Coroutines are started one at a time, in the order of the calls.
 
         Raise ROSInterruptException if the node shuts down first.
         """
@@ -262,7 +262,7 @@ class Session:
     # --- helpers
 
     def _leave(self) -> None:
-        """Leave the graph. Waits for the master's responses; Node.close() sets the time limits."""
+        """Leave the graph. Waits for the master's responses, within Node.close()'s time limits."""
         if self._opened and self._loop:
             try:
                 # After a signal the watchdog prints the reason for waiting.
@@ -327,7 +327,7 @@ def current_session() -> Session:
 
 
 def replace_session() -> None:
-    """Let init_node create another node if the current node has left the graph. No effect before that, or after a signal.
+    """Let init_node create another node if the current one has left the graph. Otherwise, or after a signal, do nothing.
 
     Objects that the program created for the old node, such as publishers, remain attached to it.
     """

@@ -1,4 +1,4 @@
-"""The shutdown of a process that is a node, as a state machine; docs/shutdown.md contains the diagram.
+"""The shutdown of a node's process, as a state machine. docs/shutdown.md has the diagram.
 
 The machine's inputs are events: a signal, a phase that the node has entered, a clock tick. Its outputs are actions. This
 module uses no threads, signals or clocks: :mod:`minirospy.client.signals` performs the actions.
@@ -21,7 +21,7 @@ _REQUEST_GRACE_OF_POLLS_SECONDS = 5.0
 
 
 class Phase(enum.IntEnum):
-    """The phase of the shutdown."""
+    """The phase that the shutdown has reached."""
 
     RUNNING = 0
     HOOKS = 1  # is_shutdown() still returns False
@@ -42,7 +42,7 @@ class Action(enum.Enum):
 
 
 class Awareness(enum.IntEnum):
-    """The extent to which a thread in the program has been notified of the shutdown."""
+    """How far a thread in the program has been notified of the shutdown."""
 
     NONE = 0  # the thread has never called is_shutdown()
     POLLS = 1
@@ -51,7 +51,7 @@ class Awareness(enum.IntEnum):
 
 
 class ThreadState:
-    """The shutdown state as one thread in the program sees it."""
+    """The shutdown state of one thread in the program."""
 
     __slots__ = ("awareness",)
 
@@ -79,7 +79,7 @@ class ShutdownMachine:
         self._done: set[Action] = set()
 
     def signal(self, now: float) -> list[Action]:
-        """Count a signal from the user and return the resulting actions, except for the shutdown itself."""
+        """Count a user signal and return the resulting actions, except for the shutdown itself."""
         self.signals += 1
         if self.signals == 1:
             self._signalled = now
@@ -130,7 +130,7 @@ class ShutdownMachine:
 
     @property
     def _grace(self) -> float:
-        """Return the seconds for which the main thread may run until it is interrupted."""
+        """Return for how many seconds the main thread may run before it is interrupted."""
         if self.main.awareness > Awareness.NONE:
             return _REQUEST_GRACE_OF_POLLS_SECONDS
         return _GRACE_SECONDS if self.signals else _REQUEST_GRACE_SECONDS

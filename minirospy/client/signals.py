@@ -1,4 +1,4 @@
-"""Let SIGINT, SIGTERM, SIGHUP and Windows' SIGBREAK shut the node down, as `minirospy.client.shutdown` decides.
+"""Let SIGINT, SIGTERM, SIGHUP and Windows' SIGBREAK shut the node down, by the rules in `minirospy.client.shutdown`.
 
 The handler runs in the main thread and only marks a signal as pending. A watchdog thread reads the signals from a
 file descriptor, even while the main thread is in C code, feeds the state machine and performs its actions.
@@ -63,11 +63,11 @@ class SignalWatchdog:
 
     @property
     def is_installed(self) -> bool:
-        """Return whether the signals shut the node down."""
+        """Return whether the watchdog handles the signals."""
         return self._sending is not None
 
     def install(self) -> None:
-        """Let the signals shut the node down. Has no effect outside of the main thread, which alone can install handlers."""
+        """Let the signals shut the node down. No effect outside of the main thread, because only that can install handlers."""
         if threading.current_thread() is not threading.main_thread():
             return
 
@@ -102,7 +102,7 @@ class SignalWatchdog:
             self._sending = None
 
     def flush_at_exit(self) -> None:
-        """Flush the program's output while the node still handles Ctrl-C; after this, the system handles a third Ctrl-C."""
+        """Flush the program's output while the node still handles Ctrl-C. After this, the system handles a third Ctrl-C."""
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stdout.flush()
         if self._machine.signals > 1:
@@ -111,7 +111,7 @@ class SignalWatchdog:
                     signal.signal(number, signal.SIG_DFL)
 
     def interrupt_later(self) -> None:
-        """Interrupt a main thread that does not exit by itself after another process has shut the node down.
+        """Interrupt the main thread if it does not exit by itself after another process has shut the node down.
 
         Has no effect if the program handles the signals itself.
         """
@@ -186,7 +186,7 @@ class SignalWatchdog:
         return number in self._previous and signal.getsignal(number) == self.on_signal
 
     def _new_signals(self) -> int:
-        """Return the number of signals from the user that the machine has not counted yet.
+        """Return the number of user signals that the state machine has not counted yet.
 
         If an event loop has replaced the file descriptor, only the handler reports signals.
         """

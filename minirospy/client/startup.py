@@ -191,7 +191,7 @@ def _wait_for_master(session: Session) -> None:
             if wait_for_event(session.lifecycle.shutting_down, _POLL_SECONDS):
                 break
         except RpcFault:
-            return  # the master does not support this call; @foxglove/ros1's master is an example
+            return  # some masters, such as @foxglove/ros1's, do not support this call
         except RpcError as error:
             raise ROSInitException(f"what answers at {uri} is not a ROS master: {error}") from error
         else:

@@ -1,4 +1,4 @@
-"""Topic statistics: the messages received on a topic, counted by publisher, and published on /statistics.
+"""Topic statistics: counts of the messages received from each publisher of a topic, published on /statistics.
 
 Enabled if the parameter /enable_statistics is set when a topic is subscribed to.
 Source: http://wiki.ros.org/Topics#Topic_statistics, http://wiki.ros.org/rospy/Overview/Topics%20statistics.
@@ -56,7 +56,7 @@ class Spread(NamedTuple):
 
     @classmethod
     def of(cls, values: list[float]) -> Spread:
-        """Return the mean, standard deviation and maximum of ``values``; zeros if there are none."""
+        """Return the mean, standard deviation and maximum of ``values``, or zeros if there are no values."""
         if not values:
             return cls()
         mean = math.fsum(values) / len(values)
@@ -64,7 +64,7 @@ class Spread(NamedTuple):
 
 
 class Report(NamedTuple):
-    """The measurements for one publisher in one window.
+    """One window's measurements for one publisher.
 
     Times are in nanoseconds, ``Spread`` values in seconds, ``traffic`` in bytes.
     """
@@ -103,7 +103,7 @@ class TopicStatisticsCounter:
         self._windows: dict[str, _Window] = {}
 
     def count(self, message: Message, header: Header, size: int, now: int) -> Report | None:
-        """Count one message of ``size`` bytes that arrived at ``now`` (ns); return the report if this ends a window."""
+        """Count a message of ``size`` bytes that arrived at ``now`` (ns). If it ends a window, return the report."""
         publisher = header.get("callerid", "")
         window = self._windows.get(publisher)
         if window is None or now < window.start:

@@ -32,9 +32,10 @@ _log = logging.getLogger("rosout")
 _M = TypeVar("_M", bound=Message)
 _M_co = TypeVar("_M_co", bound=Message, covariant=True)
 _BUFF_SIZE = 65536
-_NEW_SECONDS = 2.0  # a program that ends sooner after its last Subscriber has not waited for messages
+# a program that ends sooner after creating its last Subscriber has not waited for messages
+_NEW_SECONDS = 2.0
 _WITHOUT_STATISTICS = frozenset({"/statistics", "/clock"})
-"""Topics that are not counted: the statistics themselves, and the clock that provides their times."""
+"""Topics that are not counted: /statistics itself, and /clock, which provides the times."""
 
 
 class Subscriber(Topic[_M_co]):
@@ -103,7 +104,7 @@ class Subscriber(Topic[_M_co]):
 
 
 def wait_for_message(topic: str, topic_type: type[_M], timeout: float | None = None) -> _M:
-    """Return the next message on ``topic``; ``timeout`` is in seconds, or a Duration.
+    """Return the next message on ``topic``. ``timeout`` is in seconds, or a Duration.
 
     Raise ROSException after ``timeout``, ROSInterruptException if the node shuts down.
     """
@@ -140,7 +141,7 @@ class _Callback(NamedTuple):
 
 
 class _Receiver(NamedTuple):
-    """A message class, its callbacks, and whether it can deserialize a memoryview (genpy's classes cannot)."""
+    """A message class, its callbacks, and whether the class can deserialize a memoryview (genpy's classes cannot)."""
 
     data_class: type[Message]
     takes_memoryview: bool
@@ -148,7 +149,7 @@ class _Receiver(NamedTuple):
 
 
 class SubscribedTopic(SharedTopic):
-    """A topic that this process subscribes to; its Subscribers share this object."""
+    """A topic that this process subscribes to. Its Subscribers share this object."""
 
     def __init__(self, session: Session, topic: str, data_class: type[Message]) -> None:
         super().__init__(session, topic, data_class)
@@ -162,7 +163,7 @@ class SubscribedTopic(SharedTopic):
         self._statistics: StatisticsPublisher | None = None
         self._misfits = RateLimitedLogger(_log)
         self._registered = False
-        self._since = time.monotonic()  # when the last Subscriber was created
+        self._since = time.monotonic()  # when the latest Subscriber was created
 
     @property
     def has_callback(self) -> bool:
@@ -171,7 +172,7 @@ class SubscribedTopic(SharedTopic):
 
     @property
     def is_new(self) -> bool:
-        """Return whether no message has arrived, and the last Subscriber was created just before."""
+        """Return whether the latest Subscriber was created a moment ago and no message has arrived since."""
         has_received = any(link.received for link in self.links)
         return not has_received and time.monotonic() - self._since < _NEW_SECONDS
 
@@ -243,7 +244,7 @@ class SubscribedTopic(SharedTopic):
         self.replay(self.data_class, callback, links)
 
     def remove_callback(self, cb: Callable[..., object], cb_args: object) -> None:
-        """Remove a callback that add_callback or a Subscriber has added. Raise KeyError if it is not registered."""
+        """Remove a callback that was added by add_callback or a Subscriber. Raise KeyError if it is not registered."""
         with self._session.lock:
             if (callback := _Callback(cb, cb_args)) in self._added:
                 self._added.remove(callback)
@@ -286,7 +287,7 @@ class SubscribedTopic(SharedTopic):
             register_with_master("subscription", self.resolved_name, wait)
 
     def _newest(self) -> int:
-        """Return the number of messages to keep, as required by the Subscriber with the largest queue_size."""
+        """Return the number of messages to keep, which the Subscriber with the largest queue_size determines."""
         sizes = [handle._newest for handle in self._handles]
         return 0 if 0 in sizes else max(sizes, default=0)
 

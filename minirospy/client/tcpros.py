@@ -51,7 +51,10 @@ _numbers = itertools.count(1)
 
 
 def recv_buff(sock: socket.socket, b: BytesIO, buff_size: int) -> int:
-    """Append received bytes to ``b``; return their number. Raise TransportTerminated if the peer has closed the connection."""
+    """Append received bytes to ``b``; return the number of bytes.
+
+    Raise TransportTerminated if the peer has closed the connection.
+    """
     data = sock.recv(buff_size)
     if not data:
         raise TransportTerminated("unable to receive data from sender, check sender's logs for details")
@@ -60,7 +63,7 @@ def recv_buff(sock: socket.socket, b: BytesIO, buff_size: int) -> int:
 
 
 class TCPROSTransportProtocol:
-    """The data that a connection transfers: the fields of its header, and the class of the received messages."""
+    """The data transferred on a connection: its header's fields, and the class of the received messages."""
 
     def __init__(
         self,
@@ -168,7 +171,7 @@ class Transport:
         return None
 
     def set_cleanup_callback(self, cleanup_callback: Callable[[Any], object]) -> None:
-        """Call a function with this object when the connection is closed."""
+        """Register a function that is called with this object when the connection is closed."""
         self.cleanup_cb = cleanup_callback
 
     def close(self) -> None:
@@ -223,7 +226,7 @@ class ProtocolHandler:
         return []
 
     def init_publisher(self, topic: str, protocol: list[Any]) -> Any:
-        """Accept connections of subscribers; a subclass overrides this."""
+        """Accept connections from subscribers; a subclass overrides this."""
         raise Exception("interface impl")
 
 
@@ -311,7 +314,7 @@ class TCPROSTransport(Transport):
             raise TransportInitError(str(error)) from error
 
     def write_header(self) -> None:
-        """Send the connection header."""
+        """Send this side's connection header."""
         data = serialize_header(self.protocol.get_header_fields())
         self._open_socket().sendall(data)
         self.stat_bytes += len(data)

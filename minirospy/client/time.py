@@ -43,7 +43,7 @@ class ROSTimeMovedBackwardsException(errors.ROSTimeMovedBackwardsException, ROSI
 
 
 class Duration(times.Duration):
-    """A time span with the fields ``secs`` and ``nsecs``; may be negative."""
+    """A time span with the fields ``secs`` and ``nsecs``. It may be negative."""
 
     # Use rospy's module name, so that programs that use real rospy can load pickles from this one, and vice versa.
     __module__ = "rospy.rostime"
@@ -107,7 +107,7 @@ def sleep(duration: float | times.Duration) -> None:
 
 
 class Rate:
-    """Runs a loop at ``hz`` iterations per second: ``sleep()`` subtracts the time that the loop's own work took.
+    """Runs a loop at ``hz`` iterations per second. ``sleep()`` subtracts the time that the loop's own work took.
 
     ``last_time`` is the start of the current period, ``sleep_dur`` its length; a program may change either.
     """
@@ -160,7 +160,7 @@ class Rate:
 
 
 class TimerEvent:
-    """The argument for a Timer's callback: expected and actual times of this call and the previous one.
+    """The argument of a Timer's callback: the expected and actual times of this call and the previous one.
 
     ``last_duration`` is in seconds; in the first call the fields for the previous call are None.
     """

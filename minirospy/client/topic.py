@@ -54,7 +54,7 @@ class AnyMsg(Message):
 class Topic(Generic[_M_co]):
     """The common part of Publisher and Subscriber: ``name`` (as resolved), ``type``, ``md5sum``, ``data_class``.
 
-    ``impl`` is shared by all handles of the topic in this process, and None once unregistered.
+    ``impl`` is shared by all of the topic's handles in this process. It is None once unregistered.
     """
 
     impl: SharedTopic | None
@@ -94,7 +94,7 @@ class Topic(Generic[_M_co]):
 
 
 class SharedTopic:
-    """The object that the handles of one topic in this process share: rospy's ``impl``, which user code reads."""
+    """The object shared by one topic's handles in this process: rospy's ``impl``, which user code reads."""
 
     _handles: Collection[Topic[Any]]
 
@@ -106,7 +106,7 @@ class SharedTopic:
 
     @property
     def ref_count(self) -> int:
-        """The number of handles."""
+        """The number of handles that share this object."""
         return len(self._handles)
 
     @property
@@ -136,16 +136,16 @@ class SharedTopic:
         raise NotImplementedError
 
     def has_connections(self) -> bool:
-        """Return whether there is a link."""
+        """Return whether there are any links."""
         return bool(self.get_num_connections())
 
     def has_connection(self, endpoint_id: str) -> bool:
-        """Return whether there is a link to a node: ``endpoint_id`` is a subscriber's name, or a publisher's URI."""
+        """Return whether there is a link to a node. ``endpoint_id`` is a subscriber's name, or a publisher's URI."""
         raise NotImplementedError
 
 
 def register_with_master(what: str, topic: str, wait: Callable[[], object]) -> None:
-    """Wait for a registration to finish; as in rospy, only log it if the master refuses."""
+    """Wait for a registration to finish. If the master refuses it, only log that, as rospy does."""
     try:
         wait()
     except MasterUnreachableError as error:

@@ -38,7 +38,8 @@ def check(source: str, target: str, *, compression: str, force: bool) -> None:
 def convert(source: str, target: str, *, compression: str, force: bool, step: Callable[[int], object]) -> int:
     """Write a bag's or MCAP file's messages to ``target``, an MCAP file if its name ends in .mcap.
 
-    Return the number of messages. ``step`` is called with the bytes of messages processed so far. ``force``: overwrite an
+    Return the number of messages. ``step`` is called with the number of message bytes processed so far. ``force``:
+    overwrite an
     existing file. An incomplete file is removed. Raise UsageError if ``target`` exists, BagError if the source is
     invalid, or OSError if a file cannot be read or written.
     """

@@ -49,7 +49,7 @@ __all__ = [
 ]
 
 Progress = Callable[[int], object]
-"""Called repeatedly with the number of bytes processed so far."""
+"""A function that is called repeatedly with the number of bytes processed so far."""
 
 _WHOLE_NAMESPACE = {"eval", "exec", "locals", "vars", "globals", "dir"}
 
@@ -74,7 +74,7 @@ def is_mcap(path: str) -> bool:
 
 
 def data_size(reader: BagReader) -> int:
-    """Return the total decompressed size of all chunks in bytes, or the file's size if the bag has no chunks."""
+    """Return the total decompressed size of all chunks, in bytes, or the file's size if the bag has no chunks."""
     headers = reader.chunk_headers().values()
     return sum(each.chunk.size for each in headers) or reader.size()
 
@@ -131,7 +131,7 @@ def copy_bag(
     compression: str = compressions.NONE,
     progress: Progress = lambda done: None,
 ) -> None:
-    """Copy a bag in time order, with each connection replaced by ``change(connection)``.
+    """Copy a bag in time order, replacing each connection with ``change(connection)``.
 
     Raise BagError if the bag is invalid, OSError if a file operation fails.
     """
@@ -179,7 +179,7 @@ class Expression:
 
 
 class FilterResult(NamedTuple):
-    """The numbers of messages kept and read."""
+    """The number of messages kept, and the number read."""
 
     kept: int
     read: int
@@ -274,7 +274,7 @@ def convert12(source: str, target: str, progress: Progress) -> None:
 
 
 def check_bag_name(path: str) -> None:
-    """Raise UsageError if an output bag has an MCAP file's name extension."""
+    """Raise UsageError if an output bag's name has an MCAP file's extension."""
     if path.endswith(".mcap"):
         raise UsageError(
             f"{path} would be a bag: end its name with .bag; `rosbag convert` makes an MCAP file of that"
@@ -323,7 +323,7 @@ def _add(writer: BagWriter, connection: Connection) -> int:
 
 
 def class_of_connection(connection: Connection, warn: Callable[[str], object]) -> type[Message]:
-    """Return the message class for a connection, as :func:`class_of` does.
+    """Return the message class for a connection, using :func:`class_of`.
 
     Raise BagFormatError if its definition is invalid.
     """

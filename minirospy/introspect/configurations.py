@@ -29,7 +29,7 @@ def configuration_documents(text: str) -> list[object]:
 
 
 def parameter_values(text: str) -> dict[str, bool | int | float | str]:
-    """Return a file's values by name, without group states. Raise MinirospyError if the file is invalid."""
+    """Return a dict of a file's values, keyed by name, without group states. Raise MinirospyError if the file is invalid."""
     values: dict[str, bool | int | float | str] = {}
     for document in configuration_documents(text):
         if not isinstance(document, dict):

@@ -23,7 +23,7 @@ __all__ = ["Echo", "Filter", "elided", "fill_message"]
 
 
 class Filter:
-    """A Python expression over a message ``m`` and its ``topic``, as the user typed it."""
+    """A Python expression over a message ``m`` and its ``topic``, as typed by the user."""
 
     def __init__(self, expression: str) -> None:
         """Compile the expression. Raise UsageError if its syntax is invalid."""
@@ -118,7 +118,7 @@ class Echo:
         return header + row + "\n"
 
     def _is_shown_whole(self, value: object) -> bool:
-        """Return whether to print a value unchanged.
+        """Return whether to print a value whole, without eliding any part.
 
         This applies to a field of a bag's message that is not itself a message, because ROS does not look up its type.
         """
@@ -140,7 +140,7 @@ class Echo:
 
 
 def fill_message(cls: type[Message], values: Sequence[object], nanoseconds: int | None = None) -> Message:
-    """Return a message filled from YAML values.
+    """Create a message and fill it from YAML values.
 
     ``now`` represents ``nanoseconds`` (or the current time), ``auto`` a stamped header. Raise MessageException, with the
     names of the fields, if the values do not match the fields.

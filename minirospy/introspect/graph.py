@@ -1,4 +1,4 @@
-"""The graph that queries are about: a master, and name resolution for the caller."""
+"""The graph to query: a master, and name resolution for the caller."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _MAX_NAME_LENGTH = 4096  # maximum characters in a name; the master refuses long
 
 
 class NodeAddress(NamedTuple):
-    """A node's name and the URI of its Slave API; the URI is None if the master does not know the node."""
+    """A node's name and its Slave API's URI. The URI is None if the master does not know the node."""
 
     name: str
     uri: str | None
 
 
 class Graph:
-    """A connection to a master, with ``tool`` as caller_id; names are resolved in ``namespace``, then remapped.
+    """A connection to a master, with ``tool`` as caller_id. Names are resolved in ``namespace``, then remapped.
 
     A context manager. Every call raises MasterUnreachableError if no master responds.
     """
@@ -131,11 +131,11 @@ def node_host(uri: str | None) -> str | None:
 
 
 def unknown_topic(graph: Graph, topic: str) -> NotFoundError:
-    """Return the error for a topic without publishers or subscribers, with similar names that exist."""
+    """Return the error for a topic without publishers or subscribers. It lists similar names that exist."""
     state = graph.state()
     return NotFoundError("topic", topic, [*state.publishers, *state.subscribers])
 
 
 def unknown_service(graph: Graph, service: str) -> NotFoundError:
-    """Return the error for a service that does not exist, with similar names that exist."""
+    """Return the error for a service that does not exist. It lists similar names that exist."""
     return NotFoundError("service", service, graph.state().services)

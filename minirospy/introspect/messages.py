@@ -89,7 +89,7 @@ class MessageClasses:
 
 
 def fill(message: _M, values: Sequence[object], keys: Mapping[str, object] | None = None) -> _M:
-    """Fill the fields of ``message`` from YAML values, either one dictionary or a value per field in order.
+    """Fill the fields of ``message`` from YAML values: a single dictionary, or one value per field in order.
 
     Return the message. ``keys`` maps words to the values that they represent, such as ``now`` to a time. Raise
     MessageException if the values do not match the fields.
@@ -130,7 +130,7 @@ def serialize(message: Message) -> bytes:
 
 
 def _does_not_fit(message: Message, error: Exception, values: Sequence[object] = ()) -> MessageException:
-    """Return a one-line error about the user's ``values``, with the fields of the message."""
+    """Return a one-line error that the user's ``values`` do not fit the message. It lists the message's fields."""
     fields = zip(message.__slots__, message._slot_types, strict=True)
     shown = ", ".join(f"{type_} {name}" for name, type_ in fields) or "no fields"
     why = " ".join(str(error).split())

@@ -31,7 +31,7 @@ _Found = TypeVar("_Found")
 
 
 class NodeQueries(Generic[_Key, _Found]):
-    """Queries nodes once per key, for example, a service's name together with its nodes. Runs on the loop.
+    """Queries nodes once per key; a key is, for example, a service's name and its nodes. Runs on the loop.
 
     Queries that fail are retried later, and do not delay others.
     """
@@ -43,7 +43,7 @@ class NodeQueries(Generic[_Key, _Found]):
         *,
         arrived_late: Callable[[], object] = lambda: None,
     ) -> None:
-        """``arrived_late`` is called when a response arrives after :meth:`look` has returned."""
+        """Create the queries. ``arrived_late`` is called when a response arrives after :meth:`look` has returned."""
         self.found: dict[_Key, _Found] = {}
         self._query = query
         self._reporter = reporter

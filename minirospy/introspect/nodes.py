@@ -56,7 +56,7 @@ SHUTDOWN_SECONDS = 10.0
 
 
 class TypedName(NamedTuple):
-    """A topic and its type."""
+    """A topic's name and type."""
 
     name: str
     type: str
@@ -97,7 +97,7 @@ def list_nodes(graph: Graph, namespace: str = "/") -> list[str]:
 
 
 def node_hosts(graph: Graph) -> dict[str, str]:
-    """Return the host name or address of each node whose address the master knows."""
+    """Return a dict from node to host name or address, for nodes whose address the master knows."""
     hosts = {node.name: node_host(node.uri) for node in graph.addresses(list_nodes(graph))}
     return {node: host for node, host in hosts.items() if host}
 
@@ -112,7 +112,7 @@ def nodes_on(graph: Graph, machine: str) -> list[str]:
 
 
 def neighbours(state: SystemState) -> dict[str, Neighbours]:
-    """Return the neighbours of each node that publishes or subscribes, sorted by node name."""
+    """Return a dict from node to neighbours, sorted by name, for the nodes that publish or subscribe."""
     senders: dict[str, set[str]] = {}
     receivers: dict[str, set[str]] = {}
     for topic in {*state.publishers, *state.subscribers}:
@@ -160,7 +160,7 @@ def node_connections(graph: Graph, node: NodeAddress) -> Connections:
 
 
 def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
-    """Return how long a call to a node takes, in seconds. Raise NodeUnreachableError if the call fails."""
+    """Call a node and return the round-trip time in seconds. Raise NodeUnreachableError if the call fails."""
     with _named(node), contextlib.closing(_slave(graph, node, timeout)) as slave:
         start = time.perf_counter()
         slave.get_pid()
@@ -168,7 +168,7 @@ def ping_node(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> float:
 
 
 def kill_node(graph: Graph, node: NodeAddress, reason: str = "user request") -> None:
-    """Request a node to shut down; do nothing if it has already exited.
+    """Ask a node to shut down; do nothing if it has already exited.
 
     Raise NodeUnreachableError if the node does not respond in time.
     """
@@ -237,7 +237,7 @@ def forget_node(graph: Graph, node: NodeAddress, state: SystemState | None = Non
 
 
 def has_exited(graph: Graph, node: NodeAddress, timeout: float = 3.0) -> bool:
-    """Return whether no process listens at a node's address, or the process there is not the node.
+    """Return whether nothing listens at a node's address, or another process does.
 
     Return False for a node that does not respond in time, because it may be alive.
     """

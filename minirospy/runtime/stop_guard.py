@@ -17,7 +17,7 @@ __all__ = ["StopGuard"]
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
-"""Stops an actuator; called in the guard's thread. The function must check whether a command has arrived in the meantime."""
+"""A function that stops an actuator. It is called in the guard's thread, and must check whether a command has arrived since."""
 
 
 class StopGuard:
@@ -33,7 +33,7 @@ class StopGuard:
         # The deadline for which the thread is waiting.
 
     def arm(self, stop: Stop, deadline: float) -> None:
-        """Call ``stop`` at ``deadline``, in seconds of the clock; this replaces the previous deadline of ``stop``.
+        """Call ``stop`` at ``deadline``, in seconds of the clock. This replaces the previous deadline of ``stop``.
 
         Raise BridgeError if the thread cannot be started.
         """
@@ -66,7 +66,7 @@ class StopGuard:
                     _log.exception("what is driven could not be stopped")
 
     def _wait(self) -> list[Stop]:
-        """Wait until deadlines have passed, and return their functions; return [] if there are no deadlines."""
+        """Wait until deadlines have passed; return their functions, or [] if there are no deadlines."""
         with self._changed:
             while self.deadlines:
                 now = self._clock()

@@ -45,7 +45,7 @@ _QUERY_SECONDS = 2.0
 
 @dataclass(frozen=True)
 class Filters:
-    """The filters for the names that clients may use."""
+    """The filters for topic, service and parameter names that clients may use."""
 
     topics: NameFilter = field(default_factory=NameFilter)
     publishable: NameFilter = field(default_factory=NameFilter)
@@ -82,7 +82,7 @@ class SharedTopic:
 
     @property
     def headers(self) -> list[Header]:
-        """Return the connection headers of the connected publishers."""
+        """Return the connection headers of the publishers that are connected."""
         return self._subscription.headers if self._subscription else []
 
     @property
@@ -141,11 +141,11 @@ class Publication:
 
     @property
     def has_joined(self) -> bool:
-        """Return whether all subscribers that the master knew when the topic was advertised are connected."""
+        """Return whether the subscribers that the master listed when the topic was advertised are all connected."""
         return self._shared is None or self._shared.joining is None or self._shared.joining.done()
 
     async def joined(self) -> None:
-        """Wait until the subscribers that the master listed at the advertisement are connected, for at most a second.
+        """Wait, for at most a second, until the subscribers that the master listed when the topic was advertised are connected.
 
         Subscribers do not receive messages published before they connect.
         """
@@ -327,7 +327,7 @@ class SharedGraph:
         return self._service_types.found.get((service, self.snapshot.services.get(service, ())))
 
     async def _look_up_services(self, found: Snapshot) -> None:
-        """Query the nodes of new services for the services' types, which the master does not know."""
+        """Query the nodes of new services for the services' types, because the master does not store them."""
         wanted = {key: None for key in found.services.items() if self.filters.services(key[0])}
         await self._service_types.look(wanted, _QUERY_SECONDS)
 

@@ -52,7 +52,7 @@ _CONTINUATIONS = bytes(range(0x80, 0xC0))
 
 
 def size_in_memory(data: bytes | bytearray) -> int:
-    """Return the number of bytes in memory of the str decoded from UTF-8 data.
+    """Return the memory, in bytes, of the str that UTF-8 data decodes to.
 
     If one character is wide, every character takes two or four bytes.
     """
@@ -65,13 +65,13 @@ def size_in_memory(data: bytes | bytearray) -> int:
 
 
 def width_of(text: str) -> int:
-    """Return the bytes per character of a str in memory: 1, 2 or 4."""
+    """Return the number of bytes per character that a str uses in memory: 1, 2 or 4."""
     if text.isascii():
         return 1
     if len(text) == 1:
         # Do not use the size of a single-character string, because Python 3.12 and later also store its UTF-8 copy.
         return 1 if ord(text) <= 0xFF else 2 if ord(text) <= 0xFFFF else 4
-    # In longer strings, such a UTF-8 copy can only make this value too large.
+    # For longer strings, such a UTF-8 copy can only make this value too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
     return found if found <= 2 else 4
 
@@ -105,7 +105,7 @@ def load_json_in_pieces(text: str) -> object:
 
 
 def _check_counts(text: str, max_values: int, max_collections: int) -> None:
-    """Raise ValueError if JSON text has too many values; brackets and commas inside strings are counted as well."""
+    """Raise ValueError if JSON text has too many values. Brackets and commas inside strings count, too."""
     for marks, most in ((",", max_values), ("[{", max_collections)):
         if len(text) > most and sum(map(text.count, marks)) > most:
             raise ValueError(f"more than {most} values")
@@ -114,7 +114,7 @@ def _check_counts(text: str, max_values: int, max_collections: int) -> None:
 
 
 class _PiecewiseDecoder(json.JSONDecoder):
-    """The library's pure-Python decoder, which lets other threads run, but which uses the C parser for long arrays of numbers."""
+    """The standard library's pure-Python decoder, except that long arrays of numbers use the C parser. Lets other threads run."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -123,7 +123,7 @@ class _PiecewiseDecoder(json.JSONDecoder):
 
 
 def _array(start: tuple[str, int], scan_once: Callable[[str, int], tuple[object, int]]) -> tuple[object, int]:
-    """Parse the array after its opening bracket; return it and the end index.
+    """Parse the array that follows an opening bracket; return the array and its end index.
 
     Raise JSONDecodeError or StopIteration if it is invalid.
     """
@@ -181,7 +181,7 @@ def dump_json(value: object) -> str:
 
 
 def dump_json_in_pieces(value: object) -> str:
-    """Return the same as :func:`dump_json`, without holding the GIL for long, for a thread alongside the event loop.
+    """Like :func:`dump_json`, but without holding the GIL for long. For use in a thread alongside the event loop.
 
     Dictionary keys must be strings.
     """
@@ -238,7 +238,7 @@ def _nested_elements(values: list[object]) -> Iterator[str]:
 
 
 def _size(value: object) -> int:
-    """Return how long a value takes to encode, where 1 is the time for a number. Stop counting early if it is large."""
+    """Return a value's encoding cost, where 1 is the time for a number. Stop counting early if the value is large."""
     if isinstance(value, str):
         return 1 + len(value) * _PIECE_VALUES // _PIECE_CHARACTERS
     if not isinstance(value, dict | list):

@@ -37,7 +37,7 @@ async def private_parameters(
 
 
 def value(private: Mapping[str, object], name: str, kind: type[_T], default: _T) -> _T:
-    """Return a parameter. Raise BridgeError if it has a different type."""
+    """Return a parameter of type ``kind``. Raise BridgeError if it has a different type."""
     found = private.get(name, default)
     if not isinstance(found, kind) or (kind is int and isinstance(found, bool)):
         raise BridgeError(f"parameter ~{name} is {found!r}: it has to be of type {kind.__name__}")

@@ -50,7 +50,7 @@ class PlayerPlayback:
         return answer
 
     def control(self, control: PlaybackControl) -> None:
-        """Execute a client's request."""
+        """Execute a client's playback request."""
         self._request_id, self._did_seek = control.request_id, control.seek is not None
         self._player.control(
             is_paused=control.command is PlaybackCommand.PAUSE,
@@ -60,7 +60,7 @@ class PlayerPlayback:
 
 
 class PlayerBridge:
-    """A bridge for a player, on a separate loop. A context manager. Raise BridgeError if the bridge cannot start."""
+    """Context manager that runs a player's bridge on a separate loop. Raise BridgeError if the bridge cannot start."""
 
     def __init__(self, player: Player, span: tuple[int, int], port: int) -> None:
         self._playback = PlayerPlayback(player, span)
@@ -101,7 +101,7 @@ class PlayerBridge:
         self._ticking = asyncio.ensure_future(keep_running(partial(self._tick, self._bridge), reporter))
 
     async def _tick(self, bridge: Bridge) -> None:
-        """Send the bag's time, and the player's state after each change by a client or a key."""
+        """Send the bag's time. Send the player's state after each change made by a client or a key."""
         shown: tuple[object, ...] = ()
         time = -1
         while True:

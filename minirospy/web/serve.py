@@ -33,7 +33,7 @@ __all__ = [
 
 
 _LARGE_BLOCK = 4 * 1024 * 1024
-"""Size in bytes from which freed blocks are returned to the system; larger than camera images, because mapping takes time."""
+"""Minimum size in bytes of freed blocks returned to the system. It exceeds camera images, because mapping memory takes time."""
 
 
 class Part(Protocol):
@@ -51,7 +51,7 @@ _SWITCH_SECONDS = 0.0005
 
 
 def prefer_the_loop() -> None:
-    """Reduce the delays that the garbage collector, and threads that process large messages, cause for the event loop.
+    """Reduce the event loop's delays caused by the garbage collector and by threads that process large messages.
 
     Call this after all imports: otherwise the collector visits the imported objects, which takes 15 ms each time a client
     sends thousands of arrays.
@@ -72,7 +72,7 @@ def require_libraries() -> None:
 
 
 def run_program(name: str, module: str) -> int:
-    """Run a node's program from ``module``, which imports the libraries; return its exit status, or 1 if a library is missing."""
+    """Run a node's program from ``module``, which imports the libraries. Return its exit status, 1 if a library is missing."""
 
     def body() -> int:
         require_libraries()
@@ -111,7 +111,7 @@ def run(
     registration_fault_lines: int = MAX_REGISTRATION_FAULTS,
     connect: Callable[[_P], Awaitable[None]] | None = None,
 ) -> int:
-    """Run a bridge on a node of this name until it is shut down; return the exit status.
+    """Run a bridge on a node called ``name`` until it is shut down; return the exit status.
 
     ``argv``: remappings, as a launch file passes them (None: the process's own arguments). ``start`` creates the bridge,
     ``on_started`` shows its addresses. Without ``imports_messages`` the node has neither /rosout nor simulated time, for

@@ -1,4 +1,4 @@
-"""The tokens of this user's bridges, in a file that only the user can read. The tokens stay the same across restarts."""
+"""The tokens of this user's bridges, in a file that only the user can read. They stay the same across restarts."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ class Workspace(NamedTuple):
 
     @classmethod
     def at(cls, root: Path) -> Workspace:
-        """Return the workspace in the folder ``root``, with the usual folder names."""
+        """Return the workspace rooted at ``root``, with the default folder layout."""
         return cls(root, *(root / name for name in ("src", "build", "devel", "install")))
 
 

@@ -26,7 +26,7 @@ _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
 """Optional packages that Python packages search for and that are reported as found."""
 _ROS_2 = re.compile(
     r"(ament|rcl|rosidl)"
-)  # packages of ROS 2, which a file for both ROS 1 and ROS 2 searches for
+)  # ROS 2 packages that a CMakeLists.txt for both ROS 1 and ROS 2 may look for
 _CHECKS = ("check_include_file", "check_include_files", "check_include_file_cxx")
 _FINDERS = ("find_package_handle_standard_args", "pkg_check_modules", "pkg_search_module")
 _MAX_LOOPS = 100_000  # maximum iterations of a foreach() with RANGE
@@ -263,7 +263,7 @@ class _Run:
         yield from ()
 
     def _call(self, name: str, arguments: list[str]) -> Iterator[Command]:
-        """Yield the commands of a function, which has a new scope, or of a macro, whose arguments are not variables."""
+        """Yield the commands of a function or macro. A function gets a new scope; a macro's arguments are not variables."""
         macro = self._macros[name]
         values = {
             **dict(zip(macro.parameters, arguments, strict=False)),

@@ -20,7 +20,7 @@ _SHEBANG = re.compile(rb"^#!\s*\S*/(?:env\s+)?python[\d.]*\s*$")
 
 
 def install(workspace: Workspace, plan: Plan) -> int:
-    """Copy the files that one package installs; return their number.
+    """Copy the files that a package installs; return the number of files copied.
 
     Raise BuildError if a folder exists where a file belongs.
     """

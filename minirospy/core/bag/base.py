@@ -18,7 +18,7 @@ Position = int | tuple[int, int]
 
 
 class StoredMessage(NamedTuple):
-    """A message: its connection, its receive time in nanoseconds, its bytes, and its location."""
+    """A stored message: connection, receive time in nanoseconds, bytes and location."""
 
     connection: Connection
     time: int
@@ -69,7 +69,7 @@ class BagReader(ABC):
     def messages(
         self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
     ) -> Iterator[StoredMessage]:
-        """Yield the messages on these connections (None: all) from ``start`` to ``end`` in nanoseconds, both included.
+        """Yield the messages on these connections (None: all) from ``start`` to ``end`` (nanoseconds, inclusive).
 
         The messages are in time order; messages with equal times are in the order of the connections. If the bag is
         damaged, raise BagFormatError after yielding the messages before the damage.

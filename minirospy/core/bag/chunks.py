@@ -64,7 +64,7 @@ class _Ahead:
         return self._future.result()
 
     def cancel(self) -> None:
-        """Request the thread to stop soon."""
+        """Ask the thread to stop soon."""
         self._is_cancelled = True
         self._future.cancel()
 
@@ -169,7 +169,7 @@ class ChunkStream:
     def _entries(
         self, header: StoredChunk, info: ChunkInfo, ranks: Ranks
     ) -> tuple[list[tuple[int, int, int, int]], list[array[int]]]:
-        """Return offset, time, rank and connection for each requested message, read from a chunk's index records.
+        """From a chunk's index records, return (offset, time, rank, connection) for each requested message.
 
         Also return the offsets of all messages, by connection.
         """
@@ -253,8 +253,9 @@ class ChunkStream:
 
 
 THREADS = max(1, min(4, (os.cpu_count() or 1) - 1))
-"""Number of threads that decompress chunks in advance, which is also the maximum number of such chunks; one core remains for
-the reader's thread.
+"""Number of decompression threads, and maximum number of chunks decompressed in advance.
+
+Leaves one core to the reader's thread.
 """
 
 
@@ -291,7 +292,7 @@ _STAMP_AND_SIZE = struct.Struct("<III")
 
 
 def scan(data: bytes, ranks: Ranks, known: Mapping[int, Connection]) -> list[Found]:
-    """Return the messages in a chunk's data on connections that have ``ranks``, in the order in which the data contains them.
+    """Return the messages in a chunk's data, in file order, for the connections that have ``ranks``.
 
     ``known`` contains all connections in the bag's index. Raise BagFormatError if a message has an unknown connection, or if a
     connection in the data has a different topic or type: the bag is then damaged.
@@ -313,7 +314,7 @@ def scan_into(
 ) -> int:
     """Add the messages in a chunk's data to ``found``, and the connections to ``connections``; return the data's size.
 
-    Raise BagFormatError if a record is damaged; the position in the error is that of the end of the complete records.
+    Raise BagFormatError if a record is damaged; the error's position is the end of the last complete record.
     """
     add = found.append
     end, last_head = len(data), len(data) - _HEAD

@@ -1,4 +1,4 @@
-"""Compress and decompress chunks with none, bz2 or lz4 (in MCAP files also zstd), the names in chunk headers.
+"""Compress and decompress chunks. Chunk headers name the compression: none, bz2 or lz4, in MCAP files also zstd.
 
 An LZ4 frame is written as ROS's own reader (roslz4) requires: independent blocks of at most 1 MiB, a content
 checksum, neither block checksums nor the content size. Every standard frame can be read. lz4 is imported when a chunk

@@ -55,7 +55,7 @@ def message_prefix(connection: int) -> bytes:
 
 
 def message_prefixes(connection: int) -> tuple[bytes, bytes]:
-    """Return :func:`message_prefix` as rosbag's Python writer writes it, and as its C++ writer does, with sorted fields.
+    """Return two variants of :func:`message_prefix`: the Python writer's, and the C++ writer's with sorted fields.
 
     A reader recognizes nearly every message by comparing it with these two; :func:`parse_record` parses the others.
     """
@@ -67,7 +67,7 @@ def message_prefixes(connection: int) -> tuple[bytes, bytes]:
 
 
 def encode_fields(fields: Mapping[str, bytes]) -> bytes:
-    """Return a header with its length prefix; the fields are in the order of the mapping."""
+    """Serialize a header with its length prefix, with the fields in the mapping's order."""
     parts = [b""]
     for name, value in fields.items():
         field = name.encode() + b"=" + value
@@ -77,7 +77,7 @@ def encode_fields(fields: Mapping[str, bytes]) -> bytes:
 
 
 def encode_bag_header(header: BagHeader) -> bytes:
-    """Return the first record, padded to its constant size."""
+    """Serialize the bag header record, padded to its constant size."""
     fields = encode_fields(
         {
             "op": bytes((OP_BAG_HEADER,)),
@@ -91,7 +91,7 @@ def encode_bag_header(header: BagHeader) -> bytes:
 
 
 def encode_chunk_header(chunk: Chunk) -> bytes:
-    """Return a chunk's header and the length of its data, which follows. Raise BagFormatError if that is above 4 GiB."""
+    """Serialize a chunk's header and the length of its data. Raise BagFormatError if the data exceeds 4 GiB."""
     if max(chunk.size, chunk.compressed_size) > MAX_UINT32:
         raise BagFormatError(f"a chunk of {chunk.size} bytes is larger than the format allows, 4 GiB")
     fields = {
@@ -103,7 +103,7 @@ def encode_chunk_header(chunk: Chunk) -> bytes:
 
 
 def encode_connection(connection: Connection) -> bytes:
-    """Return a connection's record."""
+    """Serialize a connection record."""
     fields = {
         "op": bytes((OP_CONNECTION,)),
         "topic": connection.topic.encode(),
@@ -113,7 +113,7 @@ def encode_connection(connection: Connection) -> bytes:
 
 
 def encode_message_header(connection: int, time: int, size: int) -> bytes:
-    """Return a message's header and the length of its body, which follows. Raise BagFormatError if a limit is exceeded."""
+    """Serialize a message's header and the length of its body. Raise BagFormatError if a limit is exceeded."""
     if size > MAX_UINT32:
         raise BagFormatError(f"a message of {size} bytes is larger than the format allows, 4 GiB")
     if not 0 <= time <= _MAX_TIME:
@@ -125,7 +125,7 @@ def encode_message_header(connection: int, time: int, size: int) -> bytes:
 
 
 def encode_index_data(connection: int, entries: Sequence[tuple[int, int]]) -> bytes:
-    """Return the index record for one connection in the preceding chunk: pairs of time and offset, in time order."""
+    """Serialize one connection's index record for the preceding chunk: pairs of time and offset, in time order."""
     fields = {
         "op": bytes((OP_INDEX_DATA,)),
         "conn": _UINT32.pack(connection),
@@ -137,7 +137,7 @@ def encode_index_data(connection: int, entries: Sequence[tuple[int, int]]) -> by
 
 
 def encode_chunk_info(info: ChunkInfo) -> bytes:
-    """Return the record of a chunk's info."""
+    """Serialize a chunk info record."""
     fields = {
         "op": bytes((OP_CHUNK_INFO,)),
         "ver": _UINT32.pack(1),

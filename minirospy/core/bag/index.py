@@ -88,7 +88,7 @@ class ConnectionIndex:
     def between(
         self, start: int | None = None, end: int | None = None, *, backwards: bool = False
     ) -> Iterator[Entry]:
-        """Yield the entries from time ``start`` to ``end``, both included."""
+        """Yield the entries from time ``start`` to ``end``, inclusive."""
         first = 0 if start is None else bisect_left(self.times, start)
         last = len(self.times) if end is None else bisect_right(self.times, end)
         places = range(first, last)

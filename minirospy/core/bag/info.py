@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 NUMPY_PAYS = 100_000
-"""Number of timestamps above which numpy computes the median faster than Python, even including the import of numpy."""
+"""Number of timestamps above which numpy computes the median faster than Python, even counting numpy's import."""
 
 BLOCK = 1 << 16  # number of timestamps that numpy processes together
 
@@ -47,7 +47,7 @@ class Topic(NamedTuple):
 
 
 class Stored(NamedTuple):
-    """The number of chunks in a bag with the same compression, and their total size in bytes before and after compression."""
+    """The chunks that share a compression: their number, and their total size in bytes before and after compression."""
 
     compression: str
     chunks: int
@@ -253,7 +253,7 @@ def _median(times: list[array[int]]) -> float:
 
 
 def _median_by_numpy(times: list[array[int]]) -> float:
-    """Return the median period, computed with numpy in the memory of ``times``, which is overwritten."""
+    """Return the median period, computed with numpy. Overwrites ``times``."""
     import numpy as np
 
     joined = np.frombuffer(times[0], np.uint64)
@@ -319,7 +319,7 @@ def _topic_lines(topics: Sequence[Topic], widest_type: int) -> Iterable[str]:
 
 
 def _listed(name: str, lines: Iterable[str]) -> list[tuple[str, str]]:
-    """Return table rows, of which only the first one contains the name."""
+    """Return one table row per line; only the first row contains the name."""
     return [("" if number else name, line) for number, line in enumerate(lines)]
 
 

@@ -200,14 +200,14 @@ class _ChunkHeader(NamedTuple):
 
 
 class _Selection(NamedTuple):
-    """The criteria for the messages that a caller requests."""
+    """The caller's criteria for selecting messages."""
 
     known: Collection[int]
     """The channels in the summary; a message on another channel means that the file is damaged."""
     wanted: Collection[int]
     first: int
     last: int
-    """Last time in nanoseconds; the first and the last time are both included."""
+    """Last time in nanoseconds; the range is inclusive."""
 
 
 class _Run:
@@ -286,7 +286,7 @@ class _Loose(_Run):
 
 
 class _Bounded:
-    """A stream for the mcap library, which may request any length; returns the available data without allocating that length."""
+    """A stream for the mcap library, which may request any length. Returns the available data without allocating that length."""
 
     def __init__(self, data: bytes) -> None:
         self._stream = BytesIO(data)
@@ -362,7 +362,7 @@ def _connection(channel: Channel, schema: Schema) -> Connection:
 
 
 def _chunk_infos(summary: Summary) -> list[ChunkInfo]:
-    """Return the chunks; each contains the message counts of the whole file, because the summary has none per chunk."""
+    """Return the chunk infos. Each has the message counts of the whole file, because the summary has no counts per chunk."""
     assert summary.statistics is not None
     counts = dict(summary.statistics.channel_message_counts)
     infos = []

@@ -1,4 +1,4 @@
-"""Write an MCAP file from messages with their times, with the layout and profile (``ros1``) of the MCAP tools' bag conversion.
+"""Write messages and their times to an MCAP file, with the layout and profile (``ros1``) of the MCAP tools' bag converter.
 
 A connection becomes a channel. The definition becomes a schema with the encoding ``ros1msg``; the connection header's
 other fields except the type (md5sum, callerid, latching, ...) become the channel's metadata. Needs the extra
@@ -39,7 +39,7 @@ _NEEDED = (*SCHEMA_FIELDS, "md5sum")
 
 
 def check_mcap() -> None:
-    """Raise BagError, which names the extra to install, if the library for MCAP files is missing."""
+    """Raise BagError if the mcap library is missing; the error names the extra to install."""
     try:
         import mcap.records  # noqa: F401 - the rest is imported where it is needed
         import zstandard  # noqa: F401
@@ -81,12 +81,12 @@ class McapWriter:
 
     @property
     def size(self) -> int:
-        """The file's size so far in bytes, without data that is not compressed yet."""
+        """The file's size so far in bytes, excluding data that is not compressed yet."""
         return self._stream.tell() + (self._gathered if self._is_plain else 0)
 
     @property
     def gathered(self) -> int:
-        """The number of bytes in memory that are not written to the stream yet."""
+        """The number of buffered bytes not yet written to the stream."""
         return self._gathered
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:

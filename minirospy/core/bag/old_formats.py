@@ -1,4 +1,4 @@
-"""Opens bags of versions before 2.0. Only this module names their readers, which are imported when such a bag is opened."""
+"""Opens bags older than version 2.0. Only this module names their readers, which are imported when such a bag is opened."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def open_old_bag(stream: BinaryIO, version: int) -> BagReader:
 
 
 def unindexed_old_bag(stream: BinaryIO) -> ScannedReader:
-    """Return a reader for the bag at the stream's position, for scanning the bag.
+    """Return a reader that can scan the unindexed bag at the stream's position.
 
     Raise BagFormatError if it is not a bag, BagVersionError if its version is not supported.
     """

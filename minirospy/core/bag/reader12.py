@@ -201,7 +201,7 @@ def open_bag12(stream: BinaryIO, version: int) -> Reader12:
 
 
 def unindexed_bag12(stream: BinaryIO) -> Reader12:
-    """Return a reader for the bag at the stream's position, for scanning the bag.
+    """Return a reader that can scan the unindexed bag at the stream's position.
 
     Raise BagFormatError if it is not a bag of this version.
     """

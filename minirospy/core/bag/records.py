@@ -94,7 +94,7 @@ Fields = dict[str, bytes]
 
 
 class BagHeader(NamedTuple):
-    """The first record: the index's position (0: the bag was not closed), and its numbers of connections and chunks."""
+    """The bag's first record: the index's position (0 if the bag was not closed), and the numbers of connections and chunks."""
 
     index_pos: int
     connection_count: int
@@ -301,7 +301,7 @@ def parse_records(buffer: bytes, position: int = 0) -> Iterator[Record]:
 
 
 def parse_fields(header: bytes, position: int | None = None) -> Fields:
-    """Return the fields of a header without its length prefix.
+    """Parse a header (without its length prefix) into its fields.
 
     Raise BagFormatError if a field is damaged; the error contains ``position``.
     """

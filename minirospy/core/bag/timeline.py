@@ -1,4 +1,4 @@
-"""A bag over time: message counts per interval, and the message at a given time, for display and not for playback."""
+"""A bag's timeline for display, not playback: message counts per interval, and the message at a given time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class TopicTimes(NamedTuple):
 
 
 class Timeline:
-    """A bag's index by topic. ``topics`` maps the name of each topic that has messages to its times.
+    """A bag's index, keyed by topic. ``topics`` maps the name of each topic that has messages to its times.
 
     Raise BagFormatError if the index is damaged.
     """
@@ -55,7 +55,7 @@ class Timeline:
         return (min(times[0] for times in every), max(times[-1] for times in every)) if every else None
 
     def density(self, topic: str, start: int, end: int, bins: int) -> list[int]:
-        """Return a topic's message counts in ``bins`` equal parts of the time from ``start`` to ``end``, both included."""
+        """Return a topic's message counts in ``bins`` equal parts of the time from ``start`` to ``end``, inclusive."""
         counts = [0] * bins
         borders = [start + (end + 1 - start) * number // bins for number in range(bins + 1)]
         for times in self.topics[topic].times:

@@ -192,7 +192,7 @@ class BagWriter:
 
     @property
     def gathered(self) -> int:
-        """The number of bytes in memory that are not written to the stream yet."""
+        """The number of buffered bytes not yet written to the stream."""
         return self._size + self._waiting
 
     def add_connection(self, topic: str, header: Mapping[str, str | bytes]) -> int:
@@ -258,7 +258,7 @@ class BagWriter:
             self.finish_chunk()
 
     def finish_chunk(self) -> None:
-        """Complete the current chunk, if it has a message. Raise OSError if the stream fails."""
+        """Complete the current chunk if it contains any messages. Raise OSError if the stream fails."""
         if not self._size:
             return
         counts: dict[int, int] = {}

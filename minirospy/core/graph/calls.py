@@ -275,5 +275,5 @@ def _resolve(name: str, caller_id: str) -> str:
 
 
 def parameters(**readers: Callable[[object, str, str], object]) -> tuple[Parameter, ...]:
-    """Return a method's parameters, from their names and readers."""
+    """Return a method's parameters; each keyword is a parameter's name, with its reader as the value."""
     return tuple(Parameter(name, read) for name, read in readers.items())

@@ -133,7 +133,7 @@ class MasterApi(ABC):
 
     @abstractmethod
     def stop(self) -> None:
-        """Request the master to stop."""
+        """Ask the master to stop."""
 
     @abstractmethod
     def get_status(self, caller_id: str) -> Answer | Steps[Answer]:

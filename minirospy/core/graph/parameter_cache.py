@@ -21,7 +21,7 @@ NOT_SET: Final = _Missing.NOT_SET  # the value of a parameter that is not set; N
 
 
 class ParameterCache:
-    """Values by global name; NOT_SET means that the parameter is not set in the master.
+    """Cached values, keyed by global name. NOT_SET means that the parameter is not set in the master.
 
     If several threads call :meth:`store` and :meth:`changed`, the caller must use a lock.
     """

@@ -104,7 +104,7 @@ class ParameterTree:
 
     @property
     def is_small(self) -> bool:
-        """Return whether the number of all parameters is small."""
+        """Return whether all parameters together use little memory, less than ``_FEW_BYTES``."""
         return self._bytes < _FEW_BYTES
 
     @property

@@ -147,7 +147,7 @@ class Registry:
         return True
 
     def register_service(self, node: str, service: str, service_uri: str, uri: str) -> Iterable[Action]:
-        """Register the service ``service`` of ``node`` at ``service_uri``; it replaces the previous provider."""
+        """Register ``node`` as the provider of ``service``, at ``service_uri``. It replaces the previous provider."""
         actions = self._claim(node, uri, service, SERVES, service_uri)
         before = self._services.get(service)
         if before:
@@ -160,7 +160,7 @@ class Registry:
         return actions
 
     def unregister_service(self, node: str, service: str, service_uri: str) -> bool:
-        """Unregister the service ``service`` of ``node``; return whether it was offered at ``service_uri``."""
+        """Unregister ``node`` as the provider of ``service``; return whether it offered the service at ``service_uri``."""
         if self._services.get(service) != _Service(node, service_uri):
             return False
         del self._services[service]
@@ -196,7 +196,7 @@ class Registry:
 
     @property
     def is_small(self) -> bool:
-        """Return whether the number of all registrations is small."""
+        """Return whether all registrations together use little memory, less than ``_FEW_BYTES``."""
         return self.shares.total < _FEW_BYTES
 
     @property

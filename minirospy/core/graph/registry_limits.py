@@ -1,4 +1,4 @@
-"""The registry's limits: the memory for all registrations, and the share of it for the nodes on one host and port.
+"""The registry's limits: the memory for all registrations, and the share that the nodes on one host and port may use.
 
 Pure. Sizes are those in 64-bit CPython; each registered name is in up to four tables.
 """
@@ -85,7 +85,7 @@ def node_cost(name: str, uri: str) -> int:
 
 
 def name_cost(name: str, kind: int, kinds: int) -> int:
-    """Return the number of bytes for registering a name as ``kind`` that is already registered as ``kinds``."""
+    """Return the bytes needed to register a name as ``kind`` if it is already registered as ``kinds``."""
     if kinds & kind:
         return 0
     text = text_cost(name)

@@ -20,7 +20,7 @@ class Excess(Enum):
 
 
 class Shares:
-    """Each holder's share in a limited resource, such as bytes or entries.
+    """Each holder's share of a limited resource, such as bytes or entries.
 
     One holder gets at most ``largest`` out of ``most``. The last ``reserve`` of the resource is only for holders that
     have at most ``small``, so that these holders can always get more.

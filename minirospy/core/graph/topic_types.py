@@ -44,7 +44,7 @@ class TopicTypes:
         return self._types[topic].text
 
     def is_counted_for(self, topic: str, node: str) -> bool:
-        """Return whether a topic's type is counted for this node."""
+        """Return whether a topic's type is charged to this node."""
         type_ = self._types.get(topic)
         return type_ is not None and type_.node == node
 
@@ -53,7 +53,7 @@ class TopicTypes:
         return iter([(topic, type_.text) for topic, type_ in self._types.items()])
 
     def cost(self, topic: str, type_: str) -> int:
-        """Return the bytes for a type, minus those of the type that it replaces, to count for a node that registers the topic."""
+        """Return the bytes to charge to a node for registering the topic with this type, minus those of the type it replaces."""
         before = self._types.get(topic)
         if before and before.node:
             return max(0, text_cost(type_) - text_cost(before.text))
@@ -96,7 +96,7 @@ class TopicTypes:
             self._remove_old(oldest, self._types.pop(oldest).text)
 
     def leave(self, topic: str, node: str, others: Iterable[str]) -> None:
-        """Count a topic's type for one of the ``others`` that register the topic, after ``node`` has unregistered it."""
+        """Charge a topic's type to one of the ``others`` that register the topic, after ``node`` has unregistered it."""
         heir = next(iter(others), "")
         if heir == node or not self.is_counted_for(topic, node):
             return

@@ -60,8 +60,8 @@ class Catalogue:
         self, packages: Mapping[str, Path], definitions: Mapping[str, Iterable[Path]] | None = None
     ) -> None:
         self.packages = packages
-        # Indexed by package and kind, because a package may have hundreds of definitions, and each is looked up by
-        # its name.
+        # Keyed by package and kind, because a package may have hundreds of definitions, and each is looked up by its
+        # name.
         self._definitions: dict[str, dict[str, dict[str, Path]]] = {}
         for package, files in (definitions or {}).items():
             kinds = self._definitions[package] = {"msg": {}, "srv": {}, "action": {}}
@@ -170,7 +170,7 @@ _OF_OTHER_LANGUAGES = {
 
 
 def read_definition(path: Path) -> str:
-    """Return the text in a definition file. Raise DefinitionError if the file cannot be read."""
+    """Return the text of a definition file. Raise DefinitionError if the file cannot be read."""
     try:
         return path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -365,7 +365,7 @@ def class_from_text(full_name: str, text: str) -> type[Message]:
 
 @lru_cache(maxsize=256)
 def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
-    """Return the classes for a full text's message and for all types that it uses, by name.
+    """Return a dict from name to class for a full text's message and all types that it uses.
 
     Raise DefinitionError if the text is invalid.
     """
@@ -381,7 +381,7 @@ def classes_from_text(full_name: str, text: str) -> Mapping[str, type[Message]]:
 
 
 def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> type[Message]:
-    """Execute the source of a class, whose fields use the classes created before."""
+    """Execute the source of a class. Its fields use the classes created so far, ``made``."""
     file = f"<generated {name}>"
     module = types.ModuleType(f"minirospy_generated.{name.replace('/', '.')}")
     for type_, alias in emitted.classes.items():

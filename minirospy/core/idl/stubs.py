@@ -37,7 +37,7 @@ class _Stub:
         self._lines: list[str] = []
 
     def message(self, spec: MessageSpec) -> None:
-        """Write a message's class."""
+        """Add a message's class to the stub."""
         fields = [(python_name(field.name), field.type) for field in spec.fields]
         constants = [(python_name(constant.name), constant.type) for constant in spec.constants]
         # Inside the class, a field or a constant hides a type with the same name.
@@ -50,7 +50,7 @@ class _Stub:
         self._class(f"{spec.name}(_genpy.Message)", lines)
 
     def service(self, spec: ServiceSpec) -> None:
-        """Write a service's class, which combines request and response."""
+        """Add a service's class, which combines request and response, to the stub."""
         self._hidden = set()
         self._class(
             spec.name,

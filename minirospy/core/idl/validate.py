@@ -143,7 +143,7 @@ def _check_size(where: str, size: _Size) -> None:
 
 
 def _shown(text: str) -> str:
-    """Return a peer's text for a one-line error: printable and shortened."""
+    """Return text from a peer, shortened and made printable for a one-line error message."""
     text = text if len(text) <= _SHOWN else text[: _SHOWN - 3] + "..."
     # Escape non-ASCII letters, because a letter in another script may look like an ASCII letter.
     return text if text.isascii() and text.isprintable() else ascii(text)[1:-1]

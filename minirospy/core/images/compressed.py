@@ -33,7 +33,7 @@ A file of some kilobytes may have ten times as many pixels, and use gigabytes of
 
 
 class Options(NamedTuple):
-    """Compression options."""
+    """Options for compressing an image."""
 
     quality: int = _QUALITY  # JPEG quality, from 1 to 100
     progressive: bool = False

@@ -25,7 +25,7 @@ DEPTHS = {
     "32S": "int32",
     "32F": "float32",
     "64F": "float64",
-}  # numpy types by OpenCV's depth, which is the index
+}  # numpy types, indexed by OpenCV's depth
 
 _GENERIC = re.compile(r"(8U|8S|16U|16S|32S|32F|64F)(?:C(\d+))?\Z")
 _CHANNELS = {"mono": "Y", "bgr": "BGR", "rgb": "RGB", "bgra": "BGRA", "rgba": "RGBA"}

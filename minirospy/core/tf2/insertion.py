@@ -78,7 +78,7 @@ def misfit_refusal(misfit: Misfit, parent: str, child: str, stamp: int, authorit
 
 
 class RefusalLog:
-    """Passes a refusal to ``write`` at most once a second for each frame and fault; the next one includes the count.
+    """Passes a refusal to ``write`` at most once a second for each frame and fault; the next one includes the number suppressed.
 
     ``clock`` returns seconds. tf2 itself prints each refusal, which floods terminals if two nodes publish the same frame.
     """

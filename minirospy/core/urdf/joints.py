@@ -32,7 +32,7 @@ _IMMOBILE = (JointType.FIXED, JointType.FLOATING)
 
 
 def read_joint(element: Element) -> Joint:
-    """Return a joint. Raise ElementError if it is invalid."""
+    """Parse a ``<joint>`` element. Raise ElementError if it is invalid."""
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "unnamed joint found")

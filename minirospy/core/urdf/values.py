@@ -15,7 +15,7 @@ class NotANumberError(ValueError):
 
 
 def as_float(text: str) -> float:
-    """Return a number. Raise NotANumberError if the text is not a number or, as in ROS, is hexadecimal, infinite or NaN."""
+    """Parse a number. Raise NotANumberError if the text is not a number or, as in ROS, is hexadecimal, infinite or NaN."""
     stripped = text.strip()
     value = float(stripped) if _NUMBER.fullmatch(stripped) else math.nan
     if not math.isfinite(value):
@@ -24,7 +24,7 @@ def as_float(text: str) -> float:
 
 
 def parse_numbers(text: str, what: str = "vector") -> tuple[float, ...]:
-    """Return the numbers in a string. Raise NotANumberError if one of them is not a number."""
+    """Parse the numbers in a string. Raise NotANumberError if one of them is not a number."""
     numbers = []
     for part in text.split():
         try:
@@ -36,7 +36,7 @@ def parse_numbers(text: str, what: str = "vector") -> tuple[float, ...]:
 
 
 def parse_vector(text: str) -> tuple[float, float, float]:
-    """Return the three numbers in a string. Raise NotANumberError if there are not exactly three numbers."""
+    """Parse the three numbers in a string. Raise NotANumberError if there are not exactly three numbers."""
     numbers = parse_numbers(text)
     if len(numbers) != 3:
         raise NotANumberError(

@@ -27,7 +27,7 @@ def serialize_header(fields: Mapping[str, str]) -> bytes:
 
 
 def parse_header(body: bytes) -> Header:
-    """Return the fields of a header without its length prefix. Raise WireError if the header is invalid."""
+    """Parse a header (without its length prefix) into its fields. Raise WireError if it is invalid."""
     fields: Header = {}
     at = 0
     while at < len(body):

@@ -40,7 +40,7 @@ class Recovered(NamedTuple):
 
 
 def serialize_record(record: list[object]) -> bytes:
-    """Return a record's bytes in the file. Raise ValueError or TypeError if msgpack cannot represent a value."""
+    """Serialize a record for the file. Raise ValueError or TypeError if msgpack cannot represent a value."""
     body = _pack(record)
     return _FRAME.pack(len(body), zlib.crc32(body)) + body
 

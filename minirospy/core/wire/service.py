@@ -30,17 +30,17 @@ RESPONSE_HEAD = _OK_LENGTH.size  # bytes before a response's body, or before an 
 
 
 def serialize_request(body: bytes) -> bytes:
-    """Return the bytes of a client's request."""
+    """Serialize a client's request."""
     return _LENGTH.pack(len(body)) + body
 
 
 def serialize_response(body: bytes) -> bytes:
-    """Return the bytes of a server's response after a successful call."""
+    """Serialize a server's response to a successful call."""
     return _OK_LENGTH.pack(1, len(body)) + body
 
 
 def serialize_failure(error: Exception) -> bytes:
-    """Return the bytes of a server's response after a failed call, with the message of ``error``."""
+    """Serialize a server's response to a failed call, with the message of ``error``."""
     # An error message may contain characters that UTF-8 cannot encode, for example from a file name.
     text = str(error).encode(errors="backslashreplace")
     return _OK_LENGTH.pack(0, len(text)) + text

@@ -19,7 +19,7 @@ __all__ = ["Examination", "Finding", "Status", "ok", "problem", "warning"]
 
 
 class Examination:
-    """Runs all checks in order; ``findings`` yields each result when it is available. A context manager.
+    """Context manager that runs all checks in order. ``findings`` yields each result when it is available.
 
     ``machines``: names or addresses of other machines to check; ``offline`` skips the network checks.
     """
@@ -61,7 +61,7 @@ class Examination:
         yield from check_packages(environment)
 
     def listen(self, report: Callable[[Finding], object]) -> bool:
-        """Respond to requests from doctors on other machines until the context exits; return False if no master was found."""
+        """Respond to doctors on other machines until the context exits. Return False if no master was found."""
         if self._listen is None:
             return False
         self._listen(report)

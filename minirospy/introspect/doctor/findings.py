@@ -29,7 +29,7 @@ class Finding(NamedTuple):
 
 
 def ok(check: str, text: str) -> Finding:
-    """Return a finding that needs no action."""
+    """Return a finding that requires no action."""
     return Finding(check, Status.OK, text)
 
 

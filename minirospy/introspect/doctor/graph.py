@@ -69,7 +69,7 @@ Answers = dict[str, NodeAnswer]
 
 
 class _Pair(NamedTuple):
-    """A publisher and a subscriber on the same topic."""
+    """A publisher and a subscriber of the same topic."""
 
     topic: str
     publisher: str
@@ -179,7 +179,7 @@ def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
 
 
 def differing_types(state: SystemState, answers: Answers) -> dict[str, dict[str, list[str]]]:
-    """Return the topics for which nodes report different types, as a dict: topic -> type -> nodes."""
+    """Return the topics whose nodes report different types, as a dict: topic -> type -> nodes."""
     found = {topic: _types(topic, answers) for topic in sorted({*state.publishers, *state.subscribers})}
     return {topic: types for topic, types in found.items() if len(types) > 1}
 
@@ -234,7 +234,7 @@ def check_connections(graph: Graph, state: SystemState, answers: Answers) -> Ite
 
 
 def check_services(graph: Graph, state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Yield a problem for each service that does not respond, unless its node was already reported."""
+    """Yield a problem for each service that does not respond, unless its node has already been reported."""
     names = [
         name
         for name, nodes in sorted(state.services.items())
@@ -297,7 +297,7 @@ def _stats(slave: SlaveProxy) -> tuple[object, ...]:
 
 
 def _types(topic: str, answers: Answers) -> dict[str, list[str]]:
-    """Return the types that nodes report for a topic, with the nodes that report each."""
+    """Return a dict from type to the nodes that report it for a topic."""
     types: dict[str, set[str]] = {}
     for name, answer in answers.items():
         for table in (answer.publications, answer.subscriptions):
@@ -366,7 +366,7 @@ def _probe_service(graph: Graph, name: str) -> str:
 
 
 def _names(names: Iterable[str]) -> str:
-    """Return a string with the first few names and the number of further names."""
+    """Join the first few names, and append the number of omitted ones."""
     all_ = list(names)
     more = f" and {len(all_) - _SHOWN} more" if len(all_) > _SHOWN else ""
     return ", ".join(all_[:_SHOWN]) + more

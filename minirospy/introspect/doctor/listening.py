@@ -44,7 +44,8 @@ _PADDING = "x" * 16384
 
 
 def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -> None:
-    """Start connecting back to each doctor that requests a check; call ``report`` with each result, in a separate thread.
+    """Start serving check requests: connect back to each doctor that sends one, and call ``report`` with each result in a
+    separate thread.
 
     Raise MasterUnreachableError if no master responds, or RpcError if a call fails.
     """

@@ -57,7 +57,7 @@ def check_variables(
     master: MasterLocation,
     known: Mapping[str, list[str]],
 ) -> Iterator[Finding]:
-    """Yield findings about the variables for the master's and this machine's address, separately and in combination.
+    """Yield findings about the variables that set the master's and this machine's address, separately and in combination.
 
     ``known``: the addresses of the host names in the variables.
     """
@@ -235,7 +235,7 @@ def _dependency_findings(environment: Environment, mine: list[str]) -> Iterator[
             for each in manifest.dependencies
             if each.tag in ("run_depend", "exec_depend", "depend") and each.name not in known
         ]
-        # Ignore rosdep keys that name system packages.
+        # Ignore rosdep keys that refer to system packages.
         missing = [each for each in dict.fromkeys(missing) if not _is_system_key(each)]
         if missing:
             yield warning(

@@ -127,7 +127,7 @@ def _unreachable(uri: str, place: MasterLocation, trouble: Trouble) -> Finding:
 
 
 def _status(master: MasterProxy) -> dict[str, object]:
-    """Return the status that only minirospy's master provides."""
+    """Return the status that minirospy's master provides; other masters have none."""
     try:
         found = master.call("minirospy.status")
     except (RpcFault, RpcError):

@@ -44,7 +44,7 @@ _log = logging.getLogger(__name__)
 
 
 class DoctorNode:
-    """A node that publishes a latched message to any peer. It is registered while the context is active.
+    """Context manager: a node that publishes a latched message to any peer. It is registered while the context is active.
 
     Entering raises OSError if no server can be opened at this machine's address.
     """
@@ -54,7 +54,7 @@ class DoctorNode:
         self.name = names.anonymous_name(PREFIX)
         self.letter = self.name + "/letter"
         self.told_by_master = threading.Event()
-        """Set after the master has called this node."""
+        """Set once the master has called this node."""
         self._loop = LoopThread("minirospy-doctor")
         self.node = _NotifiedNode(self.name, environment, self.told_by_master)
         self._log_links = threading.Condition()
@@ -169,7 +169,9 @@ def check_own_address(own: DoctorNode) -> Iterator[Finding]:
 
 
 def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[str]) -> Iterator[Finding]:
-    """Yield findings on whether the master calls this node, and /rosout's subscribers (``log_listeners``) connect to it."""
+    """Yield findings on whether the master calls this node, and whether /rosout's subscribers (``log_listeners``) connect to
+    it.
+    """
     if not own.told_by_master.wait(CONNECT_SECONDS):
         yield unreached_finding(own, f"the master's machine ({master_host})", master_host, None)
         return
@@ -185,7 +187,7 @@ def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[
 
 
 def unreached_finding(own: DoctorNode, who: str, their_host: str, trouble: Trouble | None) -> Finding:
-    """Return the finding for another machine (``who``, at ``their_host``) that does not reach this node."""
+    """Return the finding that another machine (``who``, at ``their_host``) does not reach this node."""
     host, port = host_port(own.node.uri)
     known = addresses(their_host)
     ours = own_address_towards(known[0]) if known else ""

@@ -75,7 +75,7 @@ class Fault(str, Enum):
 
 
 class Trouble(NamedTuple):
-    """A fault with its description."""
+    """A fault and its description."""
 
     fault: Fault
     text: str
@@ -142,7 +142,7 @@ def addresses(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
 
 
 def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict[str, list[str]]:
-    """Look up several names in parallel; return the addresses of each, as :func:`addresses` does."""
+    """Look up several host names in parallel; return a dict from name to addresses, as :func:`addresses` finds them."""
     names = list(dict.fromkeys(hosts))
     found = in_parallel(_ask_resolver, names, timeout)
     return {
@@ -151,7 +151,7 @@ def addresses_of(hosts: Iterable[str], timeout: float = LOOK_UP_SECONDS) -> dict
 
 
 def look_up(host: str, timeout: float = LOOK_UP_SECONDS) -> list[str]:
-    """Look up a name as :func:`addresses` does, but raise OSError on failure.
+    """Like :func:`addresses`, but raise OSError on failure.
 
     The function exists because the system's own timeout is half a minute.
     """
@@ -230,7 +230,7 @@ def read_topic(
 
 
 def _receive(sock: socket.socket, most: int) -> bytes:
-    """Read a length-prefixed block. Raise WireError if it is longer than ``most``, OSError if the connection fails."""
+    """Read a length-prefixed block of bytes. Raise WireError if it is longer than ``most``, OSError if the connection fails."""
 
     def exactly(count: int) -> bytes:
         data = b""

@@ -50,7 +50,7 @@ class JournalBusyError(Exception):
 
 
 class Left(NamedTuple):
-    """The state in a killed master's journal. ``age``: seconds since its last write.
+    """The state recovered from a killed master's journal. ``age``: seconds since its last write.
 
     ``copy`` is the path of the copy of a damaged journal, or None if copying failed.
     """
@@ -62,7 +62,7 @@ class Left(NamedTuple):
 
 
 class Journal:
-    """An open journal. For a rewrite, ``snapshot`` returns the records that describe the current state.
+    """An open journal. ``snapshot`` returns the records of the current state, for a rewrite.
 
     Call :meth:`lock`, :meth:`read`, :meth:`start`, then :meth:`append`, in this order. If the disk fails at any step,
     the master runs without a journal: ``trouble`` is the reason, and a complete rewrite is retried every half minute.
@@ -75,7 +75,7 @@ class Journal:
         clock: Callable[[], float] = time.monotonic,
         start_steps: Callable[[Steps[None]], object] = finish,
     ) -> None:
-        """Create the journal; ``start_steps`` runs long work, such as a large rewrite, immediately or in steps."""
+        """Create the journal. ``start_steps`` runs long work, such as a large rewrite, immediately or in steps."""
         self.path = path
         self._start_steps = start_steps
         self._snapshot = snapshot
@@ -91,7 +91,7 @@ class Journal:
         # The numbers of the large values that are being stored, and the last number used.
         self._stored: set[int] = set()
         self._number = 0
-        # During an incremental rewrite: the records appended since it started, and the new file.
+        # During an incremental rewrite: the records appended since it started, and the new file's descriptor.
         self._since: list[bytes] | None = None
         self._second: int | None = None
         # Counts the incremental rewrites that finished or were abandoned, so that a rewrite can detect that it was
@@ -113,7 +113,7 @@ class Journal:
             self._lock = _locked(self.path.with_name(self.path.name + ".lock"), self.path)
 
     def read(self) -> Left | None:
-        """Return the state that a killed master left, or None if there is none."""
+        """Return the state left by a killed master, or None if there is none."""
         try:
             data, written = private_files.read_file(self.path)
         except (FileNotFoundError, NotADirectoryError):
@@ -128,7 +128,7 @@ class Journal:
         return Left(recovered, max(0.0, time.time() - written), same_boot, copy)
 
     def discard(self) -> None:
-        """Discard the state that a killed master left."""
+        """Discard the state left by a killed master."""
         with contextlib.suppress(OSError):
             self.path.unlink()
 
@@ -185,7 +185,7 @@ class Journal:
             self._log_trouble()
 
     def store(self, value: object) -> Steps[int]:
-        """Write a large value in parts; return the number by which a "put" record refers to it. Never raises."""
+        """Write a large value in parts; return the number that a "put" record uses to refer to it. Never raises."""
         while self._is_rewriting:
             yield PAUSE
 
@@ -219,7 +219,7 @@ class Journal:
             self._since.append(data)
 
     def _rewrite_in_steps(self, number: int) -> Steps[None]:
-        """Do the same as :meth:`rewrite`, in steps, while :meth:`append` continues to write."""
+        """Like :meth:`rewrite`, but in steps, while :meth:`append` continues to write."""
         size = 0
         try:
             if number != self._rewrites:
@@ -257,7 +257,7 @@ class Journal:
                 self._abandon()
 
     def _write_since(self, file: int) -> int:
-        """Write the records appended since the rewrite started to the new file; return the number of bytes.
+        """Write the records appended since the rewrite started to the new file; return the number of bytes written.
 
         Raise OSError if the disk fails.
         """

@@ -31,7 +31,7 @@ class LogFileHandler(RotatingFileHandler):
     """
 
     def __init__(self, path: Path, most_bytes: int = 0, older_files: int = 0) -> None:
-        """Open ``path``; a ``most_bytes`` of 0 means no limit. Raise OSError if the file cannot be opened."""
+        """Open ``path``. If ``most_bytes`` is 0, there is no size limit. Raise OSError if the file cannot be opened."""
         super().__init__(path, maxBytes=most_bytes, backupCount=older_files, encoding="utf-8")
 
     def _open(self) -> TextIOWrapper:
@@ -126,7 +126,7 @@ class LogFile(LogFileHandler):
 
 
 class _Formatter(logging.Formatter):
-    """Formats records like the file's other lines; caches the formatted time of the current second."""
+    """Formats records like the file's other lines. Caches the formatted time of the current second."""
 
     def __init__(self, stamp: Callable[[float], str]) -> None:
         super().__init__("[%(name)s][%(levelname)s] %(asctime)s: %(message)s")

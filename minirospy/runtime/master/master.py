@@ -53,16 +53,18 @@ LOCK_SECONDS = 3.0
 # lock
 _LOCK_PAUSE = 0.02
 
-_RESTART_SECONDS = 600.0  # maximum age of a killed master's journal for its session to be continued
+# maximum age of a killed master's journal at which a new master still resumes its session
+_RESTART_SECONDS = 600.0
 
 _COLLECT_SECONDS = 60.0
 _COLLECT = (2000, 5, 1_000_000_000)
-"""The garbage collector's thresholds: it examines at most 10,000 objects, which takes some 4 ms; the oldest generation is not
-collected automatically.
+"""The garbage collector's thresholds.
+
+It examines at most 10,000 objects, in some 4 ms; the oldest generation is not collected automatically.
 """
 
 SWEEP_SECONDS = 10.0  # seconds between checks for dead nodes if the master is nearly full
-_MAX_FORGOTTEN_PER_ITERATION = 20  # dead nodes to forget per loop iteration
+_MAX_FORGOTTEN_PER_ITERATION = 20  # maximum number of dead nodes to remove per loop iteration
 
 _OWN_NODE = "/rosout"
 
@@ -96,7 +98,7 @@ class Master(MasterApi):
         self.calls = 0
         # The serialized response to getSystemState, and the registry's change count when it was serialized.
         self._state = (-1, Serialized(()))
-        # Messages for the user about the startup: what was recovered, and what could not be recovered.
+        # Startup messages for the user: what was recovered, and what could not be.
         self.news: list[str] = []
         self._started = time.monotonic()
         self._journal_path = journal
@@ -118,7 +120,7 @@ class Master(MasterApi):
         self.touching: asyncio.TimerHandle | None = None
         self._collecting: asyncio.TimerHandle | None = None
         self._sweeping: asyncio.Task[None] | None = None
-        self.stopped = asyncio.Event()  # set when the master is requested to stop
+        self.stopped = asyncio.Event()  # set when the master has been asked to stop
 
     @property
     def port(self) -> int:
@@ -200,7 +202,7 @@ class Master(MasterApi):
         return self.dispatch(method, args)
 
     def _write_state(self) -> Steps[Serialized]:
-        """Return the serialized system state.
+        """Return the serialized system state, from the cache if it is current.
 
         The state is cached, because serializing it is slow and tools request it often.
         """
@@ -242,7 +244,7 @@ class Master(MasterApi):
         self.notifier.defer(uri, topic)
 
     def stop(self) -> None:
-        """Request the master to stop."""
+        """Ask the master to stop."""
         self.stopped.set()
 
     def get_status(self, caller_id: str) -> Answer | Steps[Answer]:
@@ -288,7 +290,7 @@ class Master(MasterApi):
         return f"{self._journal.path} ({self._journal.size} bytes)"
 
     async def _open_journal(self) -> dict[str, str]:
-        """Recover the state from the journal and start to write the journal; return the nodes to check, with their URIs."""
+        """Recover the state from the journal and start writing it; return a dict from name to URI of the nodes to check."""
         from minirospy.runtime.master.journal import RETRY_SECONDS, Journal, JournalBusyError
 
         assert self._journal_path
@@ -454,7 +456,7 @@ async def _lock(journal: Journal) -> None:
 
 
 async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries: int = 1) -> bool:
-    """Return whether the node still responds at its URI. Any response counts, unless it contains another node's name."""
+    """Return whether the node still responds at its URI. Any response counts, except another node's name."""
     for _ in range(tries):
         try:
             answer = await rpc.call(uri, "getName", "/master", timeout=timeout)

@@ -48,7 +48,7 @@ _MAX_ANSWER = 65536
 
 
 class State(Protocol):
-    """The graph and the parameters when a node is called."""
+    """The interface to the current graph and parameters, read when a node is called."""
 
     def publisher_uris(self, topic: str) -> list[str]:
         """Return the URIs of a topic's publishers."""
@@ -62,7 +62,7 @@ class State(Protocol):
 
 @dataclass(eq=False, slots=True)
 class _Backlog:
-    """A node's pending notifications: only the newest for each topic and parameter."""
+    """A node's pending notifications: only the newest one for each topic and parameter."""
 
     uri: str
     notices: dict[object, Notice] = field(default_factory=dict)
@@ -89,7 +89,7 @@ class Notifier:
     """
 
     def __init__(self, state: State, turns: Turns, timeout: float, *, same_host: bool = True) -> None:
-        """Create the notifier; ``turns`` runs long work, ``timeout`` is the time limit for a call in seconds."""
+        """Create the notifier. ``turns`` runs long work; ``timeout`` is the time limit for a call, in seconds."""
         self._state = state
         self._turns = turns
         self._timeout = timeout
@@ -230,7 +230,7 @@ class Notifier:
     def _call_later(
         self, node: _Backlog, line: _Line, notice: PublisherUpdate | ParameterUpdate, count: int
     ) -> None:
-        """Send a large notification as soon as the limit on large calls allows."""
+        """Send a large notification as soon as the limit for large calls allows it."""
 
         def start() -> None:
             self._turns.start(self._call_in_steps(node, line, notice, count))
@@ -279,7 +279,7 @@ class Notifier:
     def _called(
         self, node: _Backlog, line: _Line, notice: Notice, count: int, size: int, answer: Body | RpcError
     ) -> None:
-        """Continue after a call whose notification listed ``count`` publishers.
+        """Continue after a call that notified the node of ``count`` publishers.
 
         ``size`` is the call's size in bytes, if the call was large.
         """
@@ -309,7 +309,7 @@ class Notifier:
             self._start_soon()
 
     def _go_on(self, node: _Backlog) -> None:
-        """Queue the node if it has a notification to send; otherwise set a timer for the end of its first pause, if any."""
+        """Queue the node if it has a notification to send. Otherwise set a timer for the end of its first pause, if any."""
         if node.timer:
             node.timer.cancel()
             node.timer = None
@@ -326,7 +326,7 @@ class Notifier:
             del self.nodes[node.uri]
 
     def _update(self, topic: str, publishers: list[str]) -> bytes:
-        """Return the call that reports a topic's publishers."""
+        """Serialize the call that reports a topic's publishers."""
         if self._last[:2] != (topic, publishers):
             body = serialize_call("publisherUpdate", [_MASTER, topic, publishers])
             self._last = (topic, publishers, body)

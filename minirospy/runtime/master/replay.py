@@ -24,7 +24,7 @@ class Replay:
     def __init__(self, registry: Registry, parameters: ParameterTree) -> None:
         self._registry = registry
         self._parameters = parameters
-        # The parts found so far of each large value, by number.
+        # The parts of each large value found so far, keyed by number.
         self._parts: dict[int, list[bytes]] = {}
 
     def apply(self, what: str, *args: Any) -> None:

@@ -56,7 +56,7 @@ class Node:
         on_parameter: Callable[[str, object], None] | None = None,
         watch_seconds: float = 2.0,
     ) -> None:
-        """Create the node; ``on_shutdown(reason)`` and ``on_parameter(key, value)`` are called in a worker.
+        """Create the node. ``on_shutdown(reason)`` and ``on_parameter(key, value)`` are called in a worker.
 
         Every ``watch_seconds`` the node checks whether it is still registered with the master.
         """
@@ -87,9 +87,9 @@ class Node:
         }
         self.registrations = Registrations(name, environment, tables, self.rpc, self.workers, watch_seconds)
         self.parameters = self.registrations.parameters
-        """The parameters that this node has subscribed to at the master; the subscribing code adds them."""
+        """The parameters that this node has subscribed to. The subscribing code adds them."""
         self.when_registered_again = self.registrations.when_registered_again
-        """Functions that register further state.
+        """Functions that register additional state.
 
         The functions are called in workers when the node registers again with a master that had lost it.
         """
@@ -294,7 +294,7 @@ class Node:
                 self._requesting[topic] = loop.call_later(_REQUEST_AGAIN_SECONDS, self._request_again, topic)
 
     def parameter_changed(self, key: str, value: object) -> None:
-        """Pass a parameter's new value, which the master has sent, to ``on_parameter``."""
+        """Pass a parameter's new value, received from the master, to ``on_parameter``."""
         if self._on_parameter:
             self._parameter_updates.start(self._on_parameter, key, value)
 

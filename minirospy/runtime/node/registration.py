@@ -1,4 +1,4 @@
-"""A node's registrations: the actual ones in the master, and those that the node needs.
+"""A node's registrations: those that the master has, and those that the node needs.
 
 Registrations are ordered, retried until the master accepts them, repeated after it has restarted, and removed when the
 node closes. Source: http://wiki.ros.org/ROS/Master_API.
@@ -70,16 +70,16 @@ class Registrations:
         workers: Workers,
         watch_seconds: float,
     ) -> None:
-        """Register the entries of ``tables``, a dict: kind ("Publisher") -> name -> publication, subscription or service.
+        """Register the entries of ``tables``: kind ("Publisher") -> name -> publication, subscription or service.
 
         Every ``watch_seconds`` :meth:`watch` checks whether the node is still registered with the master.
         """
         self.uri = ""
         self.service_uri = ""
-        """The address of the node's services; like the Slave API's address, it is set before the first registration."""
+        """The address of the node's services. Like the Slave API's address, it is set before the first registration."""
         self.parameters: set[str] = set()  # the parameters that the node has subscribed to
         self.when_registered_again: list[Callable[[], object]] = []
-        """Functions that register further state.
+        """Functions that register additional state.
 
         The functions are called in workers when the node registers again with a master that had lost it.
         """
@@ -93,9 +93,9 @@ class Registrations:
         self.watch_seconds = watch_seconds
 
         self._known: dict[_Key, _Part | None] = {}
-        """The object registered with the master; None if the call failed or has no response yet."""
+        """The object registered with the master, keyed by kind and name; None if the call failed or has no response yet."""
         self.taken: set[_Key] = set()
-        """Services that another node has registered later, so that the master's entry now belongs to that node."""
+        """Services that another node has registered since, so that the master's entry belongs to that node."""
         self._turns: WeakValueDictionary[_Key, asyncio.Lock] = WeakValueDictionary()
         self._registering: set[asyncio.Task[None]] = set()
         self.watching: asyncio.Task[None] | None = None
@@ -119,7 +119,7 @@ class Registrations:
         await self._unregister_all(announces=announces)
 
     async def cancel(self) -> None:
-        """Cancel the calls that have not received a response yet."""
+        """Cancel the calls that are waiting for a response."""
         tasks = [*self._registering, *([self.watching] if self.watching else [])]
         for task in tasks:
             task.cancel()
@@ -298,7 +298,7 @@ class Registrations:
                 _log.warning("the master does not know this node, and refuses to")
 
     async def register_all(self, *, again: bool = False) -> None:
-        """Register everything that the master is missing. Raise MasterUnreachableError if it does not respond."""
+        """Register everything that the master lacks. Raise MasterUnreachableError if it does not respond."""
         keys = [(kind, name) for kind, table in self._tables.items() for name in table]
         for key in dict.fromkeys([*keys, *self._known]):
             if key in self.taken and self._wanted(key):
@@ -361,7 +361,7 @@ class Registrations:
             await self.call_master("getPid", self._name)
 
     async def _call_all(self, calls: Sequence[_Call]) -> None:
-        """Make all calls, ignoring their results; batch them if the master supports system.multicall (not all do).
+        """Make all calls, ignoring their results. Batch them if the master supports system.multicall.
 
         Raise MasterUnreachableError if the master does not respond.
         """

@@ -114,7 +114,7 @@ class ServiceClient:
         return body
 
     def has_ended(self) -> bool:
-        """Return whether the server has disconnected, so that it would not read another request."""
+        """Return whether the server has disconnected and would not read another request."""
         # A server sends data only in response to requests, so a readable socket means end of file. The poll object is
         # reused, because each call does this check.
         return bool(self._poll.poll(0)) if self._poll else sockets.is_readable(self._sock)
@@ -124,7 +124,7 @@ class ServiceClient:
         sockets.hang_up(self._sock)
 
     def detach(self) -> socket.socket:
-        """Return the open socket, which from now on belongs to the caller."""
+        """Return the open socket; the caller now owns it."""
         return self._sock
 
     def close(self) -> None:
@@ -160,7 +160,7 @@ def parse_service_uri(uri: str) -> tuple[str, int]:
 
 
 class PeerEndedError(WireError):
-    """The peer closed the connection after ``received`` bytes of an incomplete read."""
+    """The peer closed the connection ``received`` bytes into an incomplete read."""
 
     def __init__(self, received: int) -> None:
         super().__init__(received)

@@ -48,12 +48,12 @@ __all__ = [
 _log = logging.getLogger(__name__)
 
 Handler = Callable[[memoryview, Header], bytes]
-"""Called with the request's bytes and the client's header; returns the response's bytes, or raises ServiceException.
+"""A function from the request's bytes and the client's header to the response's bytes. It may raise ServiceException.
 
 Any other exception is logged and sent as rospy sends it: ``error processing request: ...``. The connection stays open.
 """
 
-# A coroutine function with the same parameters and result as Handler, called on the loop
+# A coroutine function with Handler's parameters and result, called on the loop
 AsyncHandler = Callable[[bytes, Header], Awaitable[bytes]]
 
 
@@ -119,7 +119,7 @@ class ServiceServer:
             sock.close()
 
     def close(self) -> None:
-        """Stop serving: clients with a call in progress still get their responses, all other clients are disconnected."""
+        """Stop serving. Clients with a call in progress still get their responses; all others are disconnected."""
         with self._lock:
             self._closed = True
             for connection in self._open:
@@ -160,7 +160,7 @@ class ServiceServer:
             raise WireError(f"no memory for a request of {size} bytes") from None
 
     def _client_failed(self, error: OSError | WireError, fields: Header) -> None:
-        """Log the reason for disconnecting a client; if the client simply disconnected, log at level debug."""
+        """Log why a client was disconnected; if the client simply disconnected, log at level debug."""
         is_refused = isinstance(error, WireError) and not isinstance(error, PeerEndedError)
         log = self._refusals.warning if is_refused else _log.debug
         log("service %s: client %s is disconnected: %s", self.name, fields.get("callerid"), error)
@@ -264,14 +264,14 @@ class LoopServiceServer(ServiceServer):
 
 @dataclass(eq=False)
 class _Connection:
-    """One client of a service; ``busy`` is true from the first bytes of its request until its response has been sent."""
+    """One client of a service. ``busy`` is true from the first bytes of a request until its response has been sent."""
 
     sock: socket.socket
     busy: bool = False
 
 
 class AsyncServiceClient:
-    """A client on the loop, like the one in ``service_client.py``; created by :meth:`connect`, used by one task at a time."""
+    """An asyncio version of the client in ``service_client.py``. Created by :meth:`connect`; used by one task at a time."""
 
     def __init__(self, sock: socket.socket, header: Header) -> None:
         self.header = header
@@ -322,7 +322,7 @@ class AsyncServiceClient:
         return body
 
     def has_ended(self) -> bool:
-        """Return whether the server has disconnected, so that it would not read another request."""
+        """Return whether the server has disconnected and would not read another request."""
         return sockets.is_readable(self._sock)
 
     def hang_up(self) -> None:

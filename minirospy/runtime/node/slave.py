@@ -39,7 +39,7 @@ _BUMPED = re.compile(r"\[(/.*)\] Reason: new node registered with same name")
 
 
 class ServedNode(Protocol):
-    """The part of a node that the Slave API uses."""
+    """The interface to the node that the Slave API uses."""
 
     environment: Environment
     name: str
@@ -67,7 +67,7 @@ class ServedNode(Protocol):
         """Apply the complete list of a topic's publishers."""
 
     def request_shutdown(self, reason: str) -> None:
-        """Start to shut the node down."""
+        """Start shutting the node down."""
 
 
 class SlaveApi:
@@ -105,7 +105,7 @@ class SlaveApi:
         return self.dispatcher.dispatch(method, args)
 
     def get_bus_stats(self, caller_id: str) -> Answer:
-        """Return the transferred bytes and messages, by topic and connection."""
+        """Return the transferred bytes and messages, keyed by topic and connection."""
         publications = [
             [
                 publication.topic,
@@ -164,7 +164,7 @@ class SlaveApi:
         return [SUCCESS, "subscriptions", rows]
 
     def param_update(self, caller_id: str, key: str, value: object) -> Answer:
-        """Accept a new value for a subscribed parameter.
+        """Accept a subscribed parameter's new value.
 
         The key may be the parameter itself, its namespace, or a parameter below it.
         """
@@ -208,7 +208,7 @@ class SlaveApi:
 
 
 def _refusal_before_tcpros(protocols: object) -> Answer | None:
-    """Return rospy's response if the list does not contain TCPROS, or contains an invalid entry before it; otherwise None."""
+    """Return rospy's error response if the list lacks TCPROS or has an invalid entry before it, else None."""
     if not isinstance(protocols, (list, dict, str)):
         kind = type(protocols).__name__
         return [ERROR, f"Error: invalid arguments: {kind!r} object is not iterable", []]
@@ -229,6 +229,6 @@ def _refusal_before_tcpros(protocols: object) -> Answer | None:
 
 
 def connection_text(link: InLink | OutLink) -> str:
-    """Return a connection's description, whose numbers `rosnode info` prints. For a Unix socket it contains no port."""
+    """Return a connection's description; `rosnode info` prints its numbers. For a Unix socket it has no port."""
     on = f" on port {link.local_port}" if link.transport == "TCPROS" else ""
     return f"{link.transport} connection{on} to [{link.address} on socket {link.number}]"

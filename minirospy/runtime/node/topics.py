@@ -67,12 +67,12 @@ _LEAVE_SECONDS = 10.0
 _WORKED_SECONDS = 5.0
 
 Deliver = Callable[[Frame, Header], None]
-"""Called with each message's bytes, and the connection header of its publisher."""
+"""A function that is called with each message's bytes, and its publisher's connection header."""
 
 
 @dataclass(frozen=True)
 class InTurns:
-    """Options for a subscription that delivers messages of up to ``most`` bytes in steps on the loop; ``start`` runs the steps.
+    """Options to deliver a subscription's messages, of up to ``most`` bytes, in steps on the loop. ``start`` runs the steps.
 
     A longer message is skipped, and ``on_left_out`` is called with its publisher's connection header.
     """
@@ -97,7 +97,7 @@ class Publication:
         tcp_nodelay: bool = False,
         on_link: Callable[[OutLink, bool], None] | None = None,
     ) -> None:
-        """Queue up to ``queue_size`` frames for a slow subscriber (0: no limit; None: publish blocks).
+        """Create the publication. Queues up to ``queue_size`` frames for a slow subscriber (0: no limit; None: publish blocks).
 
         ``on_link(link, is_up)`` is called on the loop when a subscriber has connected or disconnected.
         """
@@ -139,7 +139,8 @@ class Publication:
                 link.wait()
 
     def accept(self, sock: socket.socket, fields: Header, caller_id: str, peer: str) -> str | None:
-        """Reply to a subscriber's header as node ``caller_id`` and start sending to it, or return the reason for refusing it.
+        """Reply to a subscriber's header as node ``caller_id`` and start sending, or return the reason for refusing the
+        subscriber.
 
         Call this on the loop.
         """
@@ -226,7 +227,7 @@ class InLink:
 
     @property
     def local_port(self) -> int:
-        """The local port; 0 if there is none, or the socket is closed."""
+        """The local port, or 0 if there is none or the socket is closed."""
         try:
             return int(self.sock.getsockname()[1]) if self.transport == "TCPROS" else 0
         except OSError:
@@ -305,7 +306,7 @@ class Subscription:
         this_host: str = "",
         unreachable: Unreachable | None = None,
     ) -> None:
-        """Create the subscription; ``this_host`` is the value of :func:`local.this_host`, or "" to not use Unix sockets.
+        """Create the subscription. ``this_host`` is the value of :func:`local.this_host`, or "" to avoid Unix sockets.
 
         All subscriptions of the node share ``unreachable``, because several subscriptions may lose the same publisher.
         """
@@ -396,7 +397,7 @@ class Subscription:
                 self._disconnect(action.uri)
 
     def _leave(self, uri: str) -> None:
-        """Continue to read from a publisher that has unregistered: messages that it published earlier may still be in transit.
+        """Keep reading from a publisher that has unregistered, because its earlier messages may still be in transit.
 
         The publisher closes the connection when everything is sent. If it does not, it is disconnected after a while.
         """
@@ -533,7 +534,7 @@ class Subscription:
         return link
 
     async def _reach(self, answer: object, uri: str) -> tuple[socket.socket, str]:
-        """Return a socket connected to the publisher that sent this response, and its address."""
+        """Connect to the publisher that sent this response; return the socket and the publisher's address."""
         unix = local.parse_answer(answer) if self._this_host else None
         if unix:
             with contextlib.suppress(OSError):
@@ -622,7 +623,7 @@ class Subscription:
 
 
 def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
-    """Return advice on which host has the wrong address, and which variable sets it."""
+    """Return advice: the host that has the wrong address, and the variable that sets it."""
     if not isinstance(error, OSError | RpcUnreachable):
         return "Its address is right, since it answered"
     if isinstance(error, RpcTimeout):
@@ -654,7 +655,7 @@ def _advice(uri: str, error: Exception, *, nameless: bool) -> str:
 
 
 class _NoPublisher(WireError):
-    """The response cannot come from a publisher: a retry would fail again, and rospy does not retry either."""
+    """The response cannot come from a publisher. A retry would fail again, and rospy does not retry either."""
 
 
 def _tcpros_address(answer: object, uri: str, topic: str) -> tuple[str, int]:

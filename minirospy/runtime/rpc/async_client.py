@@ -49,7 +49,7 @@ class AsyncRpcClient:
     def __init__(self, *, same_host: bool = True, max_answer: int = MAX_BODY) -> None:
         """Create the client.
 
-        ``same_host``: try a Unix socket first; ``max_answer``: the maximum size of a response in bytes.
+        ``same_host``: try a Unix socket first. ``max_answer``: maximum size of a response, in bytes.
         """
         self.same_host = same_host
         self.max_answer = max_answer
@@ -75,7 +75,7 @@ class AsyncRpcClient:
     def start(
         self, uri: str, body: bytes | list[bytes], timeout: float, done: Callable[[Body | RpcError], None]
     ) -> Call:
-        """Make the same call as :meth:`call` does, with callbacks: on a busy master a coroutine would double the cost.
+        """Like :meth:`call`, but with callbacks: on a busy master a coroutine would double the cost.
 
         ``body`` is the call as XML, possibly in pieces. ``done`` is called on the loop, possibly immediately, with the
         response as XML, or with the exception that :meth:`call` would raise.
@@ -99,7 +99,7 @@ class AsyncRpcClient:
         self.under_way.close()
 
     def acquire(self, address: _Address) -> _Connection | None:
-        """Return an idle connection to a server and remove it from the idle ones, or return None."""
+        """Take an idle connection to the server at ``address`` out of the pool, or return None if there is none."""
         kept = self.idle.get(address)
         if not kept:
             return None
@@ -109,7 +109,7 @@ class AsyncRpcClient:
         return connection
 
     def keep(self, connection: _Connection) -> None:
-        """Add a connection to the idle ones, so that the next call can use it."""
+        """Return a connection to the pool of idle ones, so that the next call can use it."""
         if self.closed:
             connection.close()
             return
@@ -127,7 +127,7 @@ class AsyncRpcClient:
             self._sweep = loop.call_later(KEEP_SECONDS, self._close_idle)
 
     def drop(self, connection: _Connection) -> None:
-        """Remove an idle connection that has closed."""
+        """Remove an idle connection that has closed from the pool."""
         connection.close()
         kept = self.idle[connection.address]
         kept.remove(connection)
@@ -385,7 +385,7 @@ class Call:
         self._next = 1
 
     def _send_early(self) -> None:
-        """Send now if the peer is on this machine, because such a connection is open before the loop reports it."""
+        """Send now if the peer is on this machine. Such a connection is open before the loop reports it."""
         assert self._connection
         try:
             sent = self._connection.sock.send(self._left)

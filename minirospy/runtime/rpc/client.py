@@ -31,7 +31,7 @@ class RpcClient:
     """
 
     def __init__(self, uri: str, timeout: float = 5.0, *, same_host: bool = True) -> None:
-        """Create the client for ``uri``. In seconds, ``timeout`` limits connecting (to 5 s at most) and each wait for data.
+        """Create the client for ``uri``. ``timeout``, in seconds, limits connecting (to 5 s at most) and each wait for data.
 
         ``same_host``: try a Unix socket first.
 

@@ -53,8 +53,9 @@ PROGRESS_BYTES = (
 
 _RECEIVE = 4096
 _RECEIVE_MORE = 16384
-"""Bytes per receive, for a new request and for the rest of a long one. The first is small, because all pipelined requests
-in one receive are parsed before the next client is served.
+"""Bytes per receive, for a new request and for the rest of a long one.
+
+The first value is small, because all pipelined requests in one receive are parsed before the next client is served.
 """
 
 _END_OF_HEAD = b"\r\n\r\n"
@@ -102,7 +103,7 @@ class Connection:
         self._message: HttpMessage | None = None
         self._has_deadline = False
         self._has_requested = False
-        # Bytes transferred since the time limit was set.
+        # Bytes transferred since the deadline was set.
         self._moved = 0
 
         self._task: asyncio.Task[None] | None = None
@@ -136,7 +137,7 @@ class Connection:
         self._enter(Event.END)
 
     def _enter(self, event: Event) -> bool:
-        """Move to the state that this event leads to, if any, and start or stop reading accordingly.
+        """Make the state transition for this event, if there is one, and start or stop reading accordingly.
 
         Return whether the state changed.
         """
@@ -211,7 +212,7 @@ class Connection:
             self.read()
 
     def read(self) -> None:
-        """Read available bytes. The rest of a long request, or data from a refused client, is read in steps."""
+        """Read available bytes. Read in steps if they belong to a long request or come from a refused client."""
         if not self._held and self._state is not _REFUSED:
             self._take(self._receive())
             return
@@ -279,7 +280,7 @@ class Connection:
         self._go_on()
 
     def _go_on(self) -> None:
-        """Continue reading requests, and process those that were waiting for this response."""
+        """Continue reading, and process the requests that were waiting for this response."""
         if self._enter(Event.ANSWERED):
             self._answer_waiting()
             self._set_deadline()
@@ -391,7 +392,7 @@ class Connection:
         self._finish(body, keep_alive)
 
     def _finish(self, body: bytes, keep_alive: bool) -> None:
-        """Send the response to a long-running request, then continue with the next request."""
+        """Send the response to a long-running request, then continue with the next one."""
         self._work = None
         if not self.is_refused:
             self._send(body, keep_alive)
@@ -414,7 +415,7 @@ class Connection:
             self._close()
 
     def log_refusal(self, why: str) -> None:
-        """Log that a request of the client was refused."""
+        """Log that one of the client's requests was refused."""
         self._server.log_refusal(self._sock, why)
 
     def _drop_request(self) -> None:
@@ -472,7 +473,7 @@ class Connection:
         self._server.limit_unread()
 
     def _count_unread(self, more: int) -> None:
-        """Add ``more``, which may be negative, to the number of bytes in responses that the client has not read."""
+        """Add ``more``, which may be negative, to the number of response bytes that the client has not read."""
         self._server.unread += more
         if not self._out:
             self._server.slow.pop(self, None)
@@ -538,7 +539,7 @@ class Connection:
 
 
 def _fault(method: str, error: Exception) -> bytes:
-    """Return the response to a call that failed."""
+    """Serialize the error response to a failed call."""
     match error:
         case RpcFault():
             return serialize_fault(error.code, error.text)

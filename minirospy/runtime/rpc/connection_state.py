@@ -56,7 +56,7 @@ class Event(Enum):
 _OPEN, _BUSY, _FULL, _CLOSING, _REFUSED, _ENDED = State
 
 READING = frozenset({_OPEN, _REFUSED})
-"""The states in which bytes are read from the socket."""
+"""The states in which the socket is read."""
 
 TRANSITIONS: Mapping[Event, Mapping[State, State]] = {
     Event.PIPELINED: {_OPEN: _BUSY},

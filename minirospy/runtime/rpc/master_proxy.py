@@ -18,7 +18,7 @@ __all__ = ["BusConnection", "MasterProxy", "SlaveProxy", "SystemState", "master_
 
 
 class SystemState(NamedTuple):
-    """Publishers, subscribers and service providers, each as a dict from topic or service name to node names."""
+    """Publishers, subscribers and service providers: for each, a dict from topic or service name to node names."""
 
     publishers: dict[str, list[str]]
     subscribers: dict[str, list[str]]
@@ -26,7 +26,7 @@ class SystemState(NamedTuple):
 
 
 class BusConnection(NamedTuple):
-    """One of a node's connections.
+    """One connection, as a node reports it.
 
     ``direction`` is "i", "o" or "b"; ``info`` and ``connected`` are set if the node reports them.
     """
@@ -113,7 +113,7 @@ class MasterProxy:
         return [(topic, type_) for topic, type_ in self.call("getPublishedTopics", subgraph)]
 
     def get_topic_types(self) -> dict[str, str]:
-        """Return the type of each topic that is registered with the master."""
+        """Return a dict from topic to type, for the topics registered with the master."""
         return dict(self.call("getTopicTypes"))
 
     def get_system_state(self) -> SystemState:
@@ -149,7 +149,7 @@ class MasterProxy:
         return int(self.call("unregisterService", name, service_api))
 
     def get_param(self, key: str) -> Any:
-        """Return a parameter's value, or a dictionary of the parameters below ``key``."""
+        """Return a parameter's value, or the parameters below ``key`` as a dictionary."""
         return self.call("getParam", key)
 
     def set_param(self, key: str, value: object) -> None:
@@ -220,7 +220,7 @@ class SlaveProxy:
         return str(self.call("getMasterUri"))
 
     def shutdown(self, reason: str = "") -> None:
-        """Request the node to shut down."""
+        """Ask the node to shut down."""
         self.call("shutdown", reason)
 
     def get_subscriptions(self) -> list[tuple[str, str]]:

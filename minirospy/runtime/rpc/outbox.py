@@ -50,7 +50,7 @@ class Outbox:
         return kept
 
     def flush(self) -> int:
-        """Send as much of the queue as the socket accepts; return the number of bytes sent.
+        """Send as much queued data as the socket accepts; return the number of bytes sent.
 
         Raise OSError if the connection has failed.
         """

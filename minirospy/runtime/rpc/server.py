@@ -41,8 +41,10 @@ LARGE_REQUEST = 32 * 1024  # bytes; requests up to this size are not refused bec
 _MAX_UNREAD_OF_ALL = 72 * 1024 * 1024
 
 _BACKLOG = 4096
-"""Maximum number of connections that the kernel queues. If the queue is full, the kernel drops a client's first segments, and
-the client resends them after growing delays: 1, 3, 7 s while connecting, up to 25 s for its request after that.
+"""Maximum number of connections that the kernel queues.
+
+If the queue is full, the kernel drops a client's first segments. The client resends them after growing delays: 1, 3, 7 s
+while connecting, then up to 25 s for its request.
 """
 
 _ACCEPTS_AT_ONCE, _ACCEPT_SECONDS = 1024, 0.015
@@ -64,7 +66,7 @@ _MAX_READS, _READS_SECONDS = 256, 0.01
 
 
 Dispatch = Callable[[str, list[object]], object]
-"""Called with a method name and arguments.
+"""A function that is called with a method name and arguments.
 
 Returns the value, an awaitable of it, or steps that compute it; may raise RpcFault.
 """
@@ -86,15 +88,14 @@ class RpcServer:
     ) -> None:
         """Create a server on ``port``; port 0 means any free port, chosen from ``ports`` if given.
 
-        Processes on this machine that address the server by one of the host names ``known_as`` may connect through a Unix
-        socket.
+        ``known_as``: host names by which processes on this machine may connect through a Unix socket.
 
         The ``most_idle`` most recently active clients stay connected (None: all). Clients that ``access`` does not allow are
         disconnected.
         """
         self.dispatch = dispatch
         self.port = port
-        self.refused = 0  # number of connections that were not allowed
+        self.refused = 0  # number of connections refused by ``access``
         self.held = 0  # total bytes of requests that are incomplete or being read
         self.holders: dict[Connection, int] = {}  # dict from connection to its share of ``held``, in bytes
         self.unread = 0  # total bytes of responses that clients have not read yet
@@ -186,7 +187,7 @@ class RpcServer:
         asyncio.get_running_loop().add_reader(sock, self._accept, sock)
 
     def admit(self, connection: Connection, *, is_new: bool) -> bool:
-        """Return whether to read from a readable connection now; if not, it is read in the next iteration.
+        """Return whether to read from a readable connection now. If not, it is read in the next iteration.
 
         ``is_new``: the connection has made no request yet.
         """
@@ -196,7 +197,7 @@ class RpcServer:
         return False
 
     def drop_late(self, connection: Connection) -> None:
-        """Remove a connection from those to read in the next iteration. Idempotent."""
+        """Cancel the read of a connection that is scheduled for the next iteration. Idempotent."""
         self._late_new.pop(connection, None)
         self._late.pop(connection, None)
 
@@ -283,7 +284,7 @@ class RpcServer:
     def log_refusal(self, sock: socket.socket, why: str) -> None:
         """Log a refused request, with a rate limit."""
         try:
-            # A peer on a Unix socket has no address.
+            # A peer connected by a Unix socket has no address.
             name = sock.getpeername()[0] if sock.family in sockets.FAMILIES else "this machine"
         except OSError:
             name = "a client"

@@ -88,7 +88,7 @@ class Turns:
         return self._clock() >= end
 
     def _run(self, steps: Steps[None], end: float) -> bool:
-        """Run ``steps`` until the time ``end``; return whether work remains."""
+        """Run ``steps`` until ``end``; return whether work remains."""
         self._running = steps
         try:
             while True:

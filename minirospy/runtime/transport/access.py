@@ -1,4 +1,4 @@
-"""Access control: the networks in ``--allow`` and MINIROSPY_ALLOW."""
+"""Access control: the networks set by ``--allow`` and MINIROSPY_ALLOW."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Access:
     def __init__(self, networks: Iterable[str] = ()) -> None:
         """Allow ``networks``, such as 192.168.65.0/24 or a single address. Raise UsageError if one is invalid."""
         self.networks = tuple(_network(text) for text in networks)
-        # A cache of decisions by address, because a robot has few peers, and they connect often.
+        # Cached decisions, keyed by address. A robot has few peers, and they connect often.
         self._known: dict[str, bool] = {}
 
     @classmethod
@@ -59,7 +59,7 @@ class Access:
 
 
 def listening_lines(bind_host: str, port: int, access: Access, *, local: bool = False) -> list[str]:
-    """Return lines with a server's addresses, and a warning if it is reachable from the open internet."""
+    """Return lines that list a server's addresses, and a warning if it is reachable from the open internet."""
     import ipaddress
 
     if local:

@@ -18,7 +18,7 @@ _CGROUP = Path("/sys/fs/cgroup")
 
 @contextlib.contextmanager
 def naming_thread_limit() -> Iterator[None]:
-    """Raise ThreadLimitError instead of RuntimeError if the system allows no more threads for those started in the block."""
+    """Raise ThreadLimitError instead of RuntimeError if a thread started in the block exceeds the system's limit."""
     try:
         yield
     except RuntimeError as error:
@@ -32,12 +32,12 @@ def naming_thread_limit() -> Iterator[None]:
 
 
 def is_file_limit(error: BaseException | None) -> bool:
-    """Return whether an error means that this process or machine can open no more files and sockets."""
+    """Return whether an error means that this process or machine cannot open more files or sockets."""
     return isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE)
 
 
 def explain(error: BaseException) -> str:
-    """Return an error's message; for a file limit, add the limit's name and how to raise it."""
+    """Return an error's message. For a file limit, add the limit's name and how to raise it."""
     if not is_file_limit(error):
         return str(error)
     assert isinstance(error, OSError)

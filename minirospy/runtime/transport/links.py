@@ -1,4 +1,4 @@
-"""The publisher's end of a link: the connection that carries a topic's frames after the handshake. Any thread may write.
+"""The publisher's end of a link, which is the connection that carries a topic's frames. Any thread may write.
 
 The subscriber's end is in :mod:`minirospy.runtime.transport.readers`.
 """
@@ -87,12 +87,12 @@ class OutLink:
 
     @property
     def waiting(self) -> int:
-        """Return the number of queued frames."""
+        """Return the number of frames in the queue."""
         return len(self._outbox)
 
     @property
     def waiting_bytes(self) -> int:
-        """Return the number of queued bytes."""
+        """Return the number of bytes in the queue."""
         with self._lock:
             return sum(
                 len(frame) if isinstance(frame, bytes) else sum(map(len, frame)) for frame in self._outbox
@@ -138,12 +138,12 @@ class OutLink:
             self._post(self._start_writing)
 
     def wait(self) -> None:
-        """Wait until the queue is sent, or the link is closed. Do not call this on the loop."""
+        """Wait until the queue is empty, or the link is closed. Do not call this on the loop."""
         with self._drained:
             self._drained.wait_for(lambda: not self._outbox or self._closed)
 
     async def drain(self, timeout: float) -> None:
-        """Do the same as :meth:`wait` on the loop, for at most ``timeout`` seconds."""
+        """Like :meth:`wait`, but on the loop, for at most ``timeout`` seconds."""
         end = self._loop.time() + timeout
         while self._outbox and self._loop.time() < end:
             await asyncio.sleep(0.005)
@@ -162,7 +162,7 @@ class OutLink:
         self._on_closed(self)
 
     def _has_to_wait(self, frame: _Waiting) -> bool:
-        """Append ``frame`` to the outbox and return True; return False if the outbox has become empty in the meantime."""
+        """Append ``frame`` to the outbox and return True. Return False if the outbox has become empty in the meantime."""
         outbox = self._outbox
         if not self.sent % _GATHER or (self._is_reading and self._is_full()):
             # Send from this thread, because a thread that publishes without pause would not let the loop's thread
@@ -300,7 +300,7 @@ class OutLink:
             outbox.popleft()
 
     def _readable(self) -> None:
-        """Close the link: a subscriber never sends data, so a readable socket means end of file."""
+        """Close the link. A subscriber never sends data, so a readable socket means end of file."""
         try:
             if self._sock.recv(4096):
                 return
@@ -312,7 +312,7 @@ class OutLink:
 
 
 def _take_off(buffers: list[bytes | memoryview], count: int) -> None:
-    """Remove the first ``count`` bytes from ``buffers``."""
+    """Drop the first ``count`` bytes from ``buffers``."""
     while count:
         first = buffers[0]
         if count < len(first):

@@ -32,7 +32,7 @@ class UnixAddress(NamedTuple):
 
 
 def this_host() -> str:
-    """Return a string that is equal in two processes if and only if abstract sockets can connect them; "" if unsupported."""
+    """Return a string that is the same in two processes if, and only if, abstract sockets can connect them. "" if unsupported."""
     if sys.platform != "linux":
         return ""
     try:
@@ -49,7 +49,7 @@ def name_of(host: str, port: int) -> str:
 
 
 def bind(host: str, port: int) -> socket.socket | None:
-    """Return a bound socket for ``port`` on a server known as ``host``, or None if that is not possible."""
+    """Bind a socket for ``port`` on a server known as ``host`` and return it, or None if that is not possible."""
     if sys.platform != "linux":
         return None
     try:
@@ -59,12 +59,12 @@ def bind(host: str, port: int) -> socket.socket | None:
 
 
 def connect(name: str) -> socket.socket:
-    """Return a connected, non-blocking socket; connecting a Unix socket does not block. Raise OSError if nothing listens."""
+    """Connect to the socket ``name``; return it in non-blocking mode. This does not block. Raise OSError if nothing listens."""
     return _open(name, lambda sock, address: sock.connect(address))
 
 
 def reach(host: str, port: int) -> socket.socket | None:
-    """Return a connected, non-blocking socket to the server at ``host`` and ``port``, or None if only TCP reaches it.
+    """Connect to the server at ``host`` and ``port``; return a non-blocking socket, or None if only TCP reaches it.
 
     Another user on this machine could bind the name first, so the server must belong to this user or root.
     """
@@ -92,7 +92,7 @@ def parse_answer(answer: object) -> UnixAddress | None:
 
 
 def _open(name: str, use: Callable[[socket.socket, bytes], None]) -> socket.socket:
-    """Return a non-blocking socket, bound or connected to ``name``. Raise OSError if that fails."""
+    """Return a non-blocking socket that is bound or connected to ``name``. Raise OSError if that fails."""
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         sock.setblocking(False)

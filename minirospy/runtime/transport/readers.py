@@ -1,4 +1,4 @@
-"""The subscriber's end of a link: the connection that carries a topic's frames after the handshake.
+"""The subscriber's end of a link, which is the connection that carries a topic's frames.
 
 Frames are read in a worker (:func:`read_frames`) or on the loop (:func:`watch_frames`, :func:`watch_frames_in_turns`).
 """
@@ -44,14 +44,14 @@ _log = logging.getLogger(__name__)
 
 
 class QueueSize(Protocol):
-    """The number of frames to queue for a slow receiver; it may change at any time."""
+    """The number of frames to keep for a slow receiver. It may change at any time."""
 
     newest: int
 
 
 @dataclass(eq=False)
 class ReaderSet:
-    """The readers of a node's topics. A reader that is the only active one may busy-poll for its next message.
+    """The readers of a node's topics. If only one reader is active, it may busy-poll for its next message.
 
     Two busy-polling readers would wait for each other's GIL, which takes longer than waking up.
     """
@@ -91,7 +91,7 @@ def watch_frames(
     on_end: Callable[[], None],
     on_fault: Callable[[Exception], None],
 ) -> None:
-    """Read frames on the loop, for receivers so quick that a separate thread for each would cost more.
+    """Read frames on the loop, for receivers that are so quick that a thread for each would cost more.
 
     ``on_fault`` is called with the OSError or WireError that closed the connection, before ``on_end``.
     """
@@ -164,7 +164,7 @@ def watch_frames_in_turns(
 
 
 class _FrameSource:
-    """Reads frames from a blocking socket: many small ones into one buffer, each large one into separate memory."""
+    """Reads frames from a blocking socket: small ones together into one buffer, each large one into separate memory."""
 
     def __init__(self, sock: socket.socket, readers: ReaderSet) -> None:
         self.sock = sock
@@ -176,7 +176,7 @@ class _FrameSource:
         self._is_fast = False
 
     def read(self) -> Iterable[Frame]:
-        """Wait for the next frames. Small ones are valid until the next call, large ones permanently.
+        """Wait for the next frames. Small frames are valid only until the next call; large frames stay valid.
 
         Raise _Ended if the peer closes, OSError if the connection fails, WireError if the data is invalid.
         """
@@ -259,7 +259,7 @@ class _FrameSource:
 def _deliver_newest(
     source: _FrameSource, frames: Iterable[Frame], deliver: Callable[[Frame], None], newest: int
 ) -> None:
-    """Read while frames are ready, then deliver the newest ones."""
+    """Read as long as frames are ready, then deliver the newest ones."""
     kept: deque[Frame] = deque(maxlen=newest)
     total = 0
     ended = False

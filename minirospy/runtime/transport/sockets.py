@@ -44,7 +44,7 @@ _PEER = struct.Struct("iII")  # layout of the kernel's credentials for a peer, s
 
 
 class Peer(NamedTuple):
-    """The process id, user id and group id of a process."""
+    """Process id, user id and group id of the process at the other end of a socket."""
 
     process: int
     user: int
@@ -68,7 +68,7 @@ def tune(sock: socket.socket, *, nodelay: bool = True) -> None:
 
 
 def enlarge_send_buffer(sock: socket.socket) -> None:
-    """Let a Unix socket buffer some megabytes, as far as the kernel allows; TCP enlarges its own buffers.
+    """Let a Unix socket buffer some megabytes, as far as the kernel allows. TCP enlarges its own buffers.
 
     Otherwise the receiver of a 1 MB message must run several times, and a busy machine may run another process in between.
     """
@@ -78,7 +78,7 @@ def enlarge_send_buffer(sock: socket.socket) -> None:
 
 
 def resolvable(host: str) -> bytes:
-    """Return a host name in the format that a resolver accepts. Raise OSError if it is not a host name.
+    """Encode a host name for a resolver. Raise OSError if it is not a host name.
 
     A str would make the resolver import the IDNA codec, which takes a tenth of a command's run time.
     """
@@ -94,7 +94,7 @@ def peer(sock: socket.socket) -> Peer:
 
 
 def hang_up(sock: socket.socket) -> None:
-    """Shut a connection down; a thread that is blocked reading from it wakes up and closes it."""
+    """Shut a connection down. A thread that is blocked reading from it wakes up and closes it."""
     with contextlib.suppress(OSError):
         sock.shutdown(socket.SHUT_RDWR)
 
@@ -107,7 +107,7 @@ def is_readable(sock: socket.socket) -> bool:
 
 
 def is_writable(sock: socket.socket, milliseconds: int) -> bool:
-    """Return whether the socket becomes writable within the timeout; busy-polls first, as busy_poll() does."""
+    """Return whether the socket becomes writable within the timeout. Busy-polls first, like busy_poll()."""
     if hasattr(select, "poll"):
         return (may_busy_poll(sock) and _busy_poll(sock, select.POLLOUT)) or bool(
             _poll(sock, select.POLLOUT).poll(milliseconds)
@@ -149,7 +149,7 @@ def busy_receive(sock: socket.socket, space: memoryview) -> int:
 
 
 def _busy_poll(sock: socket.socket, events: int) -> bool:
-    """Poll for the events for up to a fifth of a millisecond; return whether they occurred."""
+    """Poll for ``events`` for up to a fifth of a millisecond; return whether they occurred."""
     poll = _poll(sock, events)
     end = time.perf_counter() + BUSY_POLL_SECONDS
     while True:

@@ -1,4 +1,4 @@
-"""TCP sockets on the loop: listening, connecting, and the exact reads in a handshake.
+"""TCP sockets on the loop: listening, connecting, and the exact reads of a handshake.
 
 A handshake reads exactly a header's bytes and nothing after them, so that the socket can be passed on to a worker or a
 writer.
@@ -87,7 +87,7 @@ async def connect(host: str, port: int, timeout: float = sockets.HANDSHAKE_SECON
 
 
 class HeaderMemory:
-    """The memory reserved for long headers that are being received from many peers."""
+    """The memory reserved for receiving long headers from many peers."""
 
     def __init__(self, most: int = _MAX_LONG_HEADERS) -> None:
         self.held = 0  # bytes reserved
@@ -134,7 +134,7 @@ class Listener:
     """A listening TCP socket; each connection is passed to ``accept`` in a separate task.
 
     ``accept(socket, address)`` does the handshake. If it raises OSError or WireError, the error is logged and the
-    connection closed. The number of unfinished handshakes is limited. ``allows(peer's address, own address)`` returns
+    connection closed. The number of unfinished handshakes is limited. ``allows(peer_address, own_address)`` returns
     whether a peer may connect.
     """
 
@@ -212,7 +212,7 @@ class Listener:
             return
         if len(self.handshakes) >= MAX_HANDSHAKES:
             self._end_oldest(f"it sent nothing, and {MAX_HANDSHAKES} others are waiting")
-        # A peer on a Unix socket has no address.
+        # A peer connected by a Unix socket has no address.
         where = f"{address[0]}:{address[1]}" if isinstance(address, tuple) else "this machine"
         task = asyncio.ensure_future(self._handle(peer, where))
         self.handshakes[task] = where
@@ -264,7 +264,7 @@ def _bind(host: str, port: int) -> socket.socket:
 
 
 async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | int | bytes, ...]]]:
-    """Return (family, address) for each address of a host; an IP address or "localhost" needs no resolver.
+    """Return (family, address) for each of a host's addresses. An IP address or "localhost" needs no resolver.
 
     IPv4 addresses are first, because ROS 1 servers listen there, while many resolvers return IPv6 first. Raise OSError if
     the host cannot be resolved.
@@ -285,7 +285,7 @@ async def _addresses(host: str, port: int) -> Sequence[tuple[int, tuple[str | in
 
 
 def _header_at_hand(sock: socket.socket) -> Header | None:
-    """Return a header that has already arrived completely, or None. Most headers have, which saves a task and a timer."""
+    """Return a header that has already arrived completely, or None. Most headers have arrived, which saves a task and a timer."""
     try:
         seen = sock.recv(_AT_HAND, socket.MSG_PEEK)
     except (BlockingIOError, InterruptedError):

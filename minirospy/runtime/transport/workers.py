@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 
 
 class Workers:
-    """A pool of daemon threads that remain for a while after their function returns, because starting a thread is expensive.
+    """A pool of daemon threads. A thread stays for a while after its function returns, because starting one is expensive.
 
     Their number is not limited: each connection that waits for bytes uses one, and the number of peers is limited when they
     are accepted.

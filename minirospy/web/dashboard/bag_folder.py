@@ -104,7 +104,7 @@ class BagFolder:
         return path
 
     def _entries(self) -> Iterator[os.DirEntry[str]]:
-        """Yield the bags in the folder and its subfolders, level by level."""
+        """Yield the bags in the folder and its subfolders, breadth first."""
         left = _MAX_ENTRIES
         level = [self.root]
         for _ in range(_MAX_DEPTH):

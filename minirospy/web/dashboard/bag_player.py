@@ -37,7 +37,7 @@ class GraphOutput:
     """Publishes a player's messages on the loop's graph: the messages on enabled topics, and the clock."""
 
     def __init__(self, graph: SharedGraph) -> None:
-        """Create the output. Must be called on the loop."""
+        """Create the output for ``graph``. Must be called on the loop."""
         self._graph = graph
         self._loop = asyncio.get_running_loop()
         self._publications: dict[str, Publication] = {}

@@ -63,7 +63,7 @@ class LinkFile:
 
 
 def open_link(link: str) -> Callable[[], object] | None:
-    """Open a link without waiting for the browser; return a function that removes the link's file, or None if nothing was opened.
+    """Open a link without waiting for the browser; return a function that removes the link's file (None: nothing was opened).
 
     Nothing is opened without a display, or if the file cannot be created.
     """

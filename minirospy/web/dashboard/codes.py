@@ -50,7 +50,7 @@ class Codes:
         return code
 
     def when_ended(self, code: str, action: Callable[[], object]) -> None:
-        """Call ``action`` once, when a code has been used, has expired or has been discarded."""
+        """Call ``action`` once, when the code has been used, has expired or has been discarded."""
         found = self._waiting.get(code)
         if found:
             self._waiting[code] = found._replace(on_end=action)
@@ -58,7 +58,7 @@ class Codes:
             action()
 
     def token_of(self, code: str) -> str:
-        """Return the token for a code, without using up the code, or "" if the code is not valid."""
+        """Return the token for a code, or "" if the code is not valid. The code stays valid."""
         self.forget_expired()
         found = self._waiting.get(code)
         return found.token if found else ""
@@ -70,7 +70,7 @@ class Codes:
         return token
 
     def forget_expired(self) -> None:
-        """Discard expired codes."""
+        """Discard the expired codes."""
         now = self._clock()
         for code in [code for code, found in self._waiting.items() if now >= found.end]:
             self._forget(code)

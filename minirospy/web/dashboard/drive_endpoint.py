@@ -91,7 +91,7 @@ class Joystick:
 
 @dataclass(frozen=True)
 class Command:
-    """A client's command: a topic, and the message to publish, which is None if the client no longer drives the topic."""
+    """A client's command: a topic and the message to publish. The message is None if the client no longer drives the topic."""
 
     topic: str
     held: Velocity | Joystick | None
@@ -298,7 +298,7 @@ class _Driven:
             self._loop.call_soon_threadsafe(self._stopped, self._topic)
 
     def _publish(self, held: Velocity | Joystick) -> None:
-        """Publish a command now or, if subscribers are still connecting, publish the newest command once they are connected.
+        """Publish a command now. If subscribers are still connecting, publish the newest command once they are connected.
 
         The caller must hold the lock.
         """

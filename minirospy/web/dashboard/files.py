@@ -52,7 +52,7 @@ class PageFile:
 
 
 def read_folder(folder: Path = FOLDER) -> dict[str, PageFile]:
-    """Return the files by request path; the path ``/`` is index.html."""
+    """Return a dict from request path to file; the path ``/`` is index.html."""
     found = {}
     for path in sorted(folder.rglob("*")):
         content_type = _TYPES.get(path.suffix)

@@ -327,7 +327,7 @@ class JointSession(JsonSession):
         return "" if self.client.may_write else "this token is read-only: it sets no joints"
 
     async def follow(self) -> None:
-        """Send the joints if they have been read again, and the joints' positions."""
+        """Send the joints if they have been reloaded, and their positions."""
         if self._generation != self._endpoint.generation:
             self._generation = self._endpoint.generation
             self.send(self._endpoint.description())
@@ -353,7 +353,7 @@ class JointSession(JsonSession):
 
 
 def _finite(value: float) -> float:
-    """Replace an infinite limit with a finite number, because JSON cannot represent infinity."""
+    """Replace an infinite limit with a large finite number, because JSON cannot represent infinity."""
     return min(max(value, -_FARTHEST), _FARTHEST) if not math.isnan(value) else 0.0
 
 
@@ -376,7 +376,7 @@ def _described(
 
 
 def _kinds(description: str) -> tuple[str, dict[str, str]]:
-    """Return the robot's name and its joints' types, which determine the units."""
+    """Return the robot's name and a dict from joint to type; the types determine the units."""
     root = parse_xml(description, "robot_description")
     kinds = {
         joint.attributes.get("name", ""): joint.attributes.get("type", "") for joint in root.all("joint")

@@ -66,7 +66,7 @@ class JsonSession:
         self.is_ended = False
         self._handlers = handlers
         self._operations: deque[tuple[str, Fields, int]] = deque()
-        """The name, fields and memory (bytes) of each queued operation."""
+        """The queued operations: name, fields, and memory in bytes."""
         self._carried_out_size = 0  # memory used by the running operations, in bytes
         self._operation_size = 0  # memory used by the last received operation, in bytes
         self._thread = ThreadPoolExecutor(1, type(self).__name__)
@@ -114,7 +114,7 @@ class JsonSession:
         self._wake.set()
 
     def count(self) -> None:
-        """Add the memory used for this client to the server's total."""
+        """Charge the memory used for this client to the server's account."""
         self.client.holds(self._carried_out_size + sum(size for _, _, size in self._operations))
 
     async def in_thread(self, work: Callable[[], _T]) -> _T:
@@ -321,7 +321,7 @@ class JsonEndpoint(Generic[_S]):
 
 
 async def wait_until(event: asyncio.Event, end: float) -> None:
-    """Wait for an event until the loop's clock reaches ``end``. After a timeout, the clock is certain to be past ``end``."""
+    """Wait for an event until the loop's clock reaches ``end``. After a timeout, the clock has certainly passed ``end``."""
     # Do not use asyncio.wait_for, because before Python 3.12 it may lose a cancellation that coincides with the
     # event. Add the clock's resolution, because a loop runs timers early by that much, and callers that compare times
     # would spin until the clock advances.
@@ -335,7 +335,7 @@ async def wait_until(event: asyncio.Event, end: float) -> None:
 
 
 def text_of(fields: Fields, name: str) -> str:
-    """Return a string field of an operation. Raise LookupError if it is missing, TypeError if it is not a string."""
+    """Return an operation's string field. Raise LookupError if it is missing, TypeError if it is not a string."""
     value = fields[name]
     if not isinstance(value, str):
         raise TypeError(f"{name} is a text")
@@ -343,7 +343,7 @@ def text_of(fields: Fields, name: str) -> str:
 
 
 def texts_of(fields: Fields, name: str) -> list[str]:
-    """Return an operation's field that is a list of strings.
+    """Return an operation's list-of-strings field.
 
     Raise LookupError if it is missing, TypeError if it is not a list.
     """

@@ -31,12 +31,12 @@ __all__ = ["SUBPROTOCOL", "LaunchEndpoint", "LaunchSession"]
 SUBPROTOCOL = "minirospy.launch.v1"
 
 _LOG_SECONDS = 0.2
-"""Poll interval in seconds for a log file that a page shows; polling is necessary, because a file reports no changes."""
+"""Poll interval in seconds for a log file that a page shows. Polling is necessary, because files report no changes."""
 
 _STOPPING_SECONDS = 0.2
 _MAX_RUNS = 50
 _MAX_ENDED = 20
-"""Maximum number of ended launches that are stored with their last lines."""
+"""Maximum number of ended launches that are kept, with their last lines."""
 
 _TAIL_BYTES = 64 * 1024
 
@@ -233,7 +233,7 @@ class LaunchSession(JsonSession):
             self.client.send_text_message("launches", text.encode(), newest_only=True)
 
     async def _send_log(self) -> bool:
-        """Send new log lines; return whether to check again even if the launch's state does not change."""
+        """Send new log lines. Return whether to poll the log again even if the launch's state does not change."""
         tail = self._tail
         if tail is None:
             return False

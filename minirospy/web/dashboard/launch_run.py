@@ -1,4 +1,4 @@
-"""A launch file that runs for the page: roslaunch's launcher in a thread, with all output in log files."""
+"""A launch file run for the page: roslaunch's launcher in a thread, with all output in log files."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class NodeState(NamedTuple):
 
 
 class RunState(NamedTuple):
-    """A launch, which is starting, running, stopping or ended; ``error``: the error that ended the launch, or ""."""
+    """A launch's state: starting, running, stopping or ended. ``error`` is the error that ended it, or ""."""
 
     id: int
     package: str

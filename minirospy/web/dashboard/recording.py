@@ -21,23 +21,22 @@ from minirospy.ros.roslaunch.launcher.process import Guardian, Process, Timeouts
 __all__ = ["COMPRESSIONS", "Recording", "RecordingState"]
 
 _TIMEOUTS = Timeouts(interrupt=120.0, terminate=10.0)
-"""Timeouts in seconds for stopping. The timeouts are long, because after SIGINT the file is completed, possibly on a slow
-disk.
-"""
+"""Timeouts in seconds for stopping. They are long, because after SIGINT the file is completed, possibly on a slow disk."""
 
 TIMEOUTS_BEFORE_FILE = Timeouts(interrupt=5.0, terminate=10.0)
-"""Timeouts while no file is open. The timeouts are short, because a starting interpreter may lose a SIGINT that arrives in
-a callback of importlib.
+"""Timeouts while no file is open.
+
+They are short, because a starting interpreter may lose a SIGINT that arrives in a callback of importlib.
 """
 
 _MAX_LINES = 20
 COMPRESSIONS = {".bag": {"none": [], "lz4": ["--lz4"], "bz2": ["--bz2"]},
                 ".mcap": {"none": [], "lz4": ["--lz4"], "zstd": ["--zstd"]}}  # fmt: skip
-"""Arguments for `rosbag record` by file type and compression."""
+"""Arguments for `rosbag record`, keyed by file type and compression."""
 
 
 class RecordingState(NamedTuple):
-    """A recording: its file's name, topics, seconds, and size in bytes.
+    """A recording's state: file name, topics, duration in seconds, and size in bytes.
 
     ``error`` describes why an ended recording failed; it is "" if it did not fail.
     """

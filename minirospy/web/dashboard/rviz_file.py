@@ -110,7 +110,7 @@ def _scalar(event: yaml.ScalarEvent) -> object:
 
 
 def format_rviz(config: Mapping[str, object]) -> str:
-    """Return the text of a .rviz file as RViz writes it: keys sorted, lists indented below their key.
+    """Format a .rviz file as RViz does: keys sorted, lists indented below their key.
 
     Raise RvizFileError if ``config`` is nested more deeply than :func:`parse_rviz` accepts.
     """

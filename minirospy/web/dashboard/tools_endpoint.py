@@ -53,7 +53,7 @@ _MAX_CONCURRENT = 4
 
 
 class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
-    """Serves requests from pages. ``tool`` is the caller_id for calls to nodes."""
+    """Serves requests from pages. ``tool`` is the caller_id used to call nodes."""
 
     def __init__(self, master_uri: str, tool: str = "minirospy_dashboard") -> None:
         super().__init__(SUBPROTOCOL, lambda client: ToolsSession(self, client))
@@ -92,7 +92,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             session.report(_report_of(describe(self._last)))
 
     def unwatch(self, session: ToolsSession) -> None:
-        """Stop sending reports to a session. Without sessions, nodes are not queried."""
+        """Stop sending reports to a session. If no sessions are left, nodes are not queried."""
         self._watching.discard(session)
         if not self._watching and self._reporting:
             self._reporting.cancel()
@@ -116,7 +116,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
             await asyncio.sleep(max(REPORT_SECONDS, 2 * (time.monotonic() - started)))
 
     def topic_types(self) -> Mapping[str, str]:
-        """Return the topic types that the master knows; ``*`` if a topic has only subscribers to any type."""
+        """Return a dict from topic to the type that the master knows, or ``*`` if the topic only has subscribers to any type."""
         with self.graph() as graph:
             return graph.master.get_topic_types()
 
@@ -126,7 +126,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
 
 
 class ToolsSession(JsonSession):
-    """A client's session. When a request is done, a response with the request's ``id`` is sent."""
+    """One client's session. Each request gets a response with the request's ``id``."""
 
     subject: ClassVar[str] = "the graph"
     longest: ClassVar[int] = 100_000
@@ -210,7 +210,7 @@ class ToolsSession(JsonSession):
         return {}
 
     async def _ping(self, fields: Fields) -> Fields:
-        """Return how long a call to ``node`` takes, in seconds."""
+        """Call ``node`` and return the round-trip time in seconds."""
 
         name = text_of(fields, "node")
 
@@ -221,7 +221,7 @@ class ToolsSession(JsonSession):
         return {"seconds": await self.in_thread(ping)}
 
     async def _kill(self, fields: Fields) -> Fields:
-        """Request ``node`` to shut down."""
+        """Ask ``node`` to shut down."""
         self._require_writing("shuts down no node")
         name = text_of(fields, "node")
 
@@ -271,7 +271,7 @@ class ToolsSession(JsonSession):
             raise UsageError(f"this token is read-only: it {what}")
 
     async def _yaml(self, fields: Fields) -> Fields:
-        """Return the values, by name, in a file from rqt_reconfigure or dynparam."""
+        """Return the values, keyed by name, in a file saved by rqt_reconfigure or dynparam."""
         text = text_of(fields, "text")
         loop = asyncio.get_running_loop()
         values = await loop.run_in_executor(self._endpoint.parser, parameter_values, text)
@@ -282,7 +282,7 @@ class ToolsSession(JsonSession):
         }
 
     async def _value(self, fields: Fields) -> Fields:
-        """Return the type and YAML text of the value that `rosparam set` would store for ``text``."""
+        """Parse ``text`` as `rosparam set` does; return the value's type and its YAML text."""
         value = await self._parsed(fields)
         return {"type": _type_name(value), "text": format_value(value)[:_MAX_PREVIEW]}
 

@@ -1,4 +1,4 @@
-"""The channels and services offered to all clients of the Foxglove protocol, with ids for the graph's topics and services."""
+"""The channels and services offered to all clients of the Foxglove protocol. Assigns ids to the graph's topics and services."""
 
 from __future__ import annotations
 
@@ -14,13 +14,11 @@ from minirospy.web.graph import SharedGraph
 __all__ = ["Channels", "Services"]
 
 TYPE_SECONDS = 3.0
-"""Timeout in seconds for querying topic types that are not installed. The timeout is short, because all clients wait for
-the channels.
-"""
+"""Timeout in seconds for querying topic types that are not installed. It is short, because all clients wait for the channels."""
 
 
 class Channels:
-    """Topics as channels. A topic whose type or definition changes gets a new channel."""
+    """The graph's topics as channels. A topic whose type or definition changes gets a new channel."""
 
     def __init__(self) -> None:
         self.by_id: dict[int, Channel] = {}
@@ -107,7 +105,7 @@ class Channels:
 
 
 class Services:
-    """Services with ids. A service whose type changes gets a new id."""
+    """The graph's services, each with an id. A service whose type changes gets a new id."""
 
     def __init__(self) -> None:
         self.by_id: dict[int, ServiceOffer] = {}

@@ -28,7 +28,7 @@ __all__ = ["CAPABILITIES", "FoxgloveEndpoint", "FoxgloveOptions"]
 _log = logging.getLogger(__name__)
 
 CAPABILITIES = ("clientPublish", "parameters", "parametersSubscribe", "services", "connectionGraph", "assets")
-"""The default capabilities of clients."""
+"""The capabilities that clients have by default."""
 
 _FOR_WRITERS = {"clientPublish", "services", "playbackControl"}
 _DROP_REPORT_SECONDS = 2.0
@@ -38,7 +38,7 @@ _DROP_REPORT_SECONDS = 2.0
 class FoxgloveOptions:
     """The options of the endpoint.
 
-    ``name`` is the server's name that clients show; ``session_id`` is different for each start of the bridge.
+    ``name`` is the server name shown by clients; ``session_id`` is different for each start of the bridge.
     """
 
     name: str = "minirospy bridge"
@@ -175,7 +175,7 @@ class FoxgloveEndpoint:
             self._updating = self.graph.spawn(self._update())
 
     async def _update(self) -> None:
-        """Advertise new channels and services and remove old ones; repeat this if the graph has changed in the meantime."""
+        """Advertise new channels and services and remove old ones. Repeat if the graph has changed in the meantime."""
         while self._is_outdated:
             self._is_outdated = False
             new_services, removed_services = self.services.update(self.graph)

@@ -36,7 +36,7 @@ async def _start(node: Node) -> Bridge:
 
 
 def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
-    """Return the options for a node's private parameters. Raise BridgeError if one is invalid."""
+    """Return the options set by a node's private parameters. Raise BridgeError if one is invalid."""
     uses_tls = value(private, "tls", bool, False)
     certificate = value(private, "certfile", str, "")
     if uses_tls and not certificate:

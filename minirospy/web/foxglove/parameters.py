@@ -27,12 +27,12 @@ class Parameters:
     def __init__(self, graph: SharedGraph) -> None:
         self._graph = graph
         self._wanted: dict[ParameterListener, set[str] | None] = {}
-        """The names that each client subscribes to; None means all."""
+        """The parameter names that each client subscribes to; None means all."""
         self._is_watching = False
         self._at_master = asyncio.Lock()
 
     async def read(self, names: tuple[str, ...]) -> list[Parameter]:
-        """Return parameters, or all if ``names`` is empty.
+        """Return the named parameters, or all if ``names`` is empty.
 
         Raise MasterUnreachableError or RpcError if the master's call fails.
         """
@@ -102,7 +102,7 @@ class Parameters:
             self._graph.spawn(self._in_order(self._graph.node.parameters.remove))
 
     async def _in_order(self, request: Callable[[str], Awaitable[object]]) -> None:
-        """Subscribe or unsubscribe at the master after earlier requests are done.
+        """Call the master to subscribe or unsubscribe, after earlier requests have finished.
 
         Otherwise requests could overtake each other, because each may use its own connection.
         """

@@ -116,7 +116,7 @@ class GraphTables(NamedTuple):
 
 
 class PlaybackState(NamedTuple):
-    """A player's status, position (nanoseconds) and speed; ``request_id``: the request to which this state responds."""
+    """A player's status, position (nanoseconds) and speed. ``request_id`` identifies the request that this state answers."""
 
     status: PlaybackStatus
     now: int
@@ -134,7 +134,7 @@ class Subscribe:
 
 @dataclass(frozen=True)
 class Unsubscribe:
-    """Cancel subscriptions."""
+    """Cancel the subscriptions with these ids."""
 
     ids: tuple[int, ...]
 
@@ -150,14 +150,14 @@ class ClientChannel(NamedTuple):
 
 @dataclass(frozen=True)
 class ClientAdvertise:
-    """Advertise topics."""
+    """Advertise the topics that a client publishes."""
 
     channels: tuple[ClientChannel, ...]
 
 
 @dataclass(frozen=True)
 class ClientUnadvertise:
-    """Unadvertise topics."""
+    """Unadvertise topics that a client published."""
 
     ids: tuple[int, ...]
 
@@ -243,7 +243,7 @@ class Playback(Protocol):
 
     @property
     def range(self) -> tuple[int, int]:
-        """Return the start and end of the recording, in nanoseconds."""
+        """Return the recording's start and end times, in nanoseconds."""
 
     def now(self) -> int:
         """Return the current playback time, used as messages' timestamp."""

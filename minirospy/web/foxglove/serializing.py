@@ -72,7 +72,7 @@ def server_info(
 
 
 def status(level: StatusLevel, message: str, id_: str | None = None) -> str:
-    """Return a status message. Clients replace it when a later message has the same id."""
+    """Return a status message. A later message with the same id replaces it in the client."""
     fields: dict[str, object] = {"op": "status", "level": int(level), "message": message}
     if id_ is not None:
         fields["id"] = id_
@@ -80,7 +80,7 @@ def status(level: StatusLevel, message: str, id_: str | None = None) -> str:
 
 
 def remove_status(ids: Iterable[str]) -> str:
-    """Return the message that removes status messages."""
+    """Return the message that removes the status messages with these ids."""
     return _dump({"op": "removeStatus", "statusIds": list(ids)})
 
 
@@ -101,7 +101,7 @@ def advertise(channels: Iterable[Channel]) -> str:
 
 
 def unadvertise(ids: Iterable[int]) -> str:
-    """Return the message that removes channels."""
+    """Return the message that removes the channels with these ids."""
     return _dump({"op": "unadvertise", "channelIds": list(ids)})
 
 
@@ -132,12 +132,12 @@ def advertise_services(services: Iterable[ServiceOffer]) -> str:
 
 
 def unadvertise_services(ids: Iterable[int]) -> str:
-    """Return the message that removes services."""
+    """Return the message that removes the services with these ids."""
     return _dump({"op": "unadvertiseServices", "serviceIds": list(ids)})
 
 
 def parameter_values(parameters: Iterable[Parameter], id_: str | None = None) -> str:
-    """Return the message with parameter values."""
+    """Return the message that contains parameter values."""
     fields: dict[str, object] = {
         "op": "parameterValues",
         "parameters": [_parameter_fields(parameter) for parameter in parameters],
@@ -148,14 +148,14 @@ def parameter_values(parameters: Iterable[Parameter], id_: str | None = None) ->
 
 
 def service_call_failure(service_id: int, call_id: int, message: str) -> str:
-    """Return the message for a failed call."""
+    """Return the message that reports a failed service call."""
     return _dump({"op": "serviceCallFailure", "serviceId": service_id, "callId": call_id, "message": message})
 
 
 def connection_graph_update(
     changed: GraphTables, removed_topics: Iterable[str], removed_services: Iterable[str]
 ) -> str:
-    """Return the message with the changed entries of the tables, each in full, and the removed names."""
+    """Return the message with the tables' changed entries, each in full, and the removed names."""
 
     def listed(table: Mapping[str, Sequence[str]], key: str) -> list[dict[str, object]]:
         return [{"name": name, key: list(nodes)} for name, nodes in table.items()]
@@ -223,7 +223,7 @@ def _parameter_fields(parameter: Parameter) -> dict[str, object]:
 
 
 def _json_value(value: object) -> object:
-    """Return a parameter's value for JSON: bytes become base64, numbers that JSON lacks become strings."""
+    """Convert a parameter's value for JSON: bytes become base64, and numbers that JSON lacks become strings."""
     if isinstance(value, dict):
         return {str(key): _json_value(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -45,7 +45,9 @@ _MAX_CALLS = 200
 """Maximum number of concurrent calls and requests from one client."""
 
 _MAX_CHANNELS = 1000
-"""Maximum number of topics that one client may publish, and of its subscriptions, each of which receives every message."""
+"""Maximum number of topics that one client may publish, and of its subscriptions, because each subscription receives every
+message.
+"""
 
 _MAX_PARAMETERS = 10_000
 """Maximum number of parameter names to which one client may subscribe."""
@@ -59,7 +61,7 @@ _TIME = "time"  # key of time messages in a client's queue, which keeps only the
 
 
 class FoxgloveServer(Protocol):
-    """The endpoint, as the sessions of its clients use it."""
+    """The endpoint's interface for its clients' sessions."""
 
     graph: SharedGraph
     assets: Assets

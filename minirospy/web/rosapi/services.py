@@ -197,7 +197,7 @@ class Rosapi:
         return {"type": await self._type_of(self.node.resolve(request.service))}
 
     async def _service_providers(self, request: ServiceProvidersRequest) -> object:
-        """Return the nodes that provide services of a type; ``service`` is the type, despite its name."""
+        """Return the nodes that provide services of a type. Despite its name, ``service`` is the type."""
         found = await self._services_of(request.service)
         return {"providers": [node for _, nodes in found for node in nodes]}
 
@@ -283,7 +283,7 @@ class Rosapi:
 
 
 def _guarded(handler: _Handler) -> _Handler:
-    """Return a handler that reports a BridgeError to the client in one line, without a traceback in the log."""
+    """Wrap a handler so that a BridgeError is reported to the client in one line, without a traceback in the log."""
 
     async def handle(request: object) -> object:
         try:

@@ -36,13 +36,13 @@ _FORMATS = {64: "B", 68: "B", **dict(TYPED_ARRAYS.values())}
 
 
 def encode_cbor(value: object) -> bytes:
-    """Return a value as CBOR. Raise BridgeProtocolError if cbor2 is not installed."""
+    """Encode a value as CBOR. Raise BridgeProtocolError if cbor2 is not installed."""
     data: bytes = _library().dumps(value)
     return data
 
 
 def decode_cbor(data: bytes) -> object:
-    """Return the value in CBOR data; typed arrays become lists.
+    """Decode CBOR data; typed arrays become lists.
 
     Raise ValueError if the data is invalid, BridgeProtocolError if cbor2 is not installed.
     """
@@ -63,7 +63,7 @@ def decode_cbor(data: bytes) -> object:
 def _check_heads(data: bytes) -> None:
     """Raise ValueError if there are too many values, or tags that messages do not use.
 
-    For other tags, cbor2 would for example compile regular expressions.
+    Given other tags, cbor2 would, for example, compile regular expressions.
     """
     at = count = 0
     while at < len(data):
@@ -94,7 +94,7 @@ def typed_array(type_: str, values: Sequence[float]) -> object:
 
 
 def _from_tag(first: Any, second: Any = None, *_: object) -> object:
-    """Return the list for a typed array. Older versions of cbor2 pass their decoder as first argument."""
+    """Convert a typed array to a list. Older versions of cbor2 pass their decoder as first argument."""
     tag = first if hasattr(first, "tag") else second
     format_ = _FORMATS.get(tag.tag)
     if format_ is None or not isinstance(tag.value, bytes):

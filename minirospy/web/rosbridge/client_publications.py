@@ -31,14 +31,14 @@ class _Published:
     publication: Publication
     message_class: type[Message]
     latch: bool = False
-    latched: int = 0  # bytes of the last message, if it is stored for later subscribers
+    latched: int = 0  # size in bytes of the last message, if it is latched for later subscribers
     ids: set[object] = field(default_factory=set)  # ids of the advertisements
     # sequence numbers for headers
     numbers: itertools.count[int] = field(default_factory=lambda: itertools.count(1))
 
 
 class ClientPublications:
-    """The topics that one client publishes. Called with the client's operations in order."""
+    """The topics that one client publishes. Its methods are called in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
         self.latched_size = 0
@@ -118,7 +118,7 @@ class ClientPublications:
         await self._publish_when_joined(published.publication, body)
 
     def _count_latched(self, published: _Published, body: bytes) -> None:
-        """Count a message that is stored as the latched one.
+        """Count the memory of a message that is stored as the latched message.
 
         Raise BridgeError if the client's latched messages exceed the limit.
         """

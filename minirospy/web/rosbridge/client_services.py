@@ -27,7 +27,7 @@ _MAX_SERVICES = 200  # maximum services that one client offers
 
 
 class ClientServices:
-    """The calls and services of one client. Called with the client's operations in order."""
+    """The calls and services of one client. Its methods are called in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
         self.calls_size = 0
@@ -37,7 +37,7 @@ class ClientServices:
         self._reporter = ErrorReporter(_log, "a client's call of a service")
 
     def close(self) -> None:
-        """Stop offering the client's services. The client's calls are tasks of the session, which cancels them itself."""
+        """Stop offering the client's services. The session itself cancels the client's calls, which are its tasks."""
         shared = self._session.shared
         for name, service in list(shared.services.items()):
             if service.owner is self._session:

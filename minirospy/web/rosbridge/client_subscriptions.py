@@ -20,7 +20,7 @@ __all__ = ["ClientSubscriptions"]
 
 
 class ClientSubscriptions:
-    """One client's subscriptions, by topic. Called with the client's operations in order."""
+    """One client's subscriptions, keyed by topic. Its methods are called in the order of the client's operations."""
 
     def __init__(self, session: OperationSession) -> None:
         self._session = session
@@ -57,7 +57,7 @@ class ClientSubscriptions:
         self._add(event)
 
     async def _subscribe_unknown(self, event: protocol.Subscribe, error: BridgeError) -> None:
-        """Subscribe with a type that is not installed here, if the topic has that type, whose definition the publishers send."""
+        """Subscribe with a type that is not installed here, if it is the topic's type. The publishers send its definition."""
         with contextlib.suppress(BridgeError):
             if await self._session.type_of(event.topic) == event.type:
                 self._add(event)

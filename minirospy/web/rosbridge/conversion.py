@@ -45,12 +45,12 @@ class ConversionError(BridgeProtocolError):
 
 
 def values(message: Message) -> dict[str, object]:
-    """Return a message's fields as values for JSON."""
+    """Convert a message's fields to values for JSON."""
     return {name: convert(getattr(message, name)) for name, convert in _json_fields(type(message))}
 
 
 def cbor_values(message: Message) -> dict[str, object]:
-    """Return a message's fields as values for CBOR."""
+    """Convert a message's fields to values for CBOR."""
     return {name: convert(getattr(message, name)) for name, convert in _cbor_fields(type(message))}
 
 
@@ -132,7 +132,7 @@ def _time(found: Time | Duration) -> dict[str, int]:
 
 
 def fill(message: Message, found: object, now: Callable[[], Time]) -> None:
-    """Set a message's fields to the values in a dictionary; a header without ``stamp`` gets the current time.
+    """Set a message's fields from a dictionary. A header without ``stamp`` gets the current time.
 
     Raise ConversionError, with rosbridge's message, if a field is unknown or a value has the wrong type.
     """
@@ -140,7 +140,7 @@ def fill(message: Message, found: object, now: Callable[[], Time]) -> None:
 
 
 def request_values(message: Message, arguments: object) -> Mapping[str, object]:
-    """Return the request's fields from the arguments of a call: a dictionary, or a list in order.
+    """Return a call's arguments as the request's fields; the arguments are a dictionary, or a list in field order.
 
     For other arguments, return no fields.
     """
@@ -217,7 +217,7 @@ def _from_time(
         return now()
     if not isinstance(value, dict):
         raise _mismatch(root, path, type_, value)
-    # Also accept the names in ROS 2, which roslib.js may send.
+    # Also accept ROS 2's names, which roslib.js may send.
     for name, other in (("secs", "sec"), ("nsecs", "nanosec")):
         part = value.get(name, value.get(other, getattr(present, name)))
         if type(part) is not int:

@@ -59,4 +59,4 @@ class RosbridgeEndpoint:
 
 
 def _ignore(_: Changes) -> None:
-    """Do nothing, because sessions query the graph when they need it."""
+    """Ignore graph changes, because sessions query the graph when they need it."""

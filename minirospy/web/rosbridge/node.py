@@ -56,7 +56,7 @@ def refuse(program: str) -> int:
 
 
 def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
-    """Return the options for a node's private parameters. Raise BridgeError if a parameter is invalid."""
+    """Return the options set by a node's private parameters. Raise BridgeError if a parameter is invalid."""
     if private.get("bson_only_mode") or private.get("binary_encoder") == "bson":
         raise BridgeError("BSON is not offered: subscribe with compression cbor, which is as small")
     services = globs(private, "services_glob")

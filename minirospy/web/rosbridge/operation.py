@@ -44,7 +44,7 @@ Work = Coroutine[object, object, None]
 
 
 class OperationSession(Protocol):
-    """The session of the client whose operation is executed, as the handlers use it."""
+    """The interface of the session whose client's operation is being executed, for the handlers."""
 
     @property
     def client(self) -> WebClient: ...
@@ -57,11 +57,11 @@ class OperationSession(Protocol):
 
     @property
     def budget(self) -> Budget:
-        """Return the budget of bytes for messages on topics whose rate the client limits."""
+        """Return the byte budget for messages on topics whose rate the client limits."""
 
     @property
     def operation_size(self) -> int:
-        """Return the number of bytes of memory that the current operation takes."""
+        """Return the memory, in bytes, used by the current operation."""
 
     @property
     def is_large(self) -> bool:
@@ -77,10 +77,10 @@ class OperationSession(Protocol):
         """Send a status message, if the client has requested this level."""
 
     def count(self) -> None:
-        """Report the memory used for the client to the server's account."""
+        """Charge this client's memory use to the server's budget."""
 
     def spawn(self, work: Work) -> asyncio.Task[None]:
-        """Start a task that is cancelled when the session ends."""
+        """Start a task; it is cancelled when the session ends."""
 
     async def type_of(self, topic: str) -> str:
         """Return a topic's type in the graph. Raise BridgeError if it has none."""
@@ -93,7 +93,7 @@ class OperationSession(Protocol):
 
 
 def check_name(kind: str, name: str) -> None:
-    """Raise BridgeError if a name of this kind is not legal."""
+    """Raise BridgeError if ``name`` is not a legal name of this kind."""
     why = why_illegal(name)
     if why:
         raise BridgeError(f"{kind} [{name[:200]}]: {why}")

@@ -20,7 +20,7 @@ _MAX_PIXELS = 5_600_000
 
 
 def encode(text: str) -> str:
-    """Return a text as a base64-encoded PNG, about as wide as high, padded with newlines.
+    """Encode text as a base64-encoded PNG, roughly square and padded with newlines.
 
     Raise BridgeProtocolError if Pillow is not installed.
     """
@@ -34,7 +34,7 @@ def encode(text: str) -> str:
 
 
 def decode(data: str) -> str:
-    """Return the text in a base64-encoded PNG.
+    """Decode the text in a base64-encoded PNG.
 
     Raise BridgeProtocolError if the data is invalid, the image is too large, or Pillow is not installed.
     """

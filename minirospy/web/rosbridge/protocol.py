@@ -59,15 +59,15 @@ Compression = str
 COMPRESSIONS = ("none", "png", "cbor", "cbor-raw")
 
 _MAX_FRAGMENTS = 2_000
-"""Maximum fragments of a message to a client, which may request fragments of one character, each in its own message."""
+"""Maximum fragments per message to a client. A client may request fragments of one character, each of which is a message."""
 
 _LONGEST_ID = 1000
 _SHOWN = 200
-"""Maximum characters of a client's message that an error repeats."""
+"""Maximum characters of a client's message to quote in an error."""
 
 
 class StatusLevel(IntEnum):
-    """The severity of a status message; a client receives the messages up to the level that it has set."""
+    """The severity of a status message. A client receives messages up to the level that it has set."""
 
     NONE = 0
     ERROR = 1
@@ -76,7 +76,7 @@ class StatusLevel(IntEnum):
 
 
 class OperationError(BridgeProtocolError):
-    """An operation was refused; ``id`` is the id in the client's message."""
+    """An operation was refused. ``id`` is the one in the client's message."""
 
     def __init__(self, text: str, id_: Id = None) -> None:
         super().__init__(text)
@@ -210,7 +210,7 @@ def decode(data: str | bytes) -> Fields:
 
 
 def decode_in_pieces(data: str | bytes) -> Fields:
-    """Return the same as :func:`decode`, without holding the GIL for long, for a thread alongside the event loop."""
+    """Like :func:`decode`, but without holding the GIL for long. For use in a thread alongside the event loop."""
     return _decode(data, load_json_in_pieces)
 
 
@@ -227,7 +227,7 @@ def _decode(data: str | bytes, load: Callable[[str], object]) -> Fields:
 
 
 def parse(fields: Fields) -> Event:
-    """Return the event for an operation; for a PNG, the event for the operation in it.
+    """Parse an operation into an event. For a PNG, parse the operation inside it.
 
     Raise OperationError if it is invalid.
     """
@@ -273,7 +273,7 @@ def _text_of(value: object, most: int) -> str:
 
 
 def _cut(value: object, most: int, numbers: Iterator[int]) -> object:
-    """Return only the first items of a value from JSON or CBOR, because each item takes at least one character."""
+    """Truncate a value from JSON or CBOR to its first items, because each item takes at least one character."""
     # The quotes around a string depend on the quotes in it, including those in the part cut off.
     if isinstance(value, str) and len(value) > most:
         return value[:most] + "".join(quote for quote in "'\"" if quote in value)
@@ -466,7 +466,7 @@ OPERATIONS = (
 def encode(
     fields: Fields, compression: Compression = "none", dump: Callable[[object], str] = dump_json
 ) -> str | bytes:
-    """Return a message as a string, or as bytes for CBOR; ``dump`` converts a value to JSON."""
+    """Encode a message: as a string, or as bytes for CBOR. ``dump`` converts a value to JSON."""
     if compression in ("cbor", "cbor-raw"):
         return encode_cbor(fields)
     text = dump(fields)
@@ -489,7 +489,7 @@ def encode_messages(
 
 
 def fragments(text: str, size: int, id_: Id) -> list[str]:
-    """Return a text as fragments of ``size`` characters, or the text itself if it is not longer than that.
+    """Split text into fragments of ``size`` characters. Text that is not longer than that is returned as is.
 
     The fragments are longer if there would be too many.
     """
@@ -530,5 +530,5 @@ def service_response(service: str, values: object, id_: Id, *, result: bool) -> 
 
 
 def service_call(service: str, arguments: object, id_: str) -> dict[str, object]:
-    """Return the message that calls a service that the client offers."""
+    """Return the message that calls a service offered by the client."""
     return {"op": "call_service", "id": id_, "service": service, "args": arguments}

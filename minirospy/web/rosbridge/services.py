@@ -24,13 +24,13 @@ _T = TypeVar("_T")
 
 
 class InThread(Protocol):
-    """Runs work on a large message in a thread."""
+    """A function that runs work on a large message in a thread."""
 
     async def __call__(self, work: Callable[[], _T]) -> _T: ...
 
 
 class Response(NamedTuple):
-    """A service's serialized response, and its class."""
+    """A service's serialized response, and the response's class."""
 
     message_class: type[Message]
     data: bytes

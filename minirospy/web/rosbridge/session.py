@@ -58,7 +58,7 @@ class RosbridgeSession:
     def __init__(
         self, shared: RosbridgeShared, client: WebClient, on_end: Callable[[RosbridgeSession], None]
     ) -> None:
-        """Create the session; ``on_end`` is called with it once its client has disconnected."""
+        """Create the session. ``on_end`` is called with the session once its client has disconnected."""
         self.client = client
         self.shared = shared
         self.graph = shared.graph
@@ -78,7 +78,8 @@ class RosbridgeSession:
         # waiting operations, and calls; cancelled when the session ends
         self._tasks: set[asyncio.Task[None]] = set()
         self._inbox: deque[str | bytes] = deque()  # messages queued behind a waiting operation
-        self._inbox_size = 0  # bytes of memory of the inbox, and of the message whose operation is waiting
+        # bytes of memory used by the inbox and by the message whose operation is waiting
+        self._inbox_size = 0
         self._is_working = False  # True while an operation is waiting
         self._handlers: Mapping[type[Event], Callable[[Any], Work | _Pending | None]] = {
             protocol.Advertise: self._publications.advertise,
@@ -135,7 +136,7 @@ class RosbridgeSession:
                 self.client.send_text(message)
 
     def status(self, level: StatusLevel, text: str, id_: object = None) -> None:
-        """Send a status message, if the client has requested this level; log it unless it is only information."""
+        """Send a status message if the client has requested this level. Log it if its level is above INFO."""
         if level <= self._level:
             self.client.send_text(str(protocol.encode(protocol.status(level, text, id_))))  # type: ignore[arg-type]
         if level is not StatusLevel.INFO:
@@ -145,7 +146,7 @@ class RosbridgeSession:
     # --- sequential execution
 
     def count(self) -> None:
-        """Report the memory used for the client to the server's account."""
+        """Charge this client's memory use to the server's budget."""
         self.client.holds(
             self._inbox_size
             + self._fragments.size
@@ -173,7 +174,7 @@ class RosbridgeSession:
             self.count()
 
     async def _work(self, first: _Pending, size: int) -> None:
-        """Finish an operation, whose message has ``size`` bytes, then execute those that have arrived in the meantime."""
+        """Finish an operation whose message has ``size`` bytes, then execute those that have arrived in the meantime."""
         try:
             await self._finish(first)
             self._inbox_size -= size
@@ -192,7 +193,7 @@ class RosbridgeSession:
         self._is_working = False
 
     def _begin(self, data: str | bytes) -> _Pending | None:
-        """Execute an operation; return the part that has to wait, if any."""
+        """Execute an operation; return the part that has to wait, or None."""
         self.operation_size = _VALUE_FACTOR * sys.getsizeof(data)
         if not protocol.is_quick(data):
             return self._begin_large(data)
@@ -204,7 +205,7 @@ class RosbridgeSession:
         return self._carry_out(event)
 
     def _begin_large(self, data: str | bytes) -> _Pending | None:
-        """Parse a large message in a thread, so that no other client has to wait; pause reading from the client until then."""
+        """Parse a large message in a thread, so that no other client has to wait. Until then, pause reading from the client."""
         if not self.client.may_write:
             # The message comes from joined fragments or a PNG: the connection itself refuses messages of this size.
             self._refuse_large(data)

@@ -83,11 +83,11 @@ class RosbridgeShared:
         self.graph = graph
         self.options = options or RosbridgeOptions()
         self.services: dict[str, ClientService] = {}
-        """The services that clients offer, by name."""
+        """The services that clients offer, keyed by name."""
         self.log = RateLimitedLogger(logging.getLogger(graph.node.log.name), _LOG_LINES)
 
         self.in_thread = _LargeWork("rosbridge-large")
-        """Runs work on large messages from clients, which wait for each other."""
+        """Runs work on large messages from clients, one at a time."""
         self.encode = _LargeWork("rosbridge-encode")
         """Runs work on large messages to clients."""
         self._closing: dict[str, asyncio.Task[None]] = {}
@@ -127,7 +127,7 @@ class RosbridgeShared:
         self._encoded.pop(topic, None)
 
     def class_of(self, arrival: Arrival) -> type[Message] | None:
-        """Return the class for a received message, or None if its definition is unknown."""
+        """Return the class of a received message, or None if its definition is unknown."""
         return self._types.of(arrival.header)
 
     @staticmethod
@@ -138,7 +138,10 @@ class RosbridgeShared:
         return len(body) <= _MAX_QUICK_BODY or compression == "cbor-raw"
 
     def encoded(self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str) -> bytes:
-        """Return a message as clients receive it, encoded once for all clients. Raise BridgeError if it cannot be encoded."""
+        """Return a message encoded for clients.
+
+        Each message is encoded once for all of them. Raise BridgeError if it cannot be encoded.
+        """
         found = self._encodings(topic, arrival)
         made = found.get(compression)
         if made is None:
@@ -148,7 +151,7 @@ class RosbridgeShared:
     async def encoded_large(
         self, topic: str, class_: type[Message] | None, arrival: Arrival, compression: str
     ) -> bytes:
-        """Return the same as :meth:`encoded`, but encode in a thread, so that only the receivers of this message wait."""
+        """Like :meth:`encoded`, but encode in a thread, so that only the receivers of this message wait."""
         found = self._encodings(topic, arrival)
 
         def encode() -> bytes:
@@ -162,7 +165,7 @@ class RosbridgeShared:
         return found[compression]
 
     def _encodings(self, topic: str, arrival: Arrival) -> dict[str, bytes]:
-        """Return the existing encodings of a message, by compression."""
+        """Return the message's cached encodings, keyed by compression."""
         known = self._encoded.get(topic)
         if known is None or known[0] is not arrival:
             known = self._encoded[topic] = arrival, {}

@@ -22,12 +22,12 @@ MAX_FRAGMENT_BYTES = 64_000_000
 _MAX_FRAGMENTS = 100_000
 _FRAGMENT_BYTES = 200
 _MESSAGE_BYTES = 1000
-"""Bytes of memory that a fragment takes in addition to its text, and an incomplete message in addition to its fragments."""
+"""Overhead in bytes: of a fragment in addition to its text, and of an incomplete message in addition to its fragments."""
 
 
 @dataclass(frozen=True)
 class Merged:
-    """The parameters for sending a topic's messages; ``throttle`` is in seconds."""
+    """The merged parameters of a client's subscriptions to one topic; ``throttle`` is in seconds."""
 
     throttle: float
     queue_length: int
@@ -49,7 +49,7 @@ def merge(subscriptions: Iterable[Subscribe]) -> Merged:
 
 @dataclass
 class Budget:
-    """The bytes of messages that a client's topics queue to limit their rates, and the maximum."""
+    """The number of bytes that a client's rate-limited topics have queued, and the maximum."""
 
     most: int = DEFAULT_LIMIT
     taken: int = 0
@@ -62,7 +62,7 @@ class Pacer(Generic[_T]):
     """
 
     def __init__(self, budget: Budget, size_of: Callable[[_T], int]) -> None:
-        """Create the limit. ``budget`` may be shared with other topics; ``size_of`` returns a message's size in bytes."""
+        """Create the rate limiter. ``budget`` may be shared with other topics; ``size_of`` returns a message's size in bytes."""
         self.throttle = 0.0
         self._budget = budget
         self._size_of = size_of
@@ -91,11 +91,11 @@ class Pacer(Generic[_T]):
 
     @property
     def due(self) -> float | None:
-        """Return the time when to send the next queued message, or None if there is none."""
+        """Return the time at which to send the next queued message, or None if there is none."""
         return self._last + self.throttle if self._waiting else None
 
     def next(self, now: float) -> _T | None:
-        """Remove and return a message that is due, or return None."""
+        """Remove and return a message that is due, or return None if there is none."""
         if not self._waiting or now < self._last + self.throttle:
             return None
         self._last = now
@@ -130,7 +130,7 @@ class _Parts(NamedTuple):
 
 
 class Fragments:
-    """One client's fragments whose messages are incomplete."""
+    """The fragments of one client's incomplete messages."""
 
     def __init__(self, timeout: float = 600.0) -> None:
         """Create the collection. ``timeout``: seconds after which an incomplete message is discarded."""

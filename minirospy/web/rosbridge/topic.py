@@ -51,7 +51,7 @@ class ClientTopic:
         self._update()
         self._shared.graph.subscribe(self._topic, self._arrived)
         if not is_first:
-            # Cancel the additional subscription, which was made only to receive the latched messages again.
+            # Cancel the additional subscription, made only to receive the latched messages again.
             self._shared.graph.unsubscribe(self._topic, self._arrived)
 
     def remove(self, id_: object) -> None:
@@ -135,7 +135,7 @@ class ClientTopic:
             self._session.client.hold_work(is_held=False)
 
     def _fragment_size(self, merged: Merged, data: bytes) -> int | None:
-        """Return the size in characters of a message's fragments, or None if it is sent as a whole."""
+        """Return the fragment size for a message, in characters, or None to send it whole."""
         size = merged.fragment_size or self._shared.options.fragment_size
         is_cut = size and len(data) > size and not merged.compression.startswith("cbor")
         return size if is_cut else None

@@ -1,4 +1,4 @@
-"""Find message and service classes by the names that clients send (with rosbridge's errors), or by publishers' headers."""
+"""Find message and service classes: by the names that clients send, with rosbridge's errors, or by publishers' headers."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class UnknownTypeError(BridgeError):
 
 
 def message_class(name: str) -> type[Message]:
-    """Return a message's class. Raise UnknownTypeError if the type is not installed."""
+    """Return the message class ``name``. Raise UnknownTypeError if the type is not installed."""
     return _installed(get_message_class, name, "msg")
 
 
 def service_class(name: str) -> ServiceClass:
-    """Return a service's class. Raise UnknownTypeError if the type is not installed."""
+    """Return the service class ``name``. Raise UnknownTypeError if the type is not installed."""
     return _installed(get_service_class, name, "srv")
 
 

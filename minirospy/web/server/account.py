@@ -16,13 +16,13 @@ from collections.abc import Callable, Sequence
 __all__ = ["LARGE_PIECE", "MAX_BYTES", "Account", "Share"]
 
 MAX_BYTES = 160_000_000
-"""Maximum bytes that a server holds for all clients.
+"""Maximum memory, in bytes, that a server uses for all clients.
 
 The process stays below 400 MB, including copies while it handles a message.
 """
 
 LARGE_PIECE = 32_768
-"""Minimum bytes of a piece that is counted only once, even if it is queued for many clients."""
+"""Minimum size in bytes of a large piece, which is counted only once even if it is queued for many clients."""
 
 Piece = bytes | memoryview | bytearray
 
@@ -33,11 +33,11 @@ class Share:
     def __init__(self, account: Account, address: str, shed: Callable[[], object]) -> None:
         self.address = address
         self.is_owner = False
-        """True once the client has proved to be the owner: its share is then the last to be reduced."""
+        """True once the client has proved to be the owner. Its share is then the last to be reduced."""
         self.size = 0
         """Bytes that only this client uses."""
         self.large = 0
-        """Bytes of the large pieces queued for this client, which may be queued for other clients too."""
+        """Bytes of the large pieces queued for this client. Other clients may have queued the same pieces."""
         self.shed = shed
         """Releases some or all of the client's memory."""
         self._account = account
@@ -76,7 +76,7 @@ class Account:
         """Number of times that a client had to release memory."""
         self._shares: set[Share] = set()
         self.holders: Counter[int] = Counter()
-        """Number of times that a large piece is queued, by the id of the object, which exists while it is queued."""
+        """Number of times that each large piece is queued, keyed by the object's id. The object exists while it is queued."""
         self._is_enforcing = False
 
     def open(self, address: str, shed: Callable[[], object]) -> Share:
@@ -86,7 +86,7 @@ class Account:
         return share
 
     def close(self, share: Share) -> None:
-        """Remove a client's share, whose pieces must have been released. Idempotent."""
+        """Remove a client's share; its pieces must have been released. Idempotent."""
         self._shares.discard(share)
         self.total -= share.size
         share.size = 0
@@ -104,7 +104,7 @@ class Account:
         return found
 
     def release(self, pieces: Sequence[Piece]) -> int:
-        """Decrement the count of pieces that were held; return the total bytes of the large ones."""
+        """Stop counting pieces that were held; return the total bytes of the large ones."""
         found = 0
         for piece in pieces:
             size = len(piece)

@@ -59,7 +59,7 @@ class Occupant(Protocol):
 
     @property
     def active(self) -> float:
-        """The time when the connection was opened, or last sent or received a message, by the same clock as ``now``."""
+        """The time when the connection was opened, or last sent or received a message. Uses the same clock as ``now``."""
 
 
 _O = TypeVar("_O", bound=Occupant)

@@ -47,7 +47,7 @@ The headers prevent caching, because the contents change constantly, and the pat
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits for one client: bytes per message, frames per second, queued bytes, seconds without progress.
+    """One client's limits: bytes per message, frames per second, queued bytes, seconds without progress.
 
     ``connections`` is the maximum number of all clients together; an address may open ``connections_a_second``, and initially
     ``connection_burst``.
@@ -57,7 +57,7 @@ class Limits:
     read_only_message: int = 64 * 1024
     """Maximum bytes in a message from a read-only client, which subscribes but sends no large messages."""
     memory: int = MAX_BYTES
-    """Maximum bytes held for all clients together: see account.py."""
+    """Maximum memory, in bytes, used for all clients together; see account.py."""
     messages_a_second: int = 20_000
     """Maximum number of frames of any kind, including empty frames, pings and fragments of a message."""
     queue: int = DEFAULT_LIMIT
@@ -65,12 +65,12 @@ class Limits:
     connections_a_second: float = 50.0
     connection_burst: int = 500
     reserve: int = 32
-    """Number of connections in excess of ``connections`` that may be open until their request is known."""
+    """Number of connections that may exceed ``connections`` until their request is known."""
     handshake_seconds: float = 30.0
-    """A browser opens connections in advance and uses them within ten seconds, so this time must be longer."""
+    """Seconds for the handshake. A browser opens connections in advance and uses them within ten seconds, so this is longer."""
     ping_seconds: float = 20.0
     silent_seconds: float = 60.0
-    """A client that responds to no ping, or reads nothing, for this many seconds is disconnected."""
+    """Seconds after which a client that responds to no ping, or reads nothing, is disconnected."""
 
 
 class HttpRequest(NamedTuple):
@@ -83,13 +83,11 @@ class HttpRequest(NamedTuple):
     peer_port: int = 0
     address: str = ""
     port: int = 0
-    """The port of the client (``peer_port``), and the address and port of the server, for this connection; see Endpoints in
-    pipe.py.
-    """
+    """The client's port (``peer_port``), and the server's address and port, for this connection; see Endpoints in pipe.py."""
 
 
 class Session(Protocol):
-    """The session of one client of a protocol. Called on the loop; an exception closes the connection."""
+    """One client's session in a protocol. Its methods are called on the loop; an exception closes the connection."""
 
     def received_text(self, text: str) -> None: ...
 
@@ -99,16 +97,19 @@ class Session(Protocol):
 
 
 class Endpoint(Protocol):
-    """A protocol over WebSocket."""
+    """One endpoint of the server: a protocol served over WebSocket."""
 
     def select(self, offered: Sequence[str]) -> str | None:
-        """Return the sub-protocol to use, or None to use none. Raise LookupError, with the reason, to refuse the client."""
+        """Return the sub-protocol to use, or None for no sub-protocol.
+
+        Raise LookupError, with the reason, to refuse the client.
+        """
 
     def open(self, client: WebClient) -> Session: ...
 
 
 HttpHandler = Callable[["Exchange"], None]
-"""Responds to a request immediately or later, with the methods of the exchange."""
+"""A function that responds to a request immediately or later, with the exchange's methods."""
 
 
 class ClientConnection(Protocol):
@@ -140,7 +141,7 @@ class ClientConnection(Protocol):
 
 
 class WebClient:
-    """One WebSocket client, as the session of its protocol sees it."""
+    """One WebSocket client, as its session sees it."""
 
     def __init__(
         self, connection: ClientConnection, request: HttpRequest, grant: Grant, subprotocol: str | None
@@ -195,20 +196,20 @@ class WebClient:
         )
 
     def holds(self, count: int) -> None:
-        """Count the bytes that the session uses for the client: those of messages that are queued or being handled."""
+        """Set the memory, in bytes, that the session uses for the client's queued or current messages."""
         self._connection.session_holds(count)
 
     def send_message(self, key: Hashable, head: bytes, payload: Piece, *, newest_only: bool = False) -> None:
-        """Send a stream's message as one binary message; if the client is slow, older messages with ``key`` are dropped."""
+        """Send a stream's message as one binary message. If the client is slow, older messages with ``key`` are dropped."""
         front = frame_head(_BINARY, len(head) + len(payload)) + head
         self._connection.stream(key, (front, payload), newest_only=newest_only)
 
     def send_text_message(self, key: Hashable, text: bytes, *, newest_only: bool = False) -> None:
-        """Send a stream's message as a text message, as :meth:`send_message` does; ``text`` is UTF-8."""
+        """Like :meth:`send_message`, but send a text message; ``text`` is UTF-8."""
         self._connection.stream(key, (frame_head(_TEXT, len(text)), text), newest_only=newest_only)
 
     def send_texts(self, key: Hashable, texts: Sequence[str], *, newest_only: bool = False) -> None:
-        """Send one message of a stream as several text messages, which are queued or dropped together."""
+        """Send one of a stream's messages as several text messages, queued or dropped together."""
         pieces: list[Piece] = []
         for text in texts:
             data = text.encode()
@@ -229,7 +230,7 @@ class WebClient:
     def hold_work(self, *, is_held: bool) -> None:
         """Stop or continue running the functions passed to :meth:`in_turn`.
 
-        Used while the last one continues in a thread, so that the order is preserved.
+        Used to preserve the order while the last one continues in a thread.
         """
         self._connection.hold_jobs(are_held=is_held)
 
@@ -301,7 +302,7 @@ def _file_failure(answer: FileAnswer, why: str) -> bytes:
 
 
 def frame_head(opcode: int, length: int) -> bytes:
-    """Return the header of a server's frame that contains a whole message."""
+    """Return the header of a server's frame that contains a whole message of ``length`` bytes."""
     if length < 126:
         return bytes((opcode, length))
     if length < 65536:

@@ -66,7 +66,7 @@ _NEW_WEIGHT = 0.25
 
 @dataclass
 class Traffic:
-    """A client's traffic, and the number of times that reading from it was suspended."""
+    """A client's traffic counters, and the number of times that reading from it was suspended."""
 
     received: int = 0
     received_bytes: int = 0
@@ -259,7 +259,7 @@ class Connection:
         self.close_when_sent()
 
     def give_way(self) -> None:
-        """Close the connection, because another client needs its place."""
+        """Close the connection to make room for another client."""
         self.close_websocket(CloseCode.TRY_AGAIN_LATER, "another client needs the place")
         if self.is_open or self._output.is_full:
             self._abort()
@@ -282,7 +282,7 @@ class Connection:
             self.site.turns.start(self.turn)
 
     def in_turn(self, work: Callable[[], None], message: Piece) -> None:
-        """Run ``work`` in the client's turn, or immediately if it is the client's turn now.
+        """Run ``work`` when it is the client's turn, or immediately if it already is.
 
         ``work`` uses ``message``, whose bytes are counted until then. If the queued work exceeds the queue's limit, the
         oldest is dropped.
@@ -298,13 +298,13 @@ class Connection:
             self._count()
 
     def hold_jobs(self, *, are_held: bool) -> None:
-        """Stop or continue the work for the client, while the last piece of work continues in a thread."""
+        """Stop or continue the queued work for the client. Used while the last piece of work continues in a thread."""
         self._are_jobs_held = are_held
         if not are_held and self._jobs:
             self.site.turns.start(self.turn)
 
     def session_holds(self, count: int) -> None:
-        """Set the number of bytes that the session uses for the client."""
+        """Set the memory, in bytes, that the session uses for the client."""
         self._held = count
         if self._phase is not _Phase.ENDED:
             self._count()
@@ -312,7 +312,7 @@ class Connection:
     # --- handling the client's input
 
     def _work(self, end: float) -> bool:
-        """Do work for the client until a time; return whether more is left."""
+        """Do work for the client until the time ``end``; return whether more is left."""
         self._is_in_turn = True
         try:
             return self._do_jobs(end) or self._handle_frames(end)
@@ -339,7 +339,7 @@ class Connection:
         return False
 
     def _handle_frames(self, end: float) -> bool:
-        """Handle frames until a time; return whether more are left within the client's quota for this second."""
+        """Handle frames until the time ``end``; return whether more are left within the client's quota for this second."""
         if self.client is None:
             self._parse_head()
         websocket, rate, time_of = self._websocket, self._websocket.rate, self.loop.time
@@ -433,7 +433,7 @@ class Connection:
             self._open_websocket(request, seen, grant)
 
     def _admitted(self, head: RequestHead) -> tuple[HttpRequest, Grant, bool] | Refusal:
-        """Return a request, its rights and whether it is for a page, or the reason for refusing it.
+        """Return (request, rights, whether it is for a page), or the reason for refusing the request.
 
         Raise ValueError if the request is invalid.
         """
@@ -499,7 +499,7 @@ class Connection:
         self._count()
 
     def _count(self) -> None:
-        """Report the bytes that only this client uses. As a result, clients may have to release memory, including this one."""
+        """Report the memory that only this client uses. As a result, clients (even this one) may have to release memory."""
         self.share.set(self.unfinished + self._held + self._jobs.size + self._output.size)
 
     def _shed(self) -> None:
@@ -532,7 +532,7 @@ class Connection:
     # --- time
 
     def _watch(self, check: Callable[[], None]) -> None:
-        """Call ``check`` after the ping interval, instead of the previous check."""
+        """Call ``check`` after the ping interval, replacing the previous check."""
         self._timer.cancel()
         self._timer = self.loop.call_later(self._limits.ping_seconds, check)
 

@@ -23,7 +23,7 @@ PIECE_BYTES = 128 * 1024
 
 @dataclass(frozen=True)
 class FileAnswer:
-    """A response that ends with a file, which is not opened before it reaches the front of the queue."""
+    """A response that ends with a file. The file is opened only when it reaches the front of the queue."""
 
     open: Callable[[], tuple[BinaryIO, int]]
     """Returns the file and its size. Blocks; raises BridgeError, with the reason, if the file cannot be opened."""

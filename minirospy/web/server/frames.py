@@ -35,7 +35,7 @@ class FrameByFrame(ServerProtocol):
         return event if isinstance(event, Frame) else None
 
     def limit(self, size: int) -> None:
-        """Refuse larger messages from now on."""
+        """Refuse messages larger than ``size`` from now on."""
         # The name of the attribute depends on the library's version.
         for name in ("max_message_size", "max_size"):
             if hasattr(self, name):

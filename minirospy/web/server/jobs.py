@@ -1,4 +1,4 @@
-"""Work that is queued for a client's turn: messages that are not encoded yet. Pure."""
+"""Work queued until a client's turn: messages that are not encoded yet. Pure."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Jobs:
     """
 
     def __init__(self, max_bytes: int, share: Share) -> None:
-        self.size = 0  # bytes of memory that the work uses for this client alone
+        self.size = 0  # bytes of memory used only for this client's queued work
         self._max_bytes = max_bytes
         self._share = share
         self._message_bytes = 0  # total bytes of all messages that the work refers to
@@ -39,7 +39,7 @@ class Jobs:
         return len(self._waiting)
 
     def add(self, work: Work, message: Piece) -> int:
-        """Append work that refers to a message; return the number of older jobs dropped because of it."""
+        """Append work that refers to a message; return the number of older jobs that were dropped."""
         self._waiting.append(_Job(work, message))
         self._count(message, 1)
         self._share.hold((message,))

@@ -239,7 +239,10 @@ class Listener:
         return refusal
 
     def _make_room(self, peer: str, rank: Rank, occupants: Sequence[Connection]) -> bool:
-        """Disconnect one of these clients for a new one from ``peer``, if the rules allow it; return whether one was found."""
+        """Disconnect one of ``occupants`` to admit a new connection from ``peer``, if the rules allow it.
+
+        Return whether one was found.
+        """
         now = asyncio.get_running_loop().time()
         while found := displaced(peer, rank, occupants, now):
             if Rank.SILENT < found.rank < Rank.OWN and self._is_own(found):

@@ -8,7 +8,7 @@ __all__ = ["Liveness", "Verdict"]
 
 
 class Verdict(Enum):
-    """The result of a check, which determines what to do."""
+    """The result of a check: what to do with the client."""
 
     PING = auto()
     """Send a ping."""
@@ -21,12 +21,12 @@ class Verdict(Enum):
 
 
 class Liveness:
-    """The time of the last data from a client, and whether it was pinged after that. Times are in seconds of one clock."""
+    """The time of the last data from a client, and whether it was pinged since. Times are seconds of one clock."""
 
     def __init__(self, silent_seconds: float, now: float) -> None:
         self.received = now  # time of the last data from the client
         self._silent_seconds = silent_seconds
-        self._is_pinged = False  # True from a ping until data arrives
+        self._is_pinged = False  # True after a ping, until data arrives
 
     def heard(self, now: float) -> None:
         """Record that data has arrived."""
@@ -34,11 +34,11 @@ class Liveness:
         self._is_pinged = False
 
     def is_stuck(self, now: float, progressed: float, *, is_full: bool) -> bool:
-        """Return whether the client has read nothing for too long; ``progressed`` is the time when output was last written."""
+        """Return whether the client has read nothing for too long. ``progressed`` is the time of the last write of output."""
         return is_full and now - progressed > self._silent_seconds
 
     def check(self, now: float, progressed: float, *, is_full: bool) -> Verdict:
-        """Return the action to take for the client now."""
+        """Return the action to take now for the client."""
         if self.is_stuck(now, progressed, is_full=is_full):
             return Verdict.STUCK
         # Check that a ping was sent: after the machine was suspended, the last data is old although no ping is

@@ -122,7 +122,7 @@ class Output:
                 self._share.hold(batch)
 
     def _next_batch(self) -> list[Piece] | None:
-        """Return the pieces to write next, or None if there are none at present."""
+        """Return the pieces to write next, or None if there is nothing to write."""
         batch: list[Piece] = []
         size = 0
         while size < _BATCH_BYTES and len(batch) < _BATCH_PIECES and not self._file:

@@ -59,7 +59,7 @@ def owner_of(end: tuple[str, int], other_end: tuple[str, int]) -> int | None:
 
 
 def _by_query(end: _End, other_end: _End) -> int | None:
-    """Return the user, by querying the kernel for one socket. Source: sock_diag(7).
+    """Query the kernel for one socket; return its user. Source: sock_diag(7).
 
     Raise OSError if the query fails.
     """
@@ -84,7 +84,7 @@ def _by_query(end: _End, other_end: _End) -> int | None:
 
 
 def _by_table(end: _End, other_end: _End) -> int | None:
-    """Return the user, from the kernel's table of all sockets. Source: proc_net_tcp in the kernel's documentation."""
+    """Look up the user in the kernel's table of all sockets. Source: proc_net_tcp in the kernel's documentation."""
     port = f":{end[1]:04X} "
     for table in _TABLES:
         try:
@@ -113,5 +113,5 @@ def _listed(text: str) -> _End:
 
 
 def _unmapped(address: _Address) -> _Address:
-    """Return the IPv4 address in an IPv4-mapped IPv6 address, because an IPv6 socket may have an IPv4 connection."""
+    """Return the IPv4 address in an IPv4-mapped IPv6 address. An IPv6 socket may have an IPv4 connection."""
     return (address.ipv4_mapped or address) if isinstance(address, ipaddress.IPv6Address) else address

@@ -25,7 +25,7 @@ _MAX_PIECES = 128
 
 
 class Endpoints(NamedTuple):
-    """The peer's port, and the local address and port; empty if the connection is closed or does not use TCP."""
+    """The peer's port, and the local address and port. Empty if the connection is closed or does not use TCP."""
 
     peer_port: int = 0
     address: str = ""
@@ -42,11 +42,11 @@ class PipeEvents(Protocol):
         """Write more, because the kernel has accepted everything that was written before."""
 
     def ended(self) -> None:
-        """Release a connection that has closed for whatever reason. Called once."""
+        """Release all resources: the connection has closed, for whatever reason. Called once."""
 
 
 class Pipe(Protocol):
-    """One connection. ``is_full``: the kernel has not accepted all written data; ``copies``: the rest is stored as a copy.
+    """One connection. ``is_full``: the kernel has not accepted all written data. ``copies``: the unsent rest is a copy.
 
     ``read_bytes``: the maximum number of bytes per receive, if it can be chosen.
     """
@@ -207,19 +207,19 @@ class TlsPipe(asyncio.Protocol):
     copies = True
 
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
-        """Create a connection. ``connected(pipe, peer's address)`` returns the object that receives the events.
+        """Create a connection. ``connected(pipe, peer_address)`` returns the object that receives the events.
 
         ``connected`` may return None to refuse the connection, after writing a response.
         """
         self._connected = connected
-        self.read_bytes = LARGE_READ  # the size that asyncio itself uses
+        self.read_bytes = LARGE_READ  # asyncio's own receive size
         self._events: PipeEvents | None = None
         self._transport: asyncio.Transport | None = None
         self._is_paused = False
 
     @property
     def is_full(self) -> bool:
-        """Return whether more data is waiting for the kernel than asyncio's limit."""
+        """Return whether the data buffered for sending exceeds asyncio's high-water mark."""
         return self._is_paused
 
     @property

@@ -30,7 +30,7 @@ MAX_ANSWERS = 64_000_000
 
 
 _FILE_BYTES = 1000
-"""Bytes of memory for a file that has not been opened yet, including its entry."""
+"""Memory, in bytes, of a file that is queued but not yet opened, including its queue entry."""
 
 
 class _Entry(NamedTuple):
@@ -57,7 +57,7 @@ class SendQueue:
     def __init__(
         self, limit: int = DEFAULT_LIMIT, entry_bytes: int = ENTRY_BYTES, share: Share | None = None
     ) -> None:
-        """Create a queue for ``limit`` bytes of messages, each with ``entry_bytes`` in addition.
+        """Create a queue for ``limit`` bytes of messages. Each message takes an additional ``entry_bytes``.
 
         A single message may be larger, and is then the only one in the queue. Large pieces are counted in ``share``.
         """
@@ -74,7 +74,7 @@ class SendQueue:
         self.dropped = 0
         """Number of messages that were dropped in favour of newer ones."""
         self.dropped_of: Counter[Hashable] = Counter()
-        """Number of dropped messages by key, for the keys in use."""
+        """Number of dropped messages, keyed by key, for the keys in use."""
         self._share = share
         self._entry_bytes = entry_bytes
         self._number = 0
@@ -87,7 +87,7 @@ class SendQueue:
 
     @property
     def is_overrun(self) -> bool:
-        """Return whether more responses are queued than is possible for a client that reads them."""
+        """Return whether more responses are queued than a client that reads them could ever have."""
         return self.answers > MAX_ANSWERS
 
     def put(self, key: Hashable, pieces: tuple[Piece, ...], *, newest_only: bool = False) -> None:

@@ -21,7 +21,7 @@ class ConnectionRate:
     """The rate limit for new connections."""
 
     def __init__(self, a_second: float, burst: int, clock: Callable[[], float]) -> None:
-        """Create the limit.
+        """Create the rate limiter.
 
         ``burst``: number of connections that an address may open at the same time; ``clock`` returns seconds.
         """

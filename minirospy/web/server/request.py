@@ -59,7 +59,7 @@ class RequestHead(NamedTuple):
 
 
 def read_head(request: Request) -> RequestHead:
-    """Return the target and headers of a received request; of repeated headers, return the last."""
+    """Return a request's target and headers. If a header is repeated, use the last one."""
     return RequestHead(request.path, {name.lower(): value for name, value in request.headers.raw_items()})
 
 
@@ -76,7 +76,7 @@ def refusal_response(refusal: Refusal) -> tuple[bytes, bytes]:
 
 
 def _origin(headers: Mapping[str, str]) -> str | None:
-    """Return the site of the page that sends a request, or None if no page sends it.
+    """Return the site of the page that sent a request, or None if it was not sent by a page.
 
     A browser sends the site in Origin, but not for an image or a frame. For these it sends whether the page is from another
     site, and possibly the page's URL in Referer. Source: https://www.w3.org/TR/fetch-metadata/.

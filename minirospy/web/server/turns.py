@@ -39,14 +39,14 @@ EXPECTED_DECAY = 0.9  # decay of the expected seconds with each piece of work th
 IMMEDIATE_SHARE = 0.5  # share of the time for work that starts without being queued
 # Maximum burst of an interactive client in slices, 1 ms in total: a request takes 0.1 to 0.5 ms, 64 kB of empty
 # frames take 100 ms. A new client has one slice, and gets one more with each short burst, so that 250 new clients
-# that flood the server are served after its other clients as soon as each has had a slice.
+# that flood the server each get one slice, and are then served after its other clients.
 INTERACTIVE_SLICES = 10
 # maximum debt of bulk clients: interactive clients alone may use 200 ms before bulk clients get a slice again
 MAX_DEBT_TURNS = 10
 BULK_SHARE = 0.2  # minimum share of the time for bulk clients, even while interactive clients use the rest
 
 Work = Callable[[float], bool]
-"""Does some work until a time of the clock; returns whether more is left."""
+"""A function that works until a time of the clock; it returns whether more work is left."""
 
 
 class Share:
@@ -68,16 +68,16 @@ class Share:
 
     def __init__(self, work: Work, queue: _FairQueue) -> None:
         self.work = work
-        self.queue = queue  # the queue of interactive clients, or that of bulk clients
-        # seconds used; at least the tag that the queue was serving when the client last started
+        self.queue = queue  # the queue that the client is in: interactive or bulk clients
+        # seconds used; at least the tag that the queue was serving when the client last became active
         self.tag = queue.served
         self.weight = 1.0  # set once the client's rights are known
         # seconds that the client's next piece of work may take, estimated from earlier pieces
         self.expected = 0.0
         self.pieces = 0  # number of pieces of work done while the client is new
-        self.burst = 0.0  # seconds used since the client last had nothing to do
+        self.burst = 0.0  # seconds used since the client was last idle
         self.last_burst = 0.0  # seconds used in the previous burst
-        self.short_bursts = 0  # number of short bursts in succession, up to INTERACTIVE_SLICES
+        self.short_bursts = 0  # number of consecutive short bursts, up to INTERACTIVE_SLICES
         self.is_queued = False
         self.is_closed = False
 
@@ -93,7 +93,7 @@ class _Entry(NamedTuple):
 
 
 class _FairQueue:
-    """The queued work of interactive or of bulk clients."""
+    """The queued work of either the interactive or the bulk clients."""
 
     def __init__(self) -> None:
         self.entries: list[_Entry] = []  # a heap
@@ -149,7 +149,7 @@ class FairTurns:
         return bool(self._interactive.entries or self._bulk.entries)
 
     def join(self, work: Work) -> Share:
-        """Return the share of a new client, which has no advantage over clients that have been idle."""
+        """Add a client; return its share, which gives it no advantage over clients that have been idle."""
         self._interactive.update()
         return Share(work, self._interactive)
 
@@ -158,7 +158,7 @@ class FairTurns:
         share.is_closed = True
 
     def start(self, share: Share) -> bool:
-        """Run a client's work now or in its turn; return whether work is left. Has no effect while the client is queued."""
+        """Run a client's work now or when it is its turn; return whether work is left. No effect while the client is queued."""
         if share.is_queued or share.is_closed:
             return share.is_queued
         if self._is_running or self.is_busy or not self._may_start_now():
@@ -268,7 +268,7 @@ class FairTurns:
 
 
 def cpu_meter() -> Callable[[], float]:
-    """Return the clock of this thread's CPU time, or the monotonic clock if the former is too coarse (Windows: 16 ms).
+    """Return the clock of this thread's CPU time, or the monotonic clock if the CPU clock is too coarse (Windows: 16 ms).
 
     By the monotonic clock, a client would also pay for other processes that use the processor during its work.
     """

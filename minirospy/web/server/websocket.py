@@ -76,7 +76,7 @@ class WebSocket:
             logger=_QUIET,
         )
         self._fragments = bytearray()  # received fragments of an incomplete message
-        self._opcode = Opcode.BINARY  # opcode of the frame that started the last message
+        self._opcode = Opcode.BINARY  # opcode of the last message's first frame
 
     # --- receiving
 
@@ -99,7 +99,7 @@ class WebSocket:
         return frame
 
     def event_of(self, frame: Frame) -> Message | Ping | None:
-        """Return the ping in a frame, or the message that the frame completes, or None if there is neither."""
+        """Return the ping in a frame, or the message that the frame completes, or None for any other frame."""
         if frame.opcode in (Opcode.TEXT, Opcode.BINARY):
             self._opcode = frame.opcode
         elif frame.opcode is Opcode.PING:
@@ -132,7 +132,7 @@ class WebSocket:
         self._fragments.clear()
 
     def restrict(self, max_size: int) -> None:
-        """Refuse larger messages from now on."""
+        """Refuse messages larger than ``max_size`` from now on."""
         self._frames.limit(max_size)
 
     # --- sending

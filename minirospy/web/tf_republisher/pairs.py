@@ -31,7 +31,7 @@ class FramePair:
         self._sent: Transform | None = None
 
     def is_to_be_sent(self, transform: Transform) -> bool:
-        """Return whether a transform differs enough from the last one sent; if it does, record it as sent."""
+        """Return whether a transform differs enough from the last one sent. If it does, record it as sent."""
         if not (
             self._sent is None
             or not self._angle
@@ -63,7 +63,7 @@ def _distance(one: Vector3, other: Vector3) -> float:
 
 
 def _angle(one: Quaternion, other: Quaternion) -> float:
-    """Return the angle between two rotations as quaternions. As in the real node, this is half the angle of rotation."""
+    """Return the angle between two quaternions. As in the real node, this is half the angle of rotation."""
     first, second = ((each.x, each.y, each.z, each.w) for each in (one, other))
     norm = math.hypot(*first) * math.hypot(*second)
     if not norm:

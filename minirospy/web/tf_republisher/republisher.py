@@ -32,11 +32,11 @@ _DEFAULT_RATE = 10.0
 _MAX_RATE = 1000.0
 _MAX_REQUESTS = 1000
 _A_TURN = 50
-"""Number of frames to look up before other tasks may run."""
+"""Number of frames to look up before letting other tasks run."""
 
 
 class _Closing(Protocol):
-    """A part that must be closed together with the republisher."""
+    """A part to close together with the republisher."""
 
     async def close(self) -> None: ...
 

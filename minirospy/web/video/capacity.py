@@ -20,7 +20,7 @@ class Capacity:
 
     @asynccontextmanager
     async def taken(self, units: int) -> AsyncIterator[None]:
-        """Acquire ``units`` for the block, after waiting until they are free. Work that exceeds the limit runs alone."""
+        """Wait until ``units`` are free, and hold them for the block. Work that exceeds the limit runs alone."""
         units = min(units, self.units)
         if self._waiting or self.taken_units + units > self.units:
             turn = asyncio.get_running_loop().create_future()

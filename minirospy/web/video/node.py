@@ -29,7 +29,7 @@ async def _start(node: Node) -> Bridge:
 
 
 def options_of(private: Mapping[str, object], environ: Mapping[str, str]) -> BridgeOptions:
-    """Return the options for a node's private parameters. Raise BridgeError if one is invalid."""
+    """Return the options set by a node's private parameters. Raise BridgeError if one is invalid."""
     return BridgeOptions(
         address=address_of(private),
         foxglove_port=None,

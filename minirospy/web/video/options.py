@@ -26,7 +26,7 @@ _MAX_PIXELS = 10_000
 
 @dataclass(frozen=True)
 class Picture:
-    """The encoding of an image.
+    """The requested encoding of an image.
 
     ``format``: jpeg or png, or "" to pass a compressed image unchanged. If a size is None, the image's size is kept.
     """

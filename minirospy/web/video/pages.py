@@ -40,12 +40,12 @@ Listener = Callable[[File | BridgeError], None]
 
 
 class _Feed:
-    """The images of a topic in one encoding: a worker encodes the newest image, as often as possible."""
+    """A topic's images in one encoding. A worker encodes the newest image, as often as possible."""
 
     def __init__(self, graph: SharedGraph, request: VideoRequest, shared: _Shared) -> None:
         self.listeners: list[Listener] = []
         self.last: File | BridgeError | None = None
-        """The last encoded image, so that a new client need not wait for the next image from a slow or latched topic."""
+        """The last encoded image, so that a new client of a slow or latched topic need not wait for the next one."""
 
         self._graph = graph
         self._request = request

@@ -24,7 +24,8 @@ _FASTEST_PNG = 1
 MAX_PIXELS = 16_000_000  # maximum number of pixels in a compressed or an enlarged image
 _LENGTH = struct.Struct("<I")
 _STAMPED = 12  # bytes of a header's seq and stamp, before the length of its frame_id
-# Number of bytes in which to search a file for the image's size: other data, such as a preview, may precede it.
+# Number of leading bytes of a file to search for the image's size, because other data, such as a preview, may precede
+# it.
 _HEAD_BYTES = 100_000
 # rows of a numeric image to scale at a time; as 64-bit numbers they take eight times the memory
 _ROWS = 256
@@ -32,7 +33,7 @@ _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/
 
 
 def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
-    """Return the image of a serialized message as an encoded file, and its content type.
+    """Return a serialized message's image as an encoded file, and its content type.
 
     Raise BridgeError if it cannot be converted.
     """
@@ -70,7 +71,7 @@ def _content_type(data: bytes) -> str:
 
 
 def _is_as_wanted(data: bytes, picture: Picture) -> bool:
-    """Return whether a compressed image can be passed to the client unchanged."""
+    """Return whether a compressed image can be sent to the client unchanged."""
     is_plain = not (picture.is_inverted or picture.width or picture.height) and picture.quality == 95
     found = _content_type(data)
     return bool(found) and is_plain and picture.format in ("", found.removeprefix("image/"))
@@ -110,7 +111,7 @@ def _scaled(image: Pixels) -> Pixels:
 
 
 def work_of(type_: str, body: bytes | memoryview) -> int:
-    """Return the number of pixels to process for a serialized message, as far as this is known in advance."""
+    """Return the number of pixels to process for a serialized message, as far as it is known in advance."""
     if type_ != COMPRESSED:
         return len(body) // 3
     try:
