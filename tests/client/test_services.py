@@ -130,6 +130,75 @@ def test_a_proxy_whose_transport_was_read_connects_again(started: list[Program])
         server.wait(30)
 
 
+CONCURRENT = """
+import threading
+import rospy
+from std_srvs.srv import SetBool
+
+def call(value):
+    for count in range(300):
+        if count == 100:
+            proxy.transport
+        response = proxy(value)
+        if response.success is not value:
+            print("the response of the other thread", flush=True)
+
+rospy.init_node("client")
+proxy = rospy.ServiceProxy("/s", SetBool, persistent=True)
+threads = [threading.Thread(target=call, args=[value]) for value in (True, False)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+print(proxy.seq, flush=True)
+"""
+
+
+def test_calls_of_two_threads_run_one_at_a_time_after_transport_was_read(started: list[Program]) -> None:
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    client = start(started, CONCURRENT)
+    assert hear(client) == "600"
+    assert client.wait(30) == 0
+
+
+ABORTING = """
+import threading
+import rospy
+from std_srvs.srv import Trigger
+
+def call():
+    try:
+        proxy()
+    except rospy.ServiceException as error:
+        print(error, flush=True)
+
+rospy.init_node("client")
+proxy = rospy.ServiceProxy("/slow", Trigger, persistent=True)
+thread = threading.Thread(target=call)
+thread.start()
+input()
+proxy.transport.close()
+thread.join()
+input()
+print(proxy().message, flush=True)
+"""
+
+
+@pytest.mark.parametrize("end", ["proxy.transport.close()", "proxy.transport = None"])
+def test_transport_can_be_read_and_set_during_a_call(started: list[Program], end: str) -> None:
+    """Programs close the transport to abort the call of another thread, so reading it does not wait for that call."""
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    client = start(started, ABORTING.replace("proxy.transport.close()", end))
+    assert hear(server) == "called"
+    say(client)
+    assert hear(client).startswith("transport error completing service call: ")
+    say(server, "gate.set()")
+    say(client)
+    assert hear(client) == "late"
+
+
 CLOSING = """
 import threading
 import rospy
