@@ -385,8 +385,13 @@ class ServiceProxy(Generic[_S_co]):
         is_kept = False
         self._calls += 1
         try:
-            transport.send_message(request, self._calls)
-            responses = transport.receive_once()
+            with current_session().lifecycle.interrupting(transport.close):
+                transport.send_message(request, self._calls)
+                responses = transport.receive_once()
+            if not responses:  # another thread closed the transport between two reads
+                if current_session().is_shutdown():
+                    raise TransportException("connection closed")
+                raise ServiceException(f"service [{self.resolved_name}] returned no response")
             is_kept = self.persistent
         except ServiceException:
             is_kept = self.persistent

@@ -68,6 +68,15 @@ rospy.signal_shutdown("enough")
 thread.join()
 """
 
+WAITING_TRANSPORT = WAITING.replace('rospy.ServiceProxy("/slow", Trigger)()', "proxy()").replace(
+    'rospy.init_node("client")',
+    """rospy.init_node("client")
+proxy = rospy.ServiceProxy("/slow", Trigger, persistent=True)
+proxy()
+print(type(proxy.transport).__name__, flush=True)
+input()""",
+)
+
 Program = subprocess.Popen[str]
 
 
@@ -199,6 +208,19 @@ def test_transport_can_be_read_and_set_during_a_call(started: list[Program], end
     assert hear(client) == "late"
 
 
+def test_transport_that_is_done_returns_no_response(started: list[Program]) -> None:
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    client = start(
+        started,
+        PERSISTENT.replace("print(proxy(True)", "proxy.transport.done = True; print(proxy(True)").replace(
+            "for line in", "proxy(True)\nfor line in"
+        ),
+    )
+    say(client)
+    assert hear(client) == "service [/s] returned no response"
+
+
 CLOSING = """
 import threading
 import rospy
@@ -259,6 +281,22 @@ def test_a_shutdown_ends_a_call_that_waits(started: list[Program]) -> None:
     server = start(started, SERVER, "server")
     assert hear(server) == "ready"
     client = start(started, WAITING)
+    assert hear(server) == "called"
+    say(client)
+    assert hear(client) == "node shutdown interrupted service call"
+    assert client.wait(30) == 0
+
+
+def test_shutdown_ends_a_call_through_a_transport(started: list[Program]) -> None:
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    say(server, "gate.set()")
+    client = start(started, WAITING_TRANSPORT)
+    assert hear(server) == "called"
+    assert hear(client) == "TCPROSTransport"
+    say(server, "gate.clear(); print('cleared', flush=True)")
+    assert hear(server) == "cleared"
+    say(client)
     assert hear(server) == "called"
     say(client)
     assert hear(client) == "node shutdown interrupted service call"
