@@ -260,8 +260,10 @@ class ServiceProxy(Generic[_S_co]):
         )
         self._transport_is_own = False  # the proxy opened the transport's connection, and may open another
         self._protocol: TCPROSServiceClient | None = None
-        # Held during calls that share a connection.
-        self._lock = threading.Lock()
+        # Held during calls that share a connection. Reentrant, because a signal may run a shutdown hook in the middle of
+        # a call of the same thread, and the hook may call the service.
+        self._lock = threading.RLock()
+        self._is_calling = False  # a thread is in such a call
         # Held while the connection changes hands, never during a call: a handler may read ``transport``, or another
         # thread may read it to abort the call. Reentrant, because a signal may run a shutdown hook that does so.
         self._handover = threading.RLock()
@@ -283,13 +285,25 @@ class ServiceProxy(Generic[_S_co]):
             body = self._serialize(request)
             return self._exchange(self._connect(body), body, keep=False)
         with self._lock:
-            # Look for a transport here, because another thread may have read or ended it while this one waited.
-            transport = self._usable_transport()
-            if transport is not None:
-                return self._call_through(transport, request)
-            body = self._serialize(request)
-            client = self._kept_client(body) if self.persistent else self._connect(body)
-            return self._exchange(client, body, keep=self.persistent)
+            if self._is_calling:
+                # A shutdown hook interrupted this thread's call, whose response is still to come on the connection.
+                body = self._serialize(request)
+                return self._exchange(self._connect(body), body, keep=False)
+            self._is_calling = True
+            try:
+                return self._call_in_turn(request)
+            finally:
+                self._is_calling = False
+
+    def _call_in_turn(self, request: Message) -> Message:
+        """Call the service through the transport or the persistent connection, and return the response."""
+        # Look for a transport here, because another thread may have read or ended it while this one waited.
+        transport = self._usable_transport()
+        if transport is not None:
+            return self._call_through(transport, request)
+        body = self._serialize(request)
+        client = self._kept_client(body) if self.persistent else self._connect(body)
+        return self._exchange(client, body, keep=self.persistent)
 
     @property
     def seq(self) -> int:
@@ -349,7 +363,7 @@ class ServiceProxy(Generic[_S_co]):
     def _end_client(self) -> None:
         """Close the persistent connection; abort the call of another thread that uses it."""
         client = self._client
-        if client and self._lock.locked():
+        if client and self._is_calling:
             # Shut the socket down instead of closing it, because closing would not wake a thread that is reading from
             # it. That thread then closes the socket.
             client.hang_up()

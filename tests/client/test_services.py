@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import socket
 import struct
 import subprocess
@@ -301,6 +302,46 @@ def test_shutdown_ends_a_call_through_a_transport(started: list[Program]) -> Non
     say(client)
     assert hear(client) == "node shutdown interrupted service call"
     assert client.wait(30) == 0
+
+
+HOOKED = """
+import rospy
+from std_srvs.srv import Trigger
+
+def hook():
+    print(proxy().message, flush=True)
+
+rospy.init_node("client")
+rospy.on_shutdown(hook)
+proxy = rospy.ServiceProxy("/slow", Trigger, persistent=True)
+proxy()
+proxy.transport
+print("ready", flush=True)
+input()
+proxy()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals between processes")
+@pytest.mark.parametrize("reads", ["proxy.transport", ""])
+def test_shutdown_hook_may_call_the_proxy_whose_call_it_interrupts(
+    started: list[Program], reads: str
+) -> None:
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    say(server, "gate.set()")
+    client = start(started, HOOKED.replace("\nproxy.transport\n", f"\n{reads}\n"))
+    assert hear(server) == "called"
+    assert hear(client) == "ready"
+    say(server, "gate.clear(); print('cleared', flush=True)")
+    assert hear(server) == "cleared"
+    say(client)
+    assert hear(server) == "called"
+    client.send_signal(signal.SIGINT)
+    assert hear(server) == "called"
+    say(server, "gate.set()")
+    assert hear(client) == "late"
+    client.wait(30)
 
 
 def test_a_request_that_does_not_fit_is_answered(started: list[Program], master: str) -> None:
