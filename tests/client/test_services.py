@@ -209,14 +209,14 @@ def test_transport_can_be_read_and_set_during_a_call(started: list[Program], end
     assert hear(client) == "late"
 
 
-def test_transport_that_is_done_returns_no_response(started: list[Program]) -> None:
+def test_transport_that_returns_no_response_is_a_service_error(started: list[Program]) -> None:
     server = start(started, SERVER, "server")
     assert hear(server) == "ready"
     client = start(
         started,
-        PERSISTENT.replace("print(proxy(True)", "proxy.transport.done = True; print(proxy(True)").replace(
-            "for line in", "proxy(True)\nfor line in"
-        ),
+        PERSISTENT.replace(
+            "print(proxy(True)", "proxy.transport.receive_once = list; print(proxy(True)"
+        ).replace("for line in", "proxy(True)\nfor line in"),
     )
     say(client)
     assert hear(client) == "service [/s] returned no response"
