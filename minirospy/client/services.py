@@ -423,12 +423,12 @@ class ServiceProxy(Generic[_S_co]):
 
     def _kept_client(self, request: bytes) -> ServiceClient:
         """Return the persistent connection for sending ``request``; connect if there is none, or if it has ended."""
-        with self._handover:
-            client = self._client
-            if client and (client.has_ended() or self._client_session is not current_session()):
-                # In a fork the connection belongs to the parent: the two processes would read each other's responses.
+        client = self._client
+        if client and (client.has_ended() or self._client_session is not current_session()):
+            # In a fork the connection belongs to the parent: the two processes would read each other's responses.
+            with self._handover:
                 self._disconnect()
-                client = None
+            client = None
         if client is None:
             client = self._client = self._connect(request)
             self._client_session = current_session()
