@@ -258,8 +258,15 @@ class ServiceProxy(Generic[_S_co]):
         self._transport: TCPROSTransport | None = (
             None  # a connection set by the program, or one that the program requested
         )
+        self._transport_is_own = False  # the proxy opened the transport's connection, and may open another
         self._protocol: TCPROSServiceClient | None = None
-        self._lock = threading.Lock()
+        # Held during calls that share a connection. Reentrant, because a signal may run a shutdown hook in the middle of
+        # a call of the same thread, and the hook may call the service.
+        self._lock = threading.RLock()
+        self._is_calling = False  # a thread is in such a call
+        # Held while the connection changes hands, never during a call: a handler may read ``transport``, or another
+        # thread may read it to abort the call. Reentrant, because a signal may run a shutdown hook that does so.
+        self._handover = threading.RLock()
 
     def __call__(self, *args: object, **kwds: object) -> Any:
         """Call the service and return its response.
@@ -274,18 +281,29 @@ class ServiceProxy(Generic[_S_co]):
         request = args_kwds_to_message(self.request_class, args, kwds)
         if not hasattr(type(request), "_type"):
             raise TypeError("request object is not a valid request message instance")
-        if self._transport is not None and self._is_transport_usable(self._transport):
-            return self._call_through(self._transport, request)
-        body = self._serialize(request)
-        if not self.persistent:
+        if not self.persistent and self._transport is None:
+            body = self._serialize(request)
             return self._exchange(self._connect(body), body, keep=False)
         with self._lock:
-            if self._client and (self._client.has_ended() or self._client_session is not current_session()):
-                # In a fork the connection belongs to the parent: the two processes would read each other's responses.
-                self._disconnect()
-            if self._client is None:
-                self._client, self._client_session = self._connect(body), current_session()
-            return self._exchange(self._client, body, keep=True)
+            if self._is_calling:
+                # A shutdown hook interrupted this thread's call, whose response is still to come on the connection.
+                body = self._serialize(request)
+                return self._exchange(self._connect(body), body, keep=False)
+            self._is_calling = True
+            try:
+                return self._call_in_turn(request)
+            finally:
+                self._is_calling = False
+
+    def _call_in_turn(self, request: Message) -> Message:
+        """Call the service through the transport or the persistent connection, and return the response."""
+        # Look for a transport here, because another thread may have read or ended it while this one waited.
+        transport = self._usable_transport()
+        if transport is not None:
+            return self._call_through(transport, request)
+        body = self._serialize(request)
+        client = self._kept_client(body) if self.persistent else self._connect(body)
+        return self._exchange(client, body, keep=self.persistent)
 
     @property
     def seq(self) -> int:
@@ -305,23 +323,26 @@ class ServiceProxy(Generic[_S_co]):
     @property
     def transport(self) -> TCPROSTransport | None:
         """The persistent connection, or None. A program may set its own connection, which calls then use."""
-        client = self._client
-        if self._transport is None and client is not None:
-            from minirospy.client.tcpros import TCPROSTransport
+        with self._handover:
+            client = self._client
+            if self._transport is None and client is not None:
+                from minirospy.client.tcpros import TCPROSTransport
 
-            # From here on the connection belongs to the transport, which the program may use or close.
-            transport = TCPROSTransport(self.protocol, self.resolved_name)
-            transport.set_socket(client.detach(), client.uri)
-            transport.dest_address = split_uri(client.uri, "rosrpc")[:2]
-            with contextlib.suppress(TransportException):  # some servers send no type
-                transport.use_header(client.header)
-            self._client, self._transport, self._transport_is_own = None, transport, True
-        return self._transport
+                # From here on the connection belongs to the transport, which the program may use or close. A call in
+                # progress still receives its response; the next call waits for that, and then uses the transport.
+                transport = TCPROSTransport(self.protocol, self.resolved_name)
+                transport.set_socket(client.detach(), client.uri)
+                transport.dest_address = split_uri(client.uri, "rosrpc")[:2]
+                with contextlib.suppress(TransportException):  # some servers send no type
+                    transport.use_header(client.header)
+                self._client, self._transport, self._transport_is_own = None, transport, True
+            return self._transport
 
     @transport.setter
     def transport(self, transport: TCPROSTransport | None) -> None:
-        self._disconnect()
-        self._transport, self._transport_is_own = transport, False
+        with self._handover:
+            self._end_client()
+            self._transport, self._transport_is_own = transport, False
 
     def _get_service_uri(self, request: object) -> str:
         """Return the service's URI. ``request`` has no effect here. Raise ServiceException if the service is not registered."""
@@ -332,38 +353,59 @@ class ServiceProxy(Generic[_S_co]):
         wait_for_service(self.resolved_name, timeout)
 
     def close(self) -> None:
-        """Close a persistent connection. If another thread is calling through it, that call fails."""
+        """Close a persistent connection; if another thread is calling through it, that call fails."""
+        with self._handover:
+            self._end_client()
+            transport, self._transport = self._transport, None
+        if transport:
+            transport.close()
+
+    def _end_client(self) -> None:
+        """Close the persistent connection; abort the call of another thread that uses it."""
         client = self._client
-        if client and self._lock.locked():
+        if client and self._is_calling:
             # Shut the socket down instead of closing it, because closing would not wake a thread that is reading from
             # it. That thread then closes the socket.
             client.hang_up()
         else:
             self._disconnect()
-        transport, self._transport = self._transport, None
-        if transport:
-            transport.close()
 
-    def _is_transport_usable(self, transport: TCPROSTransport) -> bool:
-        """Return whether calls use ``transport``; drop it if it is the proxy's own connection and has ended.
+    def _usable_transport(self) -> TCPROSTransport | None:
+        """Return the transport for the next call; drop it if it is the proxy's own connection and has ended.
 
         A program's own connection is kept: it may lead to a different server than the one that the master knows.
         """
+        transport = self._transport
+        if transport is None or not self._transport_is_own:
+            return transport
+
         from minirospy.runtime.transport.sockets import is_readable
 
         sock = transport.socket
-        if self._transport_is_own and (sock is None or is_readable(sock)):
-            transport.close()
-            self._transport = None
-        return self._transport is not None
+        if sock is not None and sock.fileno() >= 0 and not is_readable(sock):
+            return transport
+        self._drop_transport(transport)
+        return None
+
+    def _drop_transport(self, transport: TCPROSTransport) -> None:
+        """Close ``transport``; calls no longer use it."""
+        with self._handover:
+            if self._transport is transport:
+                self._transport = None
+        transport.close()
 
     def _call_through(self, transport: TCPROSTransport, request: Message) -> Message:
         """Call the service through ``transport``, and return the response."""
         is_kept = False
         self._calls += 1
         try:
-            transport.send_message(request, self._calls)
-            responses = transport.receive_once()
+            with current_session().lifecycle.interrupting(transport.close):
+                transport.send_message(request, self._calls)
+                responses = transport.receive_once()
+            if not responses:  # another thread closed the transport between two reads
+                if current_session().is_shutdown():
+                    raise TransportException("connection closed")
+                raise ServiceException(f"service [{self.resolved_name}] returned no response")
             is_kept = self.persistent
         except ServiceException:
             is_kept = self.persistent
@@ -376,9 +418,31 @@ class ServiceProxy(Generic[_S_co]):
             raise ServiceException(f"transport error completing service call: {error}") from error
         finally:
             if not is_kept:
-                transport.close()
-                self._transport = None
+                self._drop_transport(transport)
         return responses[0]
+
+    def _kept_client(self, request: bytes) -> ServiceClient:
+        """Return the persistent connection for sending ``request``; connect if there is none, or if it has ended."""
+        client = self._client
+        if client and (client.has_ended() or self._client_session is not current_session()):
+            # In a fork the connection belongs to the parent: the two processes would read each other's responses.
+            with self._handover:
+                self._disconnect()
+            client = None
+        if client is None:
+            client = self._client = self._connect(request)
+            self._client_session = current_session()
+        return client
+
+    def _drop_client(self, client: ServiceClient) -> None:
+        """Close ``client``, and the transport that took over its connection during the call."""
+        with self._handover:
+            if self._client is client:
+                self._client = None
+            transport = self._transport if self._transport_is_own else None
+        if transport is not None and transport.socket is client.detach():
+            self._drop_transport(transport)
+        client.close()
 
     def _disconnect(self) -> None:
         client, self._client = self._client, None
@@ -480,9 +544,7 @@ class ServiceProxy(Generic[_S_co]):
             raise ServiceException(f"transport error completing service call: {error}") from error
         finally:
             if not keeping:
-                client.close()
-                if self._client is client:
-                    self._client = None
+                self._drop_client(client)
 
         response: Message = self.response_class()
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import socket
 import struct
 import subprocess
@@ -68,6 +69,15 @@ rospy.signal_shutdown("enough")
 thread.join()
 """
 
+WAITING_TRANSPORT = WAITING.replace('rospy.ServiceProxy("/slow", Trigger)()', "proxy()").replace(
+    'rospy.init_node("client")',
+    """rospy.init_node("client")
+proxy = rospy.ServiceProxy("/slow", Trigger, persistent=True)
+proxy()
+print(type(proxy.transport).__name__, flush=True)
+input()""",
+)
+
 Program = subprocess.Popen[str]
 
 
@@ -128,6 +138,88 @@ def test_a_proxy_whose_transport_was_read_connects_again(started: list[Program])
             assert hear(client) == f"{is_none} {name}"
         server.terminate()
         server.wait(30)
+
+
+CONCURRENT = """
+import threading
+import rospy
+from std_srvs.srv import SetBool
+
+def call(value):
+    for count in range(300):
+        if count == 100:
+            proxy.transport
+        response = proxy(value)
+        if response.success is not value:
+            print("the response of the other thread", flush=True)
+
+rospy.init_node("client")
+proxy = rospy.ServiceProxy("/s", SetBool, persistent=True)
+threads = [threading.Thread(target=call, args=[value]) for value in (True, False)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+print(proxy.seq, flush=True)
+"""
+
+
+def test_calls_of_two_threads_run_one_at_a_time_after_transport_was_read(started: list[Program]) -> None:
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    client = start(started, CONCURRENT)
+    assert hear(client) == "600"
+    assert client.wait(30) == 0
+
+
+ABORTING = """
+import threading
+import rospy
+from std_srvs.srv import Trigger
+
+def call():
+    try:
+        proxy()
+    except rospy.ServiceException as error:
+        print(error, flush=True)
+
+rospy.init_node("client")
+proxy = rospy.ServiceProxy("/slow", Trigger, persistent=True)
+thread = threading.Thread(target=call)
+thread.start()
+input()
+proxy.transport.close()
+thread.join()
+input()
+print(proxy().message, flush=True)
+"""
+
+
+@pytest.mark.parametrize("end", ["proxy.transport.close()", "proxy.transport = None"])
+def test_transport_can_be_read_and_set_during_a_call(started: list[Program], end: str) -> None:
+    """Programs close the transport to abort the call of another thread, so reading it does not wait for that call."""
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    client = start(started, ABORTING.replace("proxy.transport.close()", end))
+    assert hear(server) == "called"
+    say(client)
+    assert hear(client).startswith("transport error completing service call: ")
+    say(server, "gate.set()")
+    say(client)
+    assert hear(client) == "late"
+
+
+def test_transport_that_returns_no_response_is_a_service_error(started: list[Program]) -> None:
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    client = start(
+        started,
+        PERSISTENT.replace(
+            "print(proxy(True)", "proxy.transport.receive_once = list; print(proxy(True)"
+        ).replace("for line in", "proxy(True)\nfor line in"),
+    )
+    say(client)
+    assert hear(client) == "service [/s] returned no response"
 
 
 CLOSING = """
@@ -194,6 +286,62 @@ def test_a_shutdown_ends_a_call_that_waits(started: list[Program]) -> None:
     say(client)
     assert hear(client) == "node shutdown interrupted service call"
     assert client.wait(30) == 0
+
+
+def test_shutdown_ends_a_call_through_a_transport(started: list[Program]) -> None:
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    say(server, "gate.set()")
+    client = start(started, WAITING_TRANSPORT)
+    assert hear(server) == "called"
+    assert hear(client) == "TCPROSTransport"
+    say(server, "gate.clear(); print('cleared', flush=True)")
+    assert hear(server) == "cleared"
+    say(client)
+    assert hear(server) == "called"
+    say(client)
+    assert hear(client) == "node shutdown interrupted service call"
+    assert client.wait(30) == 0
+
+
+HOOKED = """
+import rospy
+from std_srvs.srv import Trigger
+
+def hook():
+    print(proxy().message, flush=True)
+
+rospy.init_node("client")
+rospy.on_shutdown(hook)
+proxy = rospy.ServiceProxy("/slow", Trigger, persistent=True)
+proxy()
+proxy.transport
+print("ready", flush=True)
+input()
+proxy()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals between processes")
+@pytest.mark.parametrize("reads", ["proxy.transport", ""])
+def test_shutdown_hook_may_call_the_proxy_whose_call_it_interrupts(
+    started: list[Program], reads: str
+) -> None:
+    server = start(started, SERVER, "server")
+    assert hear(server) == "ready"
+    say(server, "gate.set()")
+    client = start(started, HOOKED.replace("\nproxy.transport\n", f"\n{reads}\n"))
+    assert hear(server) == "called"
+    assert hear(client) == "ready"
+    say(server, "gate.clear(); print('cleared', flush=True)")
+    assert hear(server) == "cleared"
+    say(client)
+    assert hear(server) == "called"
+    client.send_signal(signal.SIGINT)
+    assert hear(server) == "called"
+    say(server, "gate.set()")
+    assert hear(client) == "late"
+    client.wait(30)
 
 
 def test_a_request_that_does_not_fit_is_answered(started: list[Program], master: str) -> None:

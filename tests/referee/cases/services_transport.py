@@ -125,6 +125,8 @@ outcome("error", lambda: proxy(False))
 show(proxy(True).message, proxy.transport is transport)
 transport.connect(host, port, uri, timeout=5)
 show(proxy(True).message, proxy.transport is transport)
+transport.receive_once = list  # as if closed by another thread
+outcome("no response", lambda: proxy(True))
 proxy.transport = None
 show(proxy(True).message, proxy.transport is transport, proxy.transport is None)
 single = rospy.ServiceProxy("service", SetBool)
