@@ -33,12 +33,12 @@ def escaped(text: str, keep: str = "") -> str:
 
 
 def has_controls(text: str) -> bool:
-    """Return whether ``text`` contains a control character or a line separator, and therefore is neither a name nor a URI."""
+    """Return whether ``text`` contains a control character or a line separator, so that it is neither a name nor a URI."""
     return _NAME_CONTROL.search(text) is not None
 
 
 def own_output() -> TextIO:
-    """Return a standard output for drawings that move the cursor, because :class:`SafeTerminal` would escape those sequences.
+    """Return a standard output for drawings that move the cursor; :class:`SafeTerminal` would escape those sequences.
 
     The caller must escape untrusted text in the drawing.
     """
@@ -61,7 +61,7 @@ class SafeTerminal(io.TextIOWrapper):
         return cls(stream.buffer, stream.encoding, "backslashreplace", line_buffering=True)
 
     def write(self, text: str) -> int:
-        """Write ``text``, with its control characters escaped."""
+        """Write ``text`` with its control characters escaped."""
         if _CONTROL.search(text):
             end, parts = 0, []
             for own in _OWN_SEQUENCE.finditer(text):

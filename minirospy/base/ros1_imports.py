@@ -42,7 +42,7 @@ _GENERATED = re.compile(rb"^from [\w.]+\.(?:msg|srv|action)\._\w+ import ", re.M
 """Matches msg/__init__.py as rosidl generates it; ROS 1 generates `from ._Name import *`."""
 _INDEX = os.path.join("share", "ament_index", "resource_index", "packages")
 _MAX_PARENTS = (
-    # number of folders from a package up to the prefix: prefix/local/lib/python3.12/dist-packages/std_msgs
+    # number of folders from a package up to its prefix: prefix/local/lib/python3.12/dist-packages/std_msgs
     5
 )
 

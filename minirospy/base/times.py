@@ -20,7 +20,7 @@ class TVal:
     __slots__ = ["secs", "nsecs"]  # noqa: RUF023 - genpy's order
 
     def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
-        """Create the value; ``secs`` may be a float if ``nsecs`` is 0.
+        """Create a time or duration. ``secs`` may be a float if ``nsecs`` is 0.
 
         Raise ValueError or TypeError if an argument is invalid.
         """
@@ -42,7 +42,7 @@ class TVal:
         return cls(*_split(float_secs))
 
     def is_zero(self) -> bool:
-        """Return whether the value is zero."""
+        """Return whether the time or duration is zero."""
         return not (self.secs or self.nsecs)
 
     def set(self, secs: int, nsecs: int) -> None:
@@ -251,7 +251,7 @@ Time.__slots__ = Duration.__slots__ = TVal.__slots__
 
 
 def _split(seconds: float) -> tuple[int, int]:
-    """Return whole seconds, and the remaining nanoseconds, which are truncated and not rounded, as in genpy."""
+    """Split into whole seconds and the remaining nanoseconds, which are truncated, not rounded, as in genpy."""
     whole = int(seconds)
     return whole, int(float(seconds - whole) * 1e9)
 

@@ -29,7 +29,7 @@ __all__ = ["COMMAND", "main"]
 
 BUTTON, LED = 11, 7
 _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
-"""Seconds for which the button is pressed and then released.
+"""Seconds for which the button is held and then left released.
 
 Each is between two of the node's ten polls per second, so that the LED reacts after its typical delay.
 """
@@ -172,14 +172,14 @@ def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) 
 
 
 def _follow(board: Board, level: int) -> float | None:
-    """Press or release the button; return the seconds until the LED followed, or None if it did not."""
+    """Press or release the button. Return the seconds until the LED followed, or None if it did not."""
     start = time.monotonic()
     (board.press if level else board.release)(BUTTON)
     return None if _wait_for(board, level, _FOLLOW_SECONDS) is None else time.monotonic() - start
 
 
 def _wait_for(board: Board, level: int, timeout: float) -> int | None:
-    """Wait until the LED has ``level``, and return the level; return None after ``timeout`` seconds."""
+    """Wait until the LED has ``level`` and return the level, or None after ``timeout`` seconds."""
     watch = board.watch([LED], timeout=timeout)
     if board.get(LED) == level:
         return level

@@ -1,4 +1,4 @@
-"""The lifecycle of a node: its hooks, its shutdown, and the threads that have been notified of it.
+"""The lifecycle of a node: its hooks, its shutdown, and the threads notified of the shutdown.
 
 Source: http://wiki.ros.org/rospy/Overview/Initialization%20and%20Shutdown.
 """

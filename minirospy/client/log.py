@@ -158,7 +158,7 @@ class _CallSites:
         return True
 
     def is_due(self, frame: FrameType, period: float | times.Duration) -> bool:
-        """Return whether the call site at ``frame`` last logged at least ``period`` seconds ago."""
+        """Return whether the call site at ``frame`` last logged more than ``period`` seconds ago."""
         place, now = _place(frame), current_session().clock.now()
         before = self._times.get(place)
         pause = period.to_nsec() if isinstance(period, times.Duration) else int(period * 1e9)

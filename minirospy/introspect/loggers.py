@@ -1,4 +1,4 @@
-"""A node's loggers and their levels, queried from the node.
+"""A node's loggers and their levels, as the node reports them.
 
 Source: http://wiki.ros.org/rosconsole (the services get_loggers and set_logger_level of each node).
 """

@@ -29,7 +29,7 @@ _Kind = TypeVar("_Kind")
 
 
 class PythonSetup(NamedTuple):
-    """Top-level packages (folders), modules (files) and scripts (files), by name.
+    """Dicts of top-level packages (folders), modules (files) and scripts (files), keyed by name.
 
     ``warnings`` has a line for each package whose folder is missing, which catkin ignores.
     """
@@ -70,7 +70,7 @@ def read_python_setup(folder: Path) -> PythonSetup:
 
 
 def _given(file: Path, given: Mapping[str, object], name: str, kind: type[_Kind], form: str) -> _Kind:
-    """Return an argument of ``setup()``, or an empty ``kind`` if it is missing or None.
+    """Return the ``setup()`` argument ``name``, or an empty ``kind`` if it is missing or None.
 
     Raise BuildError if its type is wrong.
     """
@@ -116,7 +116,7 @@ def _run(file: Path) -> Mapping[str, object]:
 
 
 class _StandIn(types.ModuleType):
-    """A module that has every attribute. Each attribute is an empty class, unless it has been set."""
+    """A module that has every attribute. An attribute that has not been set is an empty class."""
 
     def __getattr__(self, name: str) -> type:
         if name.startswith("__"):

@@ -139,8 +139,7 @@ class Publication:
                 link.wait()
 
     def accept(self, sock: socket.socket, fields: Header, caller_id: str, peer: str) -> str | None:
-        """Reply to a subscriber's header as node ``caller_id`` and start sending, or return the reason for refusing the
-        subscriber.
+        """Reply to a subscriber's header as node ``caller_id`` and start sending to it. If refused, return the reason.
 
         Call this on the loop.
         """
