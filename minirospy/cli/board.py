@@ -166,9 +166,7 @@ def _show() -> int:
 
 @contextlib.contextmanager
 def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
-    """Yield a function that draws over the previous drawing, or below it on a terminal that cannot move the cursor
-    (TERM=dumb).
-    """
+    """Yield a function that draws over the previous drawing, or below it if the terminal cannot move the cursor (TERM=dumb)."""
     from rich.live import Live
 
     if console.is_dumb_terminal:

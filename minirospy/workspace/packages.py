@@ -245,8 +245,7 @@ def package_name(folder: Path) -> str | None:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Yield a package's files: first those in its own folder, then those in the folders where builds and installations put
-    programs.
+    """Yield a package's files: first those in its own folder, then programs from builds and installations.
 
     The Python modules in minirospy's own packages are skipped, because `rosrun` does not run them.
     """
