@@ -356,7 +356,7 @@ class Node:
             publisher: Publisher[Message] = self.advertise(resolved, type(message))
             kept = self._kept[resolved] = (publisher, self._spawn(publisher.wait_for_expected()))
         publisher, expected = kept
-        # Concurrent calls that publish on the topic wait here too.
+        # Concurrent calls that publish on the topic also wait here.
         await asyncio.wait([expected])
         await publisher.publish(message)
 

@@ -16,8 +16,7 @@ __all__ = ["ParameterWatch"]
 
 
 class ParameterWatch:
-    """The parameters that a node has subscribed to. When a value changes, each of ``listeners`` is called on the loop with
-    (name, value).
+    """A node's parameter subscriptions. When a value changes, ``listeners`` are called with (name, value), on the loop.
 
     A deleted parameter has the value ``{}``, as the master sends it. After a restart of the master, the subscriptions
     are renewed. Source: http://wiki.ros.org/ROS/Parameter%20Server%20API (subscribeParam).

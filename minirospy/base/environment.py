@@ -37,7 +37,7 @@ DEFAULT_MASTER_PORT = 11311
 _SWITCH = {"": False, "0": False, "off": False, "false": False, "1": True, "on": True, "true": True}
 
 DISTRO = "noetic\n"
-"""The value of /rosdistro: the ROS 1 distribution that minirospy behaves like. ROS's value ends in a newline, too."""
+"""The value of /rosdistro: the ROS 1 distribution that minirospy behaves like. Like ROS's value, it ends in a newline."""
 
 ROS_VERSION = "1.17.0\n"  # the value of /rosversion
 

@@ -82,6 +82,6 @@ class SafeTerminal(io.TextIOWrapper):
             self.detach()
 
     def __del__(self) -> None:
-        # Do not close the stream as TextIOWrapper.__del__ does, because that would close the buffer, which
+        # Unlike TextIOWrapper.__del__, do not close the stream, because that would close the buffer, which
         # sys.__stdout__ shares.
         pass

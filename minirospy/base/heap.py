@@ -28,8 +28,8 @@ def return_large_blocks(least: int = _LARGE) -> None:
         library = ctypes.CDLL(None)
         library.mallopt(_M_MMAP_THRESHOLD, least)
         if least > _LARGE:
-            # Use the same ratio as glibc does by default; otherwise each block above 128 KiB would grow and shrink
-            # the heap at its end.
+            # Keep glibc's default ratio; otherwise each block above 128 KiB would grow and shrink the heap at its
+            # end.
             library.mallopt(_M_TRIM_THRESHOLD, 2 * least)
 
 

@@ -1,4 +1,4 @@
-"""Build the command line with which the user adds a library to minirospy's own environment.
+"""Build the command line that adds a library to minirospy's own environment.
 
 Environments created by pipx or uv have no `python -m pip`; pipx and uv have commands for this. Sources:
 https://pipx.pypa.io and https://docs.astral.sh/uv/concepts/tools.

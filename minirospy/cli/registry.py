@@ -1,4 +1,4 @@
-"""A table of all commands, from which the console scripts, `minirospy VERB` and completion are generated.
+"""A table of all commands. The console scripts, `minirospy VERB` and completion are generated from it.
 
 The build creates the console scripts (hatch_build.py); `python tools/commands.py` writes the lists for the shells and for the
 conda recipe.

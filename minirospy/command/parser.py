@@ -265,7 +265,7 @@ class Parser(argparse.ArgumentParser):
 
 
 class AssignmentParser(Parser):
-    """A parser that accepts NAME:=VALUE between the other arguments, as roslaunch does."""
+    """A parser that, like roslaunch's, accepts NAME:=VALUE between the other arguments."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
         """Return a dict from argument name to value, with the assignments as ``args``.

@@ -39,7 +39,7 @@ class Command(NamedTuple):
     misuse_status: int = 2
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """Run the command; return the exit status as :func:`minirospy.command.command.run` does."""
+        """Run the command; return the exit status from :func:`minirospy.command.command.run`."""
         words = sys.argv[1:] if argv is None else argv
         return run(self.name, lambda: self._run(words), self.interrupted, self.wording)
 
@@ -122,7 +122,7 @@ class Family(NamedTuple):
     shows_help_on_error: bool = False
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """Run the chosen verb; return the exit status as :func:`minirospy.command.command.run` does."""
+        """Run the chosen verb; return the exit status from :func:`minirospy.command.command.run`."""
         words = list(sys.argv[1:] if argv is None else argv)
         return run(self.name, lambda: self._dispatch(words), self.interrupted, self.wording)
 

@@ -80,7 +80,7 @@ class Connections(NamedTuple):
 
 
 class Neighbours(NamedTuple):
-    """The nodes from which a node receives messages, and those to which it sends, according to the master."""
+    """The nodes that a node receives messages from, and those that it sends to, according to the master."""
 
     senders: list[str]
     receivers: list[str]

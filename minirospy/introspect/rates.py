@@ -30,7 +30,7 @@ _NOTHING = "no new messages"
 
 
 class Spread(NamedTuple):
-    """Statistics of a series of times in seconds: mean, minimum, maximum, standard deviation, and the number of messages."""
+    """Statistics of times in seconds: mean, minimum, maximum, standard deviation, and the number of messages."""
 
     mean: float
     min: float

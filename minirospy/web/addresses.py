@@ -48,7 +48,7 @@ def own_addresses() -> list[str]:
 
 
 def host_names() -> list[str]:
-    """Return the names by which other machines may reach this machine: its host name and its mDNS name."""
+    """Return the names that other machines may use to reach this machine: its host name and its mDNS name."""
     name = socket.gethostname()
     return [name, f"{name.partition('.')[0]}.local"]
 

@@ -80,7 +80,7 @@ def is_quick_text(text: str) -> bool:
     """Return whether a string can be parsed in a few milliseconds."""
     if len(text) <= MAX_QUICK_CHARACTERS:
         return True
-    # Brackets and commas in strings are counted too. This is harmless, because a large base64 string contains none.
+    # Brackets and commas in strings count as well. This is harmless, because a large base64 string contains none.
     return len(text) <= MAX_QUICK_STRINGS and sum(map(text.count, ",[{")) <= MAX_QUICK_VALUES
 
 
@@ -95,7 +95,7 @@ def load_json(
 
 
 def load_json_in_pieces(text: str) -> object:
-    """Parse JSON as :func:`load_json` does, but without holding the GIL for long.
+    """Like :func:`load_json`, but without holding the GIL for long.
 
     Use it in a thread alongside the event loop.
     """

@@ -337,7 +337,7 @@ class _Builder:
             path = Path(name)
             path.unlink(missing_ok=True)
             for folder in path.parents:
-                # Also remove a folder in which only Python's cache remains.
+                # Also remove a folder that contains only Python's cache.
                 if folder == self._modules or not folder.is_dir() or any(folder.glob("*.py")):
                     break
                 for cached in folder.glob("__pycache__/*.pyc"):

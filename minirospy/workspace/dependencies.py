@@ -101,7 +101,7 @@ class Dependencies:
         return [each for each in dict.fromkeys(wanted) if each == name or each in self.copies]
 
     def all(self, name: str) -> list[str]:
-        """Return a package's direct and indirect dependencies, sorted so that each follows its own dependencies.
+        """Return a package's direct and indirect dependencies in topological order: each follows those that it depends on.
 
         Raise CircularDependencyError if the dependencies form a cycle; otherwise raise the same exceptions as :meth:`direct`.
         """

@@ -165,7 +165,7 @@ QT_LIBRARIES = (
 MESSAGES = {
     "costmap_converter": "https://github.com/rst-tu-dortmund/costmap_converter",
 }
-"""Dict from package of message definitions to the arguments with which `git clone` gets its ROS 1 version."""
+"""Dict from message package to the arguments with which `git clone` gets its ROS 1 version."""
 
 IMPORTED = frozenset(
     {

@@ -177,7 +177,7 @@ class CrawlTime(NamedTuple):
 
 
 def crawl_times(root: Path) -> list[CrawlTime]:
-    """Measure the search time of a folder and of each of its subfolders, except for packages."""
+    """Measure the search time of a folder and of each subfolder, except for packages."""
     found: list[CrawlTime] = []
 
     def visit(folder: Path) -> bool:
@@ -230,7 +230,7 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _leads_back(entry: os.DirEntry[str]) -> bool:
-    """Return whether an entry is a link to one of its own parent folders, which would make the search infinite."""
+    """Return whether an entry is a link to one of its parent folders, which would make the search infinite."""
     return entry.is_symlink() and Path(entry.path).parent.resolve().is_relative_to(Path(entry.path).resolve())
 
 

@@ -29,7 +29,7 @@ _Kind = TypeVar("_Kind")
 
 
 class PythonSetup(NamedTuple):
-    """Dicts of top-level packages (folders), modules (files) and scripts (files), keyed by name.
+    """The contents of a setup.py: dicts from name to folder or file for top-level packages and modules, and script files.
 
     ``warnings`` has a line for each package whose folder is missing, which catkin ignores.
     """
@@ -191,8 +191,7 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
     sys.meta_path.insert(0, finder)
     sys.path.insert(0, str(folder))
     os.chdir(folder)
-    # Set the variables that catkin's build sets, because a terminal in which no setup.bash is sourced has none of
-    # them.
+    # Set the variables that catkin's build sets, because without a sourced setup.bash, none of them is set.
     os.environ.update({name: VARIABLES[name] for name in unset})
     try:
         yield

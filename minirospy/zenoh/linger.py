@@ -23,7 +23,7 @@ _LINGER = struct.Struct("ii")
 _ZENOHS = _LINGER.pack(1, 10)
 _NONE = _LINGER.pack(0, 0)
 LOOKS = 10
-"""Number of polls in which to examine a new file descriptor: Zenoh sets SO_LINGER only after it has connected the socket."""
+"""Number of polls that examine a new file descriptor. Zenoh sets SO_LINGER only after it has connected the socket."""
 
 
 class LingerRemover:

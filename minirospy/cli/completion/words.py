@@ -16,7 +16,10 @@ _LINE_FEED = "\v"
 _PLAIN = re.compile(r"[\w@%+=:,./~-]*\Z")
 """Strings that need no quotes in any POSIX shell."""
 _PLAIN_IN_POWERSHELL = re.compile(r"[\w+=:./\\~-]*\Z")
-"""Strings that need no quotes in PowerShell, in which a comma makes an array, and @ and % have other meanings."""
+"""Strings that need no quotes in PowerShell.
+
+Commas are excluded because they make an array, and @ and % because they have other meanings.
+"""
 
 
 class Word(NamedTuple):

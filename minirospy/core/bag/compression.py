@@ -30,7 +30,7 @@ __all__ = [
 NONE = "none"
 BZ2 = "bz2"
 LZ4 = "lz4"
-COMPRESSIONS = (NONE, BZ2, LZ4)  # in the order in which rosbag lists them
+COMPRESSIONS = (NONE, BZ2, LZ4)  # in rosbag's order
 
 MAX_CHUNK_SIZE = 1088 * 1024 * 1024
 """Maximum size of a compressed chunk's data in bytes: enough for the longest message (1 GiB) and the records before it."""

@@ -51,8 +51,8 @@ def mcap_faults() -> Iterator[None]:
     except (McapError, ZstdError, struct.error, LookupError, StopIteration, UnicodeDecodeError) as error:
         raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
     except (EOFError, OSError, ValueError, RuntimeError, ArithmeticError, MemoryError, TypeError) as error:
-        # Decompressors raise these errors for lengths that exceed the memory; a seek before the start of a short file
-        # raises them too.
+        # Decompressors raise these errors for lengths that exceed the memory. A seek before the start of a short file
+        # also raises them.
         raise BagFormatError(f"not a whole MCAP file: {error}") from error
 
 

@@ -77,7 +77,7 @@ class _Rewriting:
 
     @property
     def shift(self) -> int:
-        """The number of bytes by which the following data moves."""
+        """The offset, in bytes, to add to the positions of the following data."""
         return self._written + len(self._waiting) - self._read
 
     def copy_until(self, position: int) -> None:
@@ -96,7 +96,7 @@ class _Rewriting:
         self._put(edit.data)
 
     def finish(self) -> int:
-        """Truncate the file at the current position; return the number of bytes by which its end has moved."""
+        """Truncate the file at the current position; return how many bytes its end has moved."""
         shift, self._read = self.shift, self._read + len(self._waiting)
         self._put(b"")
         self._stream.seek(self._written)
@@ -247,7 +247,7 @@ class Repair:
                 )
 
     def _add_connections(self, content: _Content) -> None:
-        # Add the connections in file order, which is the order in which ROS writes them to the index.
+        # Add the connections in file order, because ROS writes them to the index in that order.
         for number, connection in content.connections.items():
             self.connections.setdefault(number, connection)
 

@@ -103,7 +103,7 @@ class _Complete(NamedTuple):
 
 
 class Continued(NamedTuple):
-    """The index of a bag to which messages will be appended, and the index's position."""
+    """The index of a bag to append messages to, and the index's position."""
 
     connections: Iterable[Connection]
     chunks: Iterable[ChunkInfo]

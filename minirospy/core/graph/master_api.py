@@ -66,7 +66,7 @@ class MasterApi(ABC):
         # called for each change, with the record that the journal stores
         self.record: Callable[..., object] = nothing
         self.store: Callable[[object], Steps[int]] = _store_nothing
-        """Writes a large value to the journal, and returns the number by which a change refers to it."""
+        """Writes a large value to the journal; returns the number that a change uses to refer to it."""
 
         topic = parameters(topic=global_name, caller_api=api_uri)
         typed_topic = parameters(topic=global_name, topic_type=type_name, caller_api=api_uri)

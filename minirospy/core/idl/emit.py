@@ -114,7 +114,7 @@ _HELPERS = {
         "            return value",
     ],
 }
-"""Helper functions in a module: a dict from name to lines, in the order in which they are emitted."""
+"""Helper functions in a module: a dict from name to lines, in output order."""
 
 
 def emit_message(spec: MessageSpec, lookup: Lookup) -> str:

@@ -409,7 +409,7 @@ _running: weakref.WeakValueDictionary[int, type[Message]] = weakref.WeakValueDic
 
 
 def _reduced(message: Any) -> tuple[Any, ...]:
-    """Return the data with which pickle and copy recreate a message whose class is in no module.
+    """Return the data that pickle and copy need to recreate a message whose class is in no module.
 
     The data contains the class's full text.
     """

@@ -110,7 +110,7 @@ class ServiceClass(Protocol):
 
 
 class ActionGoal(Stamped, Protocol):
-    """The message with which an action client sends a goal."""
+    """The message that an action client sends to start a goal."""
 
     @property
     def goal_id(self) -> GoalID:

@@ -1,4 +1,4 @@
-"""The hash of a type's fields (RIHS01), by which ROS 2 distinguishes definitions with the same name. Pure.
+"""The hash of a type's fields (RIHS01). ROS 2 uses it to distinguish definitions with the same name. Pure.
 
 Source: https://github.com/ros-infrastructure/rep/pull/381 (REP 2016), and rosidl's type description.
 """

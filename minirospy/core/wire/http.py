@@ -39,7 +39,7 @@ _REASONS = {
 }
 
 
-# A message's body; a long one is not copied from the buffer in which it was collected
+# a message's body; a long one is not copied from the buffer that collected it
 Body = bytes | bytearray
 
 

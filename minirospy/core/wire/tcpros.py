@@ -65,7 +65,7 @@ def subscriber_header(
 def publisher_header(
     topic: str, type_: InterfaceType, caller_id: str, *, latch: bool, extra: Mapping[str, str] | None = None
 ) -> Header:
-    """Return the header with which a publisher replies; ``extra`` are the user's fields.
+    """Return a publisher's reply header; ``extra`` are the user's fields.
 
     As in rospy, the user's fields override others: for example, a relay of AnyMsg sends the type of the relayed messages.
     """
@@ -137,7 +137,7 @@ def service_client_header(
 def service_header(
     service: str, type_: InterfaceType, caller_id: str, request_type: str, response_type: str
 ) -> Header:
-    """Return the header with which a service replies: rospy's fields, and roscpp's request and response types."""
+    """Return a service's reply header: rospy's fields, and roscpp's request and response types."""
     return {
         "callerid": caller_id,
         "md5sum": type_.md5sum,

@@ -464,7 +464,7 @@ async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries
             if isinstance(error.__cause__, (ConnectionRefusedError, EOFError)):
                 return False
         except RpcError:
-            # roscpp has no getName and returns an error, so an error is a response too.
+            # roscpp has no getName and returns an error, so an error counts as a response.
             return True
         else:
             return not (

@@ -203,7 +203,7 @@ class Reader:
         try:
             return self._receive(min(count, _MOST), flags)
         except ConnectionResetError:
-            # The peer closed a connection with unread data, which counts as end of file too.
+            # The peer closed a connection with unread data, which also counts as end of file.
             return b""
 
     def _take_large(self, data: bytes, count: int) -> bytes:

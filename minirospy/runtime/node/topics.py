@@ -56,7 +56,7 @@ SETTLE_SECONDS = 10.0  # seconds within which all nodes register again with a ma
 # exited before that
 _WARN_AFTER = 3
 
-# maximum number of log lines about publishers with invalid responses; further ones are only counted
+# maximum number of log lines about publishers with invalid responses; the rest are only counted
 _REFUSALS_LOGGED = 10
 
 # seconds within which a publisher's unreachable topics are combined in one log line
@@ -458,8 +458,8 @@ class Subscription:
             if self.lists == lists:
                 self.plan.refused(uri)
             else:
-                # A newer list arrived after this refusal, and there may be no further list, so retry now: the
-                # publisher may accept.
+                # A newer list arrived after this refusal, and it may be the last one, so retry now: the publisher may
+                # accept.
                 self.retry(uri, error)
         except _NoPublisher as error:
             self._limited_log.warning("no connection for %s: %s", self.topic, error)

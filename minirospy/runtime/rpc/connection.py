@@ -99,7 +99,7 @@ class Connection:
         self._state: State = _OPEN
 
         self._out = Outbox(sock)
-        # The next request to process; further requests that arrived with it are still unparsed bytes.
+        # The next request to process. Other requests that arrived with it are still unparsed bytes.
         self._message: HttpMessage | None = None
         self._has_deadline = False
         self._has_requested = False
@@ -246,7 +246,7 @@ class Connection:
             return
 
         if self._state is _REFUSED:
-            # The client was refused, so ignore all further data.
+            # The client was refused, so ignore all data from now on.
             if not data:
                 self.end()
             return

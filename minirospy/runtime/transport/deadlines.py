@@ -21,7 +21,7 @@ class Deadlines(Generic[_T]):
         self._late = late
         self._ends: dict[_T, float] = {}
         self._timer: asyncio.TimerHandle | None = None
-        # The time at which the timer fires, which is no later than the earliest limit.
+        # The time at which the timer fires, no later than the earliest limit.
         self._next = 0.0
 
     def __len__(self) -> int:

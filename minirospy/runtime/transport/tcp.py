@@ -146,7 +146,7 @@ class Listener:
         self._accept = accept
         self._allows = allows
         self._sock: socket.socket | None = None
-        # Dict from handshake task to the peer's address, in the order in which the tasks started.
+        # Dict from handshake task to the peer's address, in starting order.
         self.handshakes: dict[asyncio.Task[None], str] = {}
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.port = 0

@@ -66,7 +66,7 @@ class Workers:
 
 
 class InOrder:
-    """Runs functions in workers, one at a time, in the order in which they were started."""
+    """Runs functions in workers, one at a time, in the order of the calls to :meth:`start`."""
 
     def __init__(self, workers: Workers) -> None:
         self._workers = workers

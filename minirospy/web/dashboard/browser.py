@@ -86,7 +86,7 @@ def _open(address: str, remove: Callable[[], object]) -> Callable[[], object]:
 
 
 def _parent() -> Path | None:
-    """Return the folder in which to create the file's own folder, or None for the system's temporary folder."""
+    """Return the parent for the file's folder, or None to use the system's temporary folder."""
     home = Path.home()
     if any(each.exists() for each in SNAPS) and os.access(home, os.W_OK):
         return home

@@ -45,7 +45,7 @@ __all__ = [
 SUBPROTOCOL = "minirospy.drive.v1"
 
 SILENT_SECONDS = 0.5
-"""A client that holds a control and sends nothing for this many seconds is considered lost, and its topics are stopped."""
+"""A client that holds a control but sends nothing for this many seconds is considered lost; its topics are stopped."""
 
 _log = logging.getLogger(__name__)
 

@@ -457,7 +457,7 @@ OPERATIONS = (
     *("call_service", "advertise", "unadvertise", "publish", "subscribe", "unsubscribe", "fragment"),
     *("advertise_service", "service_response", "unadvertise_service", "png", "set_level", "auth"),
 )
-"""The operations that clients may send, in the order in which errors list them."""
+"""The operations that clients may send, in the order used in error messages."""
 
 
 # --- encoding

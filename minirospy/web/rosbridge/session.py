@@ -31,7 +31,7 @@ __all__ = ["RosbridgeSession"]
 
 _log = logging.getLogger(__name__)
 
-# memory of a parsed operation relative to that of its text, for objects and lists of numbers
+# ratio of a parsed operation's memory to that of its text, for objects and lists of numbers
 _VALUE_FACTOR = 4
 
 # maximum bytes from a read-only client, which only subscribes and needs less; each byte may become a value

@@ -121,7 +121,7 @@ class FairTurns:
     ) -> None:
         """Create the scheduler. ``call_soon`` schedules a call in the next loop iteration; ``clock`` returns seconds.
 
-        ``meter`` returns the seconds by which clients' use is measured, by default those of ``clock``.
+        ``meter`` returns the seconds used to measure clients' use (default: ``clock``).
         """
         self._call_soon = call_soon
         self._clock = clock

@@ -24,7 +24,7 @@ SNAPSHOT_SECONDS = 10.0
 _MAX_FEEDS = 32
 """Maximum number of concurrent feeds (a topic in one encoding), because each image is encoded once per feed."""
 _MAX_KEPT = 32_000_000
-"""Maximum total bytes of the encoded images that feeds store for new clients; further images are not stored."""
+"""Maximum total bytes of the encoded images that feeds store for new clients. Images that exceed it are not stored."""
 _HTML = "text/html; charset=utf-8"
 
 
