@@ -114,8 +114,7 @@ class Node:
         # Logs registrations that the master refused
         self.registration_faults = RateLimitedLogger(self.log, registration_fault_lines)
 
-        # The reason for the shutdown that another process requested, such as the master if a new node has the same
-        # name
+        # The shutdown reason from another process, such as the master if a new node has the same name
         self.shutdown_request = ""
 
         self._remappings = self._arguments.resolved_remappings(self.name)

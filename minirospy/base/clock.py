@@ -172,7 +172,7 @@ class SimulatedClock:
         self._sleepers: list[SignalSafeEvent] = []
 
     def now(self) -> int:
-        """Return the time that was set last, or 0 if none was set."""
+        """Return the time that was last set, or 0 if none was set."""
         return self._now
 
     def set(self, now: int) -> None:

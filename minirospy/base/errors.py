@@ -411,7 +411,7 @@ class BridgeProtocolError(BridgeError):
 
 
 class ValueTextError(MinirospyError):
-    """A value typed by a person cannot be used.
+    """A value typed by a user cannot be used.
 
     ``text`` is the value, or the name of its file or parameter; ``why`` is the reason.
     """

@@ -61,7 +61,7 @@ class TVal:
         return self.secs + self.nsecs / 1e9
 
     def to_nsec(self) -> int:
-        """Return the nanoseconds."""
+        """Return the time or duration in nanoseconds."""
         secs, nsecs = self.secs, self.nsecs
         if type(secs) is int and type(nsecs) is int:
             return secs * _BILLION + nsecs

@@ -43,7 +43,7 @@ def tree_svg(
 
     drawing = _Drawing(children, frozenset(round_))
     right = float(_GAP_X)
-    # Draw the roots first; nodes that remain after that are part of a cycle.
+    # Draw the roots first. Nodes that remain afterwards are part of a cycle.
     for name in [*(name for name in children if name not in below), *children]:
         if name not in drawing.places:
             right = drawing.place(name, right)

@@ -101,7 +101,7 @@ class Picture:
 
 
 def _map(person: Position, ascii_only: bool) -> list[Text]:
-    """Return a map of the floor in front of the scanner, seen from above: the scanner's two fields and the person."""
+    """Return a map of the floor in front of the scanner, seen from above. Shows the scanner's two fields and the person."""
     from rich.text import Text
 
     body = Circle(*person)

@@ -139,7 +139,7 @@ def _log_function(level: int, name: str) -> LogFunction:
 
 
 class _CallSites:
-    """Records when each call site last logged, and which message.
+    """Records the time and text of each call site's last message.
 
     A call site is one call expression, even if it calls several functions.
     """

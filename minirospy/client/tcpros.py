@@ -84,7 +84,7 @@ class TCPROSTransportProtocol:
         deserialize_messages(b, msg_queue, self.recv_data_class, queue_size=self.queue_size)
 
     def get_header_fields(self) -> dict[str, str]:
-        """Return the fields for the connection header."""
+        """Return the fields of the connection header to send."""
         return {}
 
 
@@ -103,7 +103,7 @@ class TCPROSServiceClient(TCPROSTransportProtocol):
         self.headers = headers or {}
 
     def get_header_fields(self) -> dict[str, str]:
-        """Return the fields for the connection header."""
+        """Return the fields of the connection header to send."""
         return {
             "service": self.resolved_name,
             "md5sum": self.service_class._md5sum,
@@ -139,7 +139,7 @@ class TCPService(TCPROSTransportProtocol):
         self.service_class = service_class
 
     def get_header_fields(self) -> dict[str, str]:
-        """Return the fields for the connection header."""
+        """Return the fields of the connection header to send."""
         return {
             "service": self.resolved_name,
             "type": self.service_class._type,
@@ -159,7 +159,7 @@ class Transport:
         self.id = next(_numbers)
         self.done = False  # set by close()
         self.cleanup_cb: Callable[[Any], object] | None = None
-        # The connection's other end: the peer's URI, and the addresses of the socket
+        # The peer: its URI, and the addresses at both ends of the socket
         self.endpoint_id = ""
         self.local_endpoint: Any = (0, 0)
         self.remote_endpoint: Any = (0, 0)
@@ -218,7 +218,7 @@ class ProtocolHandler:
         raise Exception("interface impl")
 
     def supports(self, protocol: str) -> bool:
-        """Return whether a protocol is supported."""
+        """Return whether ``protocol`` is supported."""
         return False
 
     def get_supported(self) -> list[Any]:

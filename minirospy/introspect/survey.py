@@ -90,7 +90,7 @@ def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, flo
 
 
 def describe(now: Survey, before: Survey | None = None) -> dict[str, object]:
-    """Return a survey as values for JSON: ``nodes``, ``traffic``, ``mismatches``.
+    """Convert a survey to values for JSON: ``nodes``, ``traffic``, ``mismatches``.
 
     A row in ``traffic`` is [sender, topic, receiver, Hz, bytes/s].
     """

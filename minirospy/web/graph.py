@@ -382,7 +382,7 @@ class SharedGraph:
         return Publication(self, topic, shared)
 
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
-        """Unadvertise a topic after the last client that published it has left."""
+        """Unadvertise a topic after the last client that publishes it has left."""
         shared.clients -= 1
         if not shared.clients and self.publishers.get(topic) is shared:
             del self.publishers[topic]

@@ -176,7 +176,7 @@ def _numbers(text: str, start: int, end: int) -> list[object]:
 
 
 def dump_json(value: object) -> str:
-    """Return a value as compact JSON. Raise ValueError for NaN and infinities."""
+    """Encode a value as compact JSON. Raise ValueError for NaN and infinities."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False)
 
 

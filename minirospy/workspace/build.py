@@ -141,7 +141,7 @@ def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list
 
 
 def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
-    """Sort the plans so that each follows its build dependencies. Raise BuildError if there is a cycle."""
+    """Sort the plans topologically: each follows its build dependencies. Raise BuildError if there is a cycle."""
     also = {name: {*plan.message_depends, *(need for need, _ in plan.needs)} for name, plan in plans.items()}
     try:
         names = build_order({name: plan.manifest for name, plan in plans.items()}, also)

@@ -22,7 +22,7 @@ _RUN_WITH = (Kind.BUILD_EXPORT, Kind.EXEC)
 def build_order(
     manifests: Mapping[str, Manifest], also: Mapping[str, Collection[str]] | None = None
 ) -> list[str]:
-    """Return the package names sorted so that each follows its build dependencies.
+    """Return the package names in topological order: each follows its build dependencies.
 
     Among the packages whose dependencies are done, the alphabetically first one is next. A package's build dependencies
     are those that it needs to build and test, their run dependencies, and the packages that ``also`` lists for its name.

@@ -124,7 +124,7 @@ class Manifest(NamedTuple):
 
     @property
     def build_type(self) -> str:
-        """Return the name of the package's build tool; catkin by default."""
+        """Return the name of the package's build tool (default: catkin)."""
         return next((export.text for export in self.exports if export.tag == "build_type"), "") or "catkin"
 
 

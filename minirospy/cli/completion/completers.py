@@ -75,7 +75,7 @@ def package_names(_: Cursor) -> Iterable[str]:
 
 
 def build_targets(cursor: Cursor) -> Iterable[str]:
-    """Return the targets of catkin_make."""
+    """Return catkin_make's targets."""
     names = _packages().names()
     tests = [f"run_tests_{name}" for name in names] if cursor.word.startswith("run_tests_") else []
     return ("install", "run_tests", "test", "clean", *tests, *names)
@@ -152,7 +152,7 @@ def files(cursor: Cursor) -> Iterable[str]:
 
 
 def bag_files(cursor: Cursor) -> Iterable[str]:
-    """Return local bags and folders."""
+    """Return local bag files and folders."""
     return [name for name in files(cursor) if name.endswith(("/", ".bag", ".bag.active", ".mcap"))]
 
 

@@ -53,12 +53,12 @@ def check_compression(name: str) -> None:
 
 
 def compress(name: str, data: Buffer) -> bytes:
-    """Return a chunk's data compressed with ``name``. Raise BagCompressionError if that is not possible."""
+    """Compress a chunk's data with ``name``. Raise BagCompressionError if that is not possible."""
     return _choose(_COMPRESS, name)(data)
 
 
 def decompress(name: str, data: bytes, size: int, is_cancelled: Callable[[], bool] = lambda: False) -> bytes:
-    """Return a chunk's data, which must have ``size`` bytes after decompression.
+    """Decompress a chunk's data, which must then have ``size`` bytes.
 
     Allocates at most ``size`` bytes and one piece. ``is_cancelled`` is polled between pieces, possibly in another
     thread than the caller's. Raise BagFormatError if the data is damaged, if its size is not ``size``, or after a
@@ -68,7 +68,7 @@ def decompress(name: str, data: bytes, size: int, is_cancelled: Callable[[], boo
 
 
 def decompress_mcap(name: str, data: bytes, size: int) -> bytes:
-    """Return the data of a chunk in an MCAP file; ``name`` is zstd, lz4, or "" for none.
+    """Decompress the data of a chunk in an MCAP file. ``name`` is zstd, lz4, or "" for none.
 
     Raise the same exceptions as :func:`decompress`.
     """

@@ -47,7 +47,7 @@ _MESSAGE_HEADER = struct.Struct("<I I3sB I5sI I5sII I")
 
 
 def message_prefix(connection: int) -> bytes:
-    """Return the 34 bytes before a message's time, which are the same for each message on a connection.
+    """Return the 34 bytes before a message's time. They are the same for all messages on a connection.
 
     The prefix is followed by seconds, nanoseconds and the body's size, 32 bits each, then the body.
     """

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAGIC", "McapRepair", "chunk_data", "mcap_faults"]
 
-MAGIC = b"\x89MCAP0\r\n"  # the first and the last bytes of a file
+MAGIC = b"\x89MCAP0\r\n"  # the first and last bytes of a file
 
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQ")  # the start of a message: its channel, sequence and time
@@ -57,7 +57,7 @@ def mcap_faults() -> Iterator[None]:
 
 
 def chunk_data(name: str, data: bytes, size: int) -> bytes:
-    """Return a chunk's data, decompressed.
+    """Decompress a chunk's data.
 
     Raise BagFormatError if the data is damaged, BagCompressionError if the compression is not supported.
     """

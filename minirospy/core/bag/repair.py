@@ -128,7 +128,7 @@ class Repair:
         self.problems: list[str] = []
         self._stream = stream
         self._edits: list[_Edit] = []
-        # chunk infos that are included in the bag header's count and have not been read yet
+        # chunk infos counted in the bag header that have not been read yet
         self._infos_left = 0
         self._total = 0  # total of the message counts in the chunk infos read so far
 
@@ -342,7 +342,7 @@ _BLOCK = 4 * 1024 * 1024
 
 
 def _read_index(stream: BinaryIO, position: int, limit: int) -> tuple[int, list[_Entry]]:
-    """Return the position after the index records at ``position``, and the sorted entries in them."""
+    """Return the end position of the index records at ``position``, and their sorted entries."""
     found: list[_Entry] = []
     try:
         while position < limit:
@@ -363,7 +363,7 @@ def _times(entries: list[_Entry]) -> list[int]:
 
 
 def _whole_records(data: bytes) -> int:
-    """Return the total length of the complete message and connection records at the start of the data."""
+    """Return the total length of the complete message and connection records at the start of ``data``."""
     at = 0
     try:
         for record in records.parse_records(data):

@@ -113,7 +113,7 @@ class ParameterTree:
         return self._bytes > _MANY_BYTES
 
     def is_small_at(self, key: str, most: int = SMALL_ITEMS) -> bool:
-        """Return whether the value of a parameter or namespace is small, or not set; see :func:`is_small`."""
+        """Return whether a parameter's or namespace's value is small, or not set; see :func:`is_small`."""
         return is_small(self._find(_split(key)), most)
 
     def has_room(self, weight: int) -> bool:

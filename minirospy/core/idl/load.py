@@ -239,7 +239,7 @@ def _is_generated(file: Path) -> bool:
 
 
 def _on_demand(sources: dict[str, str]) -> dict[str, str]:
-    """Return the files for a package whose modules are compiled when they are imported."""
+    """Return the files of a package whose modules are compiled when they are imported."""
     modules = [text for name, text in sources.items() if _is_module(name)]
     fingerprint = zlib.crc32("".join(modules).encode())
     kept = {name: text for name, text in sources.items() if not _is_module(name)}

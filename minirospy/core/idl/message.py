@@ -177,7 +177,7 @@ def check_type(field_name: str, field_type: str, field_val: object) -> None:
 
 
 def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Mapping[str, object]) -> _M:
-    """Return the message passed to publish() or a service call, or create it from the passed field values.
+    """Return the message passed to publish() or a service call, or create one from the field values passed.
 
     Raise TypeError or AttributeError if the values do not match the fields.
     """

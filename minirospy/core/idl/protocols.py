@@ -150,7 +150,7 @@ class Action(Message, Protocol):
 
     @property
     def action_goal(self) -> ActionGoal:
-        """A goal message."""
+        """Return an empty goal message."""
 
     @property
     def action_result(self) -> ActionResult:

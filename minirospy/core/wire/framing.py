@@ -52,7 +52,7 @@ def serialize_frame(body: bytes) -> bytes:
 
 
 def parse_length(data: bytes) -> int:
-    """Return the length in the first :data:`LENGTH_BYTES` of ``data``."""
+    """Parse the length in the first :data:`LENGTH_BYTES` of ``data``."""
     return int.from_bytes(data[:LENGTH_BYTES], "little")
 
 

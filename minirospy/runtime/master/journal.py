@@ -416,7 +416,7 @@ def _write_all(file: int, data: bytes) -> None:
 
 
 def _locked(path: Path, journal: Path) -> int:
-    """Return the descriptor of a lock file, which contains the process id; the system releases the lock when this process exits.
+    """Lock a file that contains the process id; return its descriptor. The system releases the lock when this process exits.
 
     Raise JournalBusyError if another master has locked it, OSError if it cannot be locked.
     """

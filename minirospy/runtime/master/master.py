@@ -141,7 +141,7 @@ class Master(MasterApi):
 
     @property
     def omits_topics(self) -> bool:
-        """Return whether rosout.log omits the topic lists, as the parameter /rosout/omit_topics specifies."""
+        """Return whether the parameter /rosout/omit_topics makes rosout.log omit the topic lists."""
         key = "/rosout/omit_topics"
         return self.parameters.has(key) and self.parameters.get(key) is True
 

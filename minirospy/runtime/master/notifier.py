@@ -122,7 +122,7 @@ class Notifier:
     def defer(self, uri: str, topic: str) -> None:
         """Delay notifications to a node whose pending response contains the current state of a topic, or of PARAMETERS.
 
-        Otherwise a rospy node might receive the update first and then the response, and apply the response, which is older.
+        Otherwise a rospy node might receive the update before the response, and apply the older response last.
         """
         now = asyncio.get_running_loop().time()
         while self._held and next(iter(self._held.values())) <= now:

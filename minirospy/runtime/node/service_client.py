@@ -150,7 +150,7 @@ class ServiceClient:
 
 
 def parse_service_uri(uri: str) -> tuple[str, int]:
-    """Return (host, port) of ``rosrpc://host:port``. Raise WireError if the URI is invalid."""
+    """Parse ``rosrpc://host:port`` into (host, port). Raise WireError if the URI is invalid."""
     try:
         host, port, _ = split_uri(uri, "rosrpc")
     except ValueError:

@@ -170,7 +170,7 @@ class _Connection:
             self._loop.add_reader(self._fd, self._readable)
 
     def write_on(self, function: Callable[[], None]) -> None:
-        """Call ``function`` when the socket is writable."""
+        """Call ``function`` whenever the socket is writable."""
         self._loop.add_writer(self._fd, function)
 
     def stop_writing(self) -> None:
@@ -483,7 +483,7 @@ def _settle(answer: asyncio.Future[Body], found: Body | RpcError) -> None:
 
 
 def _parts(uri: str) -> tuple[str, int, str]:
-    """Return host, port and path. Raise RpcUnreachable if the URI is invalid."""
+    """Split a URI into host, port and path. Raise RpcUnreachable if it is invalid."""
     usual = _USUAL_URI.fullmatch(uri)
     return (usual[1], int(usual[2]), usual[3] or "/") if usual else parse_http_uri(uri)
 

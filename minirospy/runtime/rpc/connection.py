@@ -60,7 +60,7 @@ The first value is small, because all pipelined requests in one receive are pars
 
 _END_OF_HEAD = b"\r\n\r\n"
 
-# Number of requests processed immediately if several arrive together; the remaining ones are processed in steps
+# Number of requests processed immediately if several arrive together; the rest are processed in steps
 _ANSWERS_AT_ONCE = 1
 
 
@@ -419,7 +419,7 @@ class Connection:
         self._server.log_refusal(self._sock, why)
 
     def _drop_request(self) -> None:
-        """Discard the current request."""
+        """Discard the current request and its data."""
         self._message = None
         self._reader.close()
         self._work_bytes = 0

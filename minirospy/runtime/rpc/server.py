@@ -96,7 +96,7 @@ class RpcServer:
         self.dispatch = dispatch
         self.port = port
         self.refused = 0  # number of connections refused by ``access``
-        self.held = 0  # total bytes of requests that are incomplete or being read
+        self.held = 0  # total bytes of requests that are incomplete or are being read
         self.holders: dict[Connection, int] = {}  # dict from connection to its share of ``held``, in bytes
         self.unread = 0  # total bytes of responses that clients have not read yet
         self.slow: OrderedDict[Connection, None] = OrderedDict()
@@ -121,7 +121,7 @@ class RpcServer:
         self._reads = 0
         self._reads_end = 0.0
         self._reads_over = False
-        # Connections to read from in the next iteration: new ones, and those that have made a request before.
+        # Connections to read in the next iteration: new ones, and those that have made a request before.
         self._late_new: OrderedDict[Connection, None] = OrderedDict()
         self._late: OrderedDict[Connection, None] = OrderedDict()
 

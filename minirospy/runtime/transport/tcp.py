@@ -45,7 +45,7 @@ _log = logging.getLogger(__name__)
 
 
 def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
-    """Return a socket bound to an address on this machine; port 0 means any free port, from ``ports`` if given.
+    """Bind a socket to an address on this machine and return it. Port 0 means any free port, from ``ports`` if given.
 
     Raise OSError if it cannot be bound.
     """
@@ -119,7 +119,7 @@ async def receive_header(
 
 
 async def send_header(sock: socket.socket, fields: Header) -> None:
-    """Send a connection header."""
+    """Send a connection header with these fields."""
     data = serialize_header(fields)
     try:
         # This does not block, because the header is short, and a new socket's buffer is empty.
@@ -152,7 +152,7 @@ class Listener:
         self.port = 0
 
     def open(self, host: str, port: int = 0, ports: range | None = None) -> None:
-        """Listen on ``host``; port 0 means any free port, from ``ports`` if given. Raise OSError if that fails."""
+        """Listen on ``host``. Port 0 means any free port, from ``ports`` if given. Raise OSError if that fails."""
         sock = bind(host, port, ports)
         self.listen(sock)
         self.port = sock.getsockname()[1]

@@ -254,7 +254,7 @@ class BagSession(JsonSession):
         for line in bag.output.switch(bag.timeline, topics, clock=bool(fields.get("clock"))):
             self.send_error(line)
         bag.player.control(has_clock=bag.output.has_clock)
-        # Publish earlier messages from latched topics, because new subscribers would not receive them otherwise.
+        # Publish earlier messages on latched topics, because new subscribers would not receive them otherwise.
         time = bag.state.time
         for topic, body in await self.in_thread(lambda: bag.latched_before(new, time)):
             bag.output.send(topic, body)

@@ -49,7 +49,7 @@ class GraphOutput:
 
     @property
     def published(self) -> list[str]:
-        """Return the enabled topics."""
+        """Return the topics that are enabled."""
         return sorted(self._publications)
 
     @property

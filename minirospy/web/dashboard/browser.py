@@ -47,7 +47,7 @@ class LinkFile:
 
     def __init__(self, link: str) -> None:
         """Create the file. Raise OSError if that fails."""
-        # mkdtemp makes the folder accessible only to this user; on Windows it does so by an access control list.
+        # mkdtemp makes the folder accessible only to this user; on Windows, it uses an access control list.
         self._folder = Path(tempfile.mkdtemp(prefix="minirospy-browser-", dir=_parent()))
         self.path = self._folder / "dashboard.html"
         try:

@@ -291,7 +291,7 @@ class _Driven:
             if self._deadline > time.monotonic():
                 return  # a command has just arrived, or the topic was released
             self._deadline = math.inf
-            # If the node has been shut down, the topic is closed, and no message can be published on it any more.
+            # If the node has been shut down, the topic is closed, and no further messages can be published on it.
             with contextlib.suppress(ROSException):
                 self._publish(self._last.zero())
         with contextlib.suppress(RuntimeError):  # the loop has been closed

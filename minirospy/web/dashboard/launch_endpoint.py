@@ -110,7 +110,7 @@ class _Tail:
         self._count = 0
 
     def read(self) -> str:
-        """Return the new lines. Blocks."""
+        """Return the log's new lines. Blocks."""
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)

@@ -180,7 +180,7 @@ class FoxgloveSession:
         self._dropped = dropped
 
     def parameters_changed(self, changed: list[Parameter]) -> None:
-        """Report changes of parameters."""
+        """Send changed parameters to the client."""
         self.send(serializing.parameter_values(changed))
 
     # --- internals

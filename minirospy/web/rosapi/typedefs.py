@@ -36,7 +36,7 @@ class TypeDefinition:
 
 
 def describe(class_: type[Message], find: Callable[[str], type[Message]]) -> list[TypeDefinition]:
-    """Return the definitions of a type and of all types that it uses, each once. ``find`` maps a name to a class."""
+    """Describe a type and all types that it uses, each once. ``find`` maps a name to a class."""
     return list(_walk(_described(class_), find, {_name_of(class_)}))
 
 

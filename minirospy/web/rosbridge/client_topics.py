@@ -29,7 +29,7 @@ class ClientTopics:
         self._clients: Publisher[Message] | None = None
 
     async def start(self) -> None:
-        """Publish the connected clients.
+        """Start publishing the connected clients.
 
         Raise MasterUnreachableError if the master does not respond, RpcError if the call fails.
         """
@@ -51,7 +51,7 @@ class ClientTopics:
                 await publisher.close()
 
     def changed(self, sessions: Sequence[RosbridgeSession]) -> None:
-        """Publish the connected clients."""
+        """Publish the list of connected clients."""
         self._sessions = sessions
         self._publish()
 

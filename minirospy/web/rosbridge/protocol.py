@@ -205,7 +205,7 @@ def is_quick(data: str | bytes) -> bool:
 
 
 def decode(data: str | bytes) -> Fields:
-    """Return the object in a message: JSON as a string, or CBOR as bytes. Raise OperationError if the data is invalid."""
+    """Decode the object in a message: JSON in a string, or CBOR in bytes. Raise OperationError if the data is invalid."""
     return _decode(data, load_json)
 
 

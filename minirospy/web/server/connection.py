@@ -140,7 +140,7 @@ class Connection:
         self._phase = _Phase.OPEN
         self._is_held_back = False  # True if the client has used up its frame quota for the current second
         self._is_paused = False  # True while the session works on an earlier message, see hold()
-        self._worked_on = 0  # bytes of that message
+        self._worked_on = 0  # bytes of the message that the session works on
         self._are_jobs_held = False  # True while a job continues in a thread, see hold_jobs()
         self._held = 0  # bytes that the session uses for the client, see session_holds()
         self._is_in_turn = False  # True while _work() runs
@@ -149,7 +149,7 @@ class Connection:
 
     @property
     def queue(self) -> SendQueue:
-        """Return the output queue."""
+        """Return the queue of output for the client."""
         return self._output.queue
 
     @property
