@@ -146,8 +146,7 @@ def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
 
 
 def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[str] = ("",)) -> str:
-    """Generate the ``__init__`` for a package's msg or srv folder. Module ``_Name`` defines ``Name`` with each suffix in
-    ``parts``.
+    """Emit the ``__init__`` of a package's msg or srv folder. Module ``_Name`` defines ``Name`` with each suffix in ``parts``.
 
     Each module is loaded when one of its names is first used. Raise DefinitionError if a name is not legal in Python.
     """

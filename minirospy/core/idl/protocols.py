@@ -150,15 +150,15 @@ class Action(Message, Protocol):
 
     @property
     def action_goal(self) -> ActionGoal:
-        """Return an empty goal message."""
+        """The action's goal message."""
 
     @property
     def action_result(self) -> ActionResult:
-        """A result message."""
+        """The action's result message."""
 
     @property
     def action_feedback(self) -> ActionFeedback:
-        """A feedback message."""
+        """The action's feedback message."""
 
 
 def is_message(value: object) -> TypeGuard[Message]:
