@@ -201,7 +201,7 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
         address = socket.gethostbyname(host)
         if address.startswith("127."):
             return True
-        # Only this machine's addresses can be bound (but Wine binds any address for datagrams, so use TCP).
+        # Only this machine's addresses can be bound. (Wine binds any address for datagrams, so use TCP.)
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.bind((address, 0))
     except OSError:

@@ -56,7 +56,7 @@ class SafeTerminal(io.TextIOWrapper):
 
     @classmethod
     def around(cls, stream: io.TextIOWrapper) -> SafeTerminal:
-        """Return a stream that writes to the terminal of ``stream``."""
+        """Return a stream that writes to the same terminal as ``stream``."""
         stream.flush()
         return cls(stream.buffer, stream.encoding, "backslashreplace", line_buffering=True)
 

@@ -83,7 +83,7 @@ def _requirement(name: str, extras: dict[str, None]) -> str:
 
 
 def _python() -> str:
-    """Return "python" or "python3" if that is the running interpreter, else the interpreter's path."""
+    """Return "python" or "python3" if that runs this interpreter, else the interpreter's path."""
     import shutil
 
     for name in ("python", "python3"):

@@ -107,7 +107,7 @@ class _Server:
             await self._abandoned.wait()
         finally:
             server.close()
-            # A client may have the address file open, so that it cannot be removed; the next server replaces it.
+            # A client may have the address file open, which prevents its removal. The next server replaces it.
             with contextlib.suppress(OSError):
                 private_files.remove_file(address)
             for client in list(self._clients):
@@ -144,7 +144,7 @@ class _Server:
         return Done(request.number)
 
     def _apply(self, operation: Operation | MovePerson) -> list[Message]:
-        """Apply an operation and return the messages for all clients. Raise OperationError if the operation is invalid."""
+        """Apply an operation and return the messages to send to all clients. Raise OperationError if the operation is invalid."""
         if isinstance(operation, MovePerson):
             return [PersonMoved(operation.position)] if self._model.move_person(operation.position) else []
         now = time.time()

@@ -41,7 +41,7 @@ class Connection(NamedTuple):
     done: bool = False
 
     def get_transport_info(self) -> str:
-        """Return the link's description, as getBusInfo in the Slave API returns it."""
+        """Return the link's description in the format of getBusInfo in the Slave API."""
         return connection_text(self.link)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Report what an interrupted process is still waiting for, and suppress the tracebacks of the interrupt."""
+"""Report what an interrupted process is still waiting for, and suppress the interrupt's tracebacks."""
 
 from __future__ import annotations
 

@@ -209,7 +209,7 @@ class Lifecycle:
                     self._run(hooks.pop(0))
             with self._lock:
                 if not self.hooks and not self.late_hooks:
-                    # From now on a newly added hook is called immediately.
+                    # From now on, newly added hooks are called immediately.
                     self.shutting_down.set()
 
     def _run(self, hook: Callable[[], object]) -> None:

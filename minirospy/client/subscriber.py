@@ -98,7 +98,7 @@ class Subscriber(Topic[_M_co]):
             state.replay(data_class, _Callback(callback, callback_args), links)
 
     def unregister(self) -> None:
-        """Stop receiving; the topic's last Subscriber in this process also closes the connections."""
+        """Stop receiving. The topic's last Subscriber in this process also closes the connections."""
         super().unregister()
         self.callback = self.callback_args = None
 

@@ -89,7 +89,7 @@ class TCPROSTransportProtocol:
 
 
 class TCPROSServiceClient(TCPROSTransportProtocol):
-    """A client's side of a connection to a service."""
+    """The client's side of a connection to a service."""
 
     def __init__(
         self,
@@ -132,7 +132,7 @@ class TCPROSServiceClient(TCPROSTransportProtocol):
 
 
 class TCPService(TCPROSTransportProtocol):
-    """A server's side of a connection to a service."""
+    """The server's side of a connection to a service."""
 
     def __init__(self, resolved_name: str, service_class: Any, buff_size: int = DEFAULT_BUFF_SIZE) -> None:
         super().__init__(resolved_name, service_class._request_class, buff_size=buff_size)
@@ -208,7 +208,7 @@ class DeadTransport(Transport):
 
 
 class ProtocolHandler:
-    """The base class of a transport's handler."""
+    """The base class of handlers for a transport."""
 
     def shutdown(self) -> None:
         """Stop; a subclass overrides this."""

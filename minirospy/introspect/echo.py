@@ -173,8 +173,7 @@ def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
         name: elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
     }
-    # A placeholder is a string regardless of the field's type, and how a field is printed depends on its declared
-    # type.
+    # A placeholder is a string, whatever the field's type, but a field is printed according to its declared type.
     types = tuple(
         "string" if isinstance(fields[name], str) else slot_type
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)

@@ -22,7 +22,7 @@ __all__ = ["logger_level", "logger_levels", "set_logger_level"]
 
 
 def logger_levels(graph: Graph, node: str) -> dict[str, str]:
-    """Return a dict from logger to level (lower case) for a node; ``node`` is a global name.
+    """Return a dict from logger to level (lower case) for the node with the global name ``node``.
 
     Raise NotFoundError if the node does not exist, NodeUnreachableError if it does not respond, or MinirospyError if it
     has no logger services.

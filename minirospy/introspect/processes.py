@@ -1,4 +1,4 @@
-"""CPU and memory use of local processes, which rqt_top shows for nodes."""
+"""Measures the CPU and memory use of local processes, which rqt_top shows for nodes."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ class TypeTexts:
         return {topic: found for topic, found in done.items() if found}
 
     async def installed(self, name: str) -> InterfaceType | None:
-        """Return the type, or None if it is not installed."""
+        """Return the message type ``name``, or None if it is not installed."""
         if name in self._installed:
             return self._installed[name]
 

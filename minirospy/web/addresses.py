@@ -31,7 +31,7 @@ def links(addresses: list[str], port: int, *, encrypted: bool) -> Links:
 
 
 def own_addresses() -> list[str]:
-    """Return this machine's IPv4 addresses that other machines may reach, starting with the default route's address."""
+    """Return this machine's IPv4 addresses that other machines can reach, the default route's address first."""
     import psutil
 
     found: dict[str, None] = {}

@@ -143,7 +143,7 @@ def _is_closed(text: str, bracket: re.Match[str], unclosed: set[str]) -> bool:
 
 
 def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
-    """Yield each token and its line number."""
+    """Yield each token with its line number."""
     position, line = 0, 1
     unclosed: set[str] = set()
     while position < len(text):

@@ -1,6 +1,6 @@
 """Serialize bag records from named tuples to bytes.
 
-Fields are written in the same order as rosbag's Python writer does. Source: http://wiki.ros.org/Bags/Format/2.0.
+Fields are in the same order as in rosbag's Python writer. Source: http://wiki.ros.org/Bags/Format/2.0.
 """
 
 from __future__ import annotations

@@ -211,7 +211,10 @@ class _Selection(NamedTuple):
 
 
 class _Run:
-    """The messages in a chunk, in time order: time, index in the chunk, channel, start and end of the body."""
+    """The messages in one chunk, in time order.
+
+    Each has a time, an index in the chunk, a channel, and the start and end of its body.
+    """
 
     def __init__(self, position: int, start: int) -> None:
         self.position = position

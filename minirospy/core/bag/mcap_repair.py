@@ -68,7 +68,7 @@ def chunk_data(name: str, data: bytes, size: int) -> bytes:
 
 
 class _Recovered(NamedTuple):
-    """A chunk, the messages on each of its channels, and its end including its message indexes."""
+    """A recovered chunk: the messages on each of its channels, and the end of the chunk including its message indexes."""
 
     info: ChunkIndex
     counts: Counter[int]

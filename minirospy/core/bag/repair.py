@@ -281,7 +281,7 @@ class Repair:
         return following
 
     def _go_on(self, position: int, error: BagFormatError, limit: int) -> int:
-        """Return the position of the next chunk after the damage, or ``limit`` if there is none."""
+        """Return the position of the next chunk after damaged data, or ``limit`` if there is none."""
         following = next_chunk(self._stream, position + 1, limit)
         end = limit if following is None else following
         is_saved = self._read_partial(position, end, limit)

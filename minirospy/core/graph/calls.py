@@ -81,7 +81,7 @@ class Dispatcher:
         *,
         refusals: tuple[type[Exception], ...] = (),
     ) -> None:
-        """Treat the exceptions in ``refusals`` like CallRefused if a method raises them."""
+        """Create the dispatcher. Exceptions in ``refusals`` raised by a method are treated like CallRefused."""
         self.methods = methods
         self._refusals: tuple[type[Exception], ...] = (CallRefused, *refusals)
 

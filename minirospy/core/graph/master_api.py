@@ -121,7 +121,7 @@ class MasterApi(ABC):
         """Send the notification that a change in the tables requires."""
 
     def notify_in_steps(self, actions: Iterable[Notice]) -> Steps[None]:
-        """Send the notifications, possibly many, that a change in the tables requires."""
+        """Send the notifications that a change in the tables requires. There may be many."""
         for number, action in enumerate(actions):
             self.notify(action)
             if number % _FEW == _FEW - 1:

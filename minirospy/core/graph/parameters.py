@@ -25,7 +25,7 @@ _MAX_DEPTH = 56
 _MAX_INT = 2**31
 
 _STEP_ITEMS = 1000
-# Approximate bytes for a number, an empty list, and a dictionary or an entry in it
+# Approximate bytes for a number, an empty list, and a dictionary or one of its entries
 _ITEM_BYTES, _LIST_BYTES, _ENTRY_BYTES = 40, 70, 120
 
 MAX_BYTES = 96 * 1024 * 1024  # maximum total bytes of all parameters in memory

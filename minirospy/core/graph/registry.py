@@ -417,6 +417,6 @@ def _remove(table: dict[str, dict[str, str]], topic: str, node: str) -> None:
 
 
 def _pairs(table: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
-    # This is the fastest way to copy many small tables, which every rewrite of a journal does first.
+    # The fastest way to copy many small tables; every rewrite of a journal starts with this copy.
     rows = list(zip(table, map(tuple, table.values()), strict=True))
     return ((node, topic) for topic, nodes in rows for node in nodes)

@@ -66,7 +66,7 @@ class Text(NamedTuple):
 
 
 class Sequence(NamedTuple):
-    """Elements that each have the layout ``items``; ``length`` is None if their number varies."""
+    """Elements that each have the layout ``items``. ``length`` is None if their number varies."""
 
     items: tuple[Item, ...]
     length: int | None = None
@@ -473,7 +473,7 @@ class _Generator:
         return count
 
     def _flush(self) -> None:
-        """Generate the lines for the pending tokens."""
+        """Generate the lines of code for the pending tokens."""
         tokens, self._tokens = _joined(self._tokens), []
         if not tokens:
             return

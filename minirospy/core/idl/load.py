@@ -50,7 +50,7 @@ _SEPARATOR = "=" * 80
 
 
 class Catalogue:
-    """The definitions in some packages, from a dict of package name to folder. Each spec is parsed once.
+    """The definitions in some packages, given as a dict from package name to folder. Each spec is parsed once.
 
     A package's definitions are the files in its folders msg, srv and action, or, if ``definitions`` contains the package,
     only the files listed there.
@@ -95,7 +95,7 @@ class Catalogue:
         return self._specs[full_name]
 
     def messages(self, package: str) -> list[MessageSpec]:
-        """Return all messages in a package by name, including those of its actions."""
+        """Return all messages in a package, sorted by name, including those of its actions."""
         names = {*self.files(package, "msg")}
         for action in self.actions(package):
             names |= {message.name for message in action.messages}
@@ -215,7 +215,7 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
     if on_demand:
         sources = _on_demand(sources)
         for kind in ("msg", "srv"):
-            # Remove modules that remain from an earlier build, which compiled them in advance.
+            # Remove modules that remain from an earlier build, which precompiled them.
             for stale in (root / package / kind).glob("_[!_]*.py"):
                 stale.unlink()
     folder = root / package
@@ -338,7 +338,7 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
 
 
 def checked_text(full_name: str, text: str) -> tuple[dict[str, MessageSpec], str]:
-    """Return the specs in a full text that the message uses, dependencies first, and the message's md5sum.
+    """Return the specs used by the message in a full text, dependencies first, and the message's md5sum.
 
     Does not create a class. Raise DefinitionError if the text is invalid.
     """
@@ -356,7 +356,7 @@ def checked_text(full_name: str, text: str) -> tuple[dict[str, MessageSpec], str
 
 
 def class_from_text(full_name: str, text: str) -> type[Message]:
-    """Return a message class created from a full text, as a publisher sends it, for a type that is not installed.
+    """Create a message class for a type that is not installed, from the full text that a publisher sends.
 
     Raise DefinitionError if the text is invalid.
     """

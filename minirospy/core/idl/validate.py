@@ -39,7 +39,7 @@ _SHOWN = 80
 
 
 def is_type_name(name: str) -> bool:
-    """Return whether a string is ``pkg/Name`` in ROS's grammar, and neither part is a Python keyword."""
+    """Return whether a string is ``pkg/Name`` in ROS's grammar, without a Python keyword in either part."""
     package, slash, short = name.partition("/")
     return bool(slash) and all(
         _NAME.fullmatch(part) and not keyword.iskeyword(part) for part in (package, short)

@@ -38,7 +38,7 @@ class Options(NamedTuple):
     quality: int = _QUALITY  # JPEG quality, from 1 to 100
     progressive: bool = False
     optimize: bool = False
-    # PNG compression, from 0 to 9 (the smallest file); None for the library's default
+    # PNG compression level, from 0 to 9 (the smallest file); None for the library's default
     level: int | None = None
 
 

@@ -45,7 +45,7 @@ class _Walk(NamedTuple):
 
 
 class TransformBuffer(FrameTree):
-    """The frame tree over the last ``cache_time`` nanoseconds, and lookups in it."""
+    """The frame tree over the last ``cache_time`` nanoseconds, with lookups in it."""
 
     # --- lookups
 

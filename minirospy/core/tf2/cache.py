@@ -179,7 +179,7 @@ class StaticCache:
         return self._sample
 
     def latest(self) -> tuple[int, Frame]:
-        """Return stamp 0 and the parent."""
+        """Return stamp 0 and the parent frame."""
         return 0, self._sample[0]
 
     def why_not(self, time: int) -> str:

@@ -57,7 +57,7 @@ def parse_length(data: bytes) -> int:
 
 
 class LargeFrame(NamedTuple):
-    """A message to send whose pieces are too large to be joined: the pieces, in order, and their total size."""
+    """A message to send in pieces that are too large to be joined: the pieces, in order, and their total size."""
 
     pieces: tuple[bytes, ...]
     size: int
@@ -144,7 +144,7 @@ Frame = memoryview | bytes  # a message's bytes as delivered
 
 
 def may_split(head: bytes, tail: int) -> bool:
-    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes, so that it may be split there."""
+    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes. If so, the message may be split there."""
     return tail >= CHUNK and len(head) >= 4 and int.from_bytes(head[-4:], "little") == tail
 
 
@@ -178,7 +178,7 @@ class FrameReader:
         self._start = 0
         self._end = 0
         self._large: bytearray | None = None
-        # The number of bytes received from the large frame, and its total size.
+        # The number of bytes received of the large frame, and the frame's total size.
         self._filled: int
         self._wanted = 0
         # The number of bytes in a skipped frame that have not been received yet.

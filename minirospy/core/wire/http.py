@@ -197,7 +197,7 @@ class HttpReader:
         return _CONTINUE
 
     def _parse(self, head: HttpHead | None) -> Generator[HttpMessage | None, None, None]:
-        """Yield the messages in the buffer, and None when more bytes are needed; ``head``, if given, has already been removed."""
+        """Yield the messages in the buffer, and None when more bytes are needed. ``head``, if given, has already been removed."""
         while True:
             if head is None:
                 head = _parse_head((yield from self._until(_end_of_head)))
@@ -218,7 +218,7 @@ class HttpReader:
         length = head.headers.get("content-length")
         if length is None:
             if head.start.startswith("HTTP/"):
-                # A response without a length extends to the end of the connection.
+                # A response without a length extends until the connection ends.
                 while not self._ended:
                     self._check(len(self._buffer))
                     yield None

@@ -28,7 +28,7 @@ __all__ = [
 
 _NOT_A_NAME = "field [callerid] contains illegal chars"
 
-ANY = "*"  # type and md5sum that a peer sends if it accepts any type
+ANY = "*"  # type and md5sum sent by a peer that accepts any type
 
 
 class InterfaceType(NamedTuple):

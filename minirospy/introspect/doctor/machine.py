@@ -97,7 +97,7 @@ def _host_findings(
     own = known[host]
     by_ip, is_address = bool(ip and not hostname), _is_address(host)
     if by_ip and own and not is_address:
-        # Strings such as `192.168.1` resolve too, here to 192.168.0.1.
+        # Strings such as `192.168.1` also resolve, here to 192.168.0.1.
         is_name = not ip.replace(".", "").isdigit()
         yield warning(
             "variables",

@@ -297,7 +297,7 @@ class Journal:
                 self._new_path.unlink()
 
     def retry(self) -> None:
-        """Write the current state if writing failed at least half a minute ago. Never raises."""
+        """Write the current state if the last failed attempt was at least half a minute ago. Never raises."""
         if self.trouble and self._clock() - self._failed_at >= RETRY_SECONDS:
             self.start()
             if not self.trouble:

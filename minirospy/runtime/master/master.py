@@ -209,7 +209,7 @@ class Master(MasterApi):
         if self.registry.is_large:
             yield ALONE
         if self._state[0] == self.registry.changes:
-            # Another client's request serialized the state while this request was queued.
+            # Another client's request has serialized the state while this request was queued.
             return self._state[1]
 
         changes = self.registry.changes

@@ -68,7 +68,7 @@ class Node:
         self.services: dict[str, ServiceServer] = {}
         # topics unsubscribed from recently, each with its timer
         self._left: dict[str, asyncio.TimerHandle] = {}
-        # Topics whose publishers will be requested from the master again
+        # Topics whose publishers will be requested again from the master
         self._requesting: dict[str, asyncio.TimerHandle] = {}
 
         self.uri = ""
@@ -339,7 +339,7 @@ class Node:
             sock.close()
 
     def _open_unix_listener(self) -> None:
-        """Serve topics and services through a Unix socket too, if the system supports it."""
+        """Also serve topics and services through a Unix socket, if the system supports it."""
         sock = local.bind(self.environment.uri_host, self.tcpros_port)
         if sock:
             self.this_host = local.this_host()

@@ -118,7 +118,7 @@ class Publication:
 
     @property
     def is_sending(self) -> bool:
-        """Return whether a thread is publishing, and therefore holds a lock."""
+        """Return whether a thread is publishing, and therefore holds a link's lock."""
         return self._latch_lock.locked() or any(link.is_sending for link in self.links)
 
     def publish(self, frame: bytes | LargeFrame) -> None:
@@ -248,11 +248,11 @@ class Unreachable:
         # A list may contain a thousand publishers that refuse: logging all of them would block the loop for 0.2 s.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._waiting: dict[str, tuple[list[str], Exception, str]] = {}
-        """Dict from a publisher's URI to its topics, and the error and advice for the first of them."""
+        """Dict from a publisher's URI to its topics, and to the error and the advice for the first topic."""
         self._timer: asyncio.TimerHandle | None = None
 
     def add(self, uri: str, topic: str, error: Exception, advice: str) -> None:
-        """Log an unreachable publisher a moment later, in one line with its other unreachable topics."""
+        """Log an unreachable publisher after a moment, in one line with its other unreachable topics."""
         self._waiting.setdefault(uri, ([], error, advice))[0].append(topic)
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(TOGETHER_SECONDS, self._report)
@@ -591,7 +591,7 @@ class Subscription:
             return
         fault = link.fault or EOFError("the publisher closed the connection")
         if isinstance(fault, WireError):
-            # Log one line and disconnect: everything after the error in such a stream is invalid too.
+            # Log one line and disconnect, because everything after the error in such a stream is also invalid.
             _log.warning("connection to %s for %s ended: %s", link.uri, self.topic, fault)
         elif link.received or time.monotonic() - link.since > _WORKED_SECONDS:
             self.plan.worked(link.uri)

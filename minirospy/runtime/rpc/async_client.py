@@ -99,7 +99,7 @@ class AsyncRpcClient:
         self.under_way.close()
 
     def acquire(self, address: _Address) -> _Connection | None:
-        """Take an idle connection to the server at ``address`` out of the pool, or return None if there is none."""
+        """Take an idle connection to the server at ``address``, or return None if there is none."""
         kept = self.idle.get(address)
         if not kept:
             return None
@@ -109,7 +109,7 @@ class AsyncRpcClient:
         return connection
 
     def keep(self, connection: _Connection) -> None:
-        """Return a connection to the pool of idle ones, so that the next call can use it."""
+        """Keep a connection as idle, so that the next call can use it."""
         if self.closed:
             connection.close()
             return
@@ -127,7 +127,7 @@ class AsyncRpcClient:
             self._sweep = loop.call_later(KEEP_SECONDS, self._close_idle)
 
     def drop(self, connection: _Connection) -> None:
-        """Remove an idle connection that has closed from the pool."""
+        """Remove a connection that has closed from the idle ones."""
         connection.close()
         kept = self.idle[connection.address]
         kept.remove(connection)
@@ -178,7 +178,7 @@ class _Connection:
         self._loop.remove_writer(self._fd)
 
     def close(self) -> None:
-        """Close the connection."""
+        """Close the connection's socket."""
         if self._is_watched:
             self._loop.remove_reader(self._fd)
         self.sock.close()

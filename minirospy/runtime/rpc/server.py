@@ -145,7 +145,7 @@ class RpcServer:
             return
         sock = tcp.bind(self._bind_host, self.port, self._ports)
         try:
-            # Accepted sockets inherit this option.
+            # Accepted sockets inherit this option from the listening one.
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             # Listen here, because two sockets may be bound to one port as long as neither listens.
             sock.listen(_BACKLOG)
@@ -202,7 +202,7 @@ class RpcServer:
         self._late.pop(connection, None)
 
     def _may_read(self) -> bool:
-        """Return whether one more connection may be read in this loop iteration.
+        """Return whether another connection may be read in this loop iteration.
 
         Occasionally, accept new connections first.
         """

@@ -188,7 +188,10 @@ class Listener:
             asyncio.get_running_loop().add_reader(self._sock, self._take_one, self._sock)
 
     def _take_one(self, sock: socket.socket) -> None:
-        """Accept one connection. The loop calls this again for the next one, so that the accepted one is served in between."""
+        """Accept one connection.
+
+        The loop calls this again for the next one, so that the accepted connection is served in between.
+        """
         try:
             peer, address = sock.accept()
         except (BlockingIOError, InterruptedError):

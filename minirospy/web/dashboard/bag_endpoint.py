@@ -68,7 +68,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
         is_starting = self._starting and not self._starting.done()
         if is_starting or (self.recording and not self.recording.state().is_ended):
             raise UsageError("there is a recording already: stop it first")
-        # The page may be closed while the recording starts, and the child process must then be stopped and not lost.
+        # The page may be closed while the recording starts. The child process must then be stopped, not lost.
         self._starting = self.spawn(self._start(name, suffix, topics, compression))
         await asyncio.shield(self._starting)
 
@@ -128,7 +128,7 @@ class BagSession(JsonSession):
         super().__init__(client, handlers)
 
     async def follow(self) -> float | None:
-        """Send the states of the recording and the player, the current messages of shown topics, and a pending thumbnail."""
+        """Send the state of the recording and of the player, the current messages of shown topics, and a pending thumbnail."""
         recording = self._endpoint.recording
         state = recording.state() if recording else None
         self._send_changed("recording", state._asdict() if state else None)

@@ -1,4 +1,4 @@
-"""One opened bag: its timeline, and the player of `rosbag play`, which publishes to the dashboard's graph."""
+"""One opened bag: its timeline, and `rosbag play`'s player, which publishes to the dashboard's graph."""
 
 from __future__ import annotations
 

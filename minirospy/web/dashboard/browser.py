@@ -26,7 +26,7 @@ SNAPS = (Path("/snap/bin/firefox"), Path("/snap/bin/chromium"))
 
 
 def has_screen(environ: Mapping[str, str], platform: str = sys.platform) -> bool:
-    """Return whether a browser has a display; without a display, a text browser would take over the terminal."""
+    """Return whether a browser has a display. Without a display, a text browser would take over the terminal."""
     if platform in ("win32", "darwin"):
         return True
     return any(environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME", "BROWSER"))
@@ -46,7 +46,7 @@ class LinkFile:
     """A link's page in a folder that only this user can access."""
 
     def __init__(self, link: str) -> None:
-        """Create the file. Raise OSError if that fails."""
+        """Create the link's file. Raise OSError if that fails."""
         # mkdtemp makes the folder accessible only to this user; on Windows, it uses an access control list.
         self._folder = Path(tempfile.mkdtemp(prefix="minirospy-browser-", dir=_parent()))
         self.path = self._folder / "dashboard.html"

@@ -156,7 +156,7 @@ class DriveEndpoint:
         self._guard = StopGuard()
 
     def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError if none of ``offered`` is supported."""
+        """Choose one of the offered sub-protocols. Raise LookupError if none of ``offered`` is supported."""
         if SUBPROTOCOL in offered:
             return SUBPROTOCOL
         raise LookupError(f"sub-protocol {SUBPROTOCOL} is required")

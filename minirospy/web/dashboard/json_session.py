@@ -262,7 +262,7 @@ class JsonEndpoint(Generic[_S]):
         self._is_change_posted = False
 
     def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError if none of ``offered`` is supported."""
+        """Choose one of the offered sub-protocols. Raise LookupError if none of ``offered`` is supported."""
         if self._subprotocol in offered:
             return self._subprotocol
         raise LookupError(f"sub-protocol {self._subprotocol} is required")

@@ -25,7 +25,10 @@ _NOT_AN_ARRAY = -1
 
 @dataclass
 class TypeDefinition:
-    """A type's fields and constants. ``lengths`` has -1 for a field that is not an array, 0 for an array of any length."""
+    """A type's fields and constants.
+
+    In ``lengths``, -1 means that a field is not an array, and 0 means an array of any length.
+    """
 
     type: str
     names: list[str] = field(default_factory=list)

@@ -268,7 +268,7 @@ def _shown(value: object) -> str:
 
 
 def _text_of(value: object, most: int) -> str:
-    """Return ``str(value)``, or a longer string with the same first ``most`` characters."""
+    """Return ``str(value)``, or a longer string that starts with the same ``most`` characters."""
     return value if isinstance(value, str) else str(_cut(value, most, itertools.count()))
 
 

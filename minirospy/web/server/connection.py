@@ -56,7 +56,7 @@ _log = logging.getLogger(__name__)
 
 _PONG = 0x8A  # first byte of a pong frame, and the key under which a pong is queued
 _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
-"""Weights of clients when the loop's time is shared.
+"""Clients' weights in the sharing of the loop's time.
 
 On loopback any program may write; the dashboard's page has the owner's token.
 """
@@ -109,7 +109,7 @@ class _Phase(IntEnum):
 
 
 class Connection:
-    """The state of one connection, which receives the events from its pipe."""
+    """The state of one connection. Receives the events from the connection's pipe."""
 
     def __init__(self, site: Site, pipe: Pipe, peer: str, loop: asyncio.AbstractEventLoop) -> None:
         limits = site.limits
@@ -217,7 +217,7 @@ class Connection:
         """Send a message that must not be dropped."""
         if not self.is_open:
             return
-        # Check the limit before appending, because a single response, such as a mesh, may be larger than the limit.
+        # Check the limit before appending, because a single response, such as a mesh, may exceed the limit.
         if self.queue.is_overrun:
             _log.warning("%s reads no answers: disconnected", self.peer)
             self._abort()
@@ -271,7 +271,7 @@ class Connection:
     # --- called by the session
 
     def hold(self, *, is_held: bool) -> None:
-        """Stop or continue handling frames while the session is processing one; unread data stays in the client's socket."""
+        """Stop or continue handling frames while the session processes one. Unread data stays in the client's socket."""
         self._is_paused = is_held
         if is_held:
             self._pipe.pause()

@@ -199,7 +199,7 @@ class FairTurns:
         return burst <= INTERACTIVE_SLICES * self._slice
 
     def _push(self, share: Share, start: float) -> None:
-        # If several clients would end at the same tag, serve the client that has used less time first.
+        # If several clients would end at the same tag, serve the one that has used less time first.
         end = self._end_of(share, start)
         heapq.heappush(share.queue.entries, _Entry(end, share.tag, next(self._numbers), start, share))
 

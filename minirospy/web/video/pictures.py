@@ -33,7 +33,7 @@ _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/
 
 
 def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
-    """Return a serialized message's image as an encoded file, and its content type.
+    """Encode a serialized message's image as a file; return the file and its content type.
 
     Raise BridgeError if it cannot be converted.
     """
