@@ -1,4 +1,4 @@
-"""A node's services in an event loop, and service calls."""
+"""A node's services in an event loop, and calls to services."""
 
 from __future__ import annotations
 

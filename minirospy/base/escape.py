@@ -15,7 +15,8 @@ from typing import TextIO
 __all__ = ["SafeTerminal", "escaped", "has_controls", "own_output"]
 
 _CONTROLS = r"\x00-\x1f\x7f-\x9f\u2028\u2029"
-# Direction marks are included because they reverse the text that follows, so that a name could look like another one.
+# Direction marks are included because they reverse the text that follows, which could make a name look like another
+# one.
 _CONTROL = re.compile(f"[{_CONTROLS}\u202a-\u202e\u2066-\u2069]")
 _NAME_CONTROL = re.compile(f"[{_CONTROLS}]")
 

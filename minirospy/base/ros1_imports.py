@@ -1,4 +1,4 @@
-"""Make ROS 1's Python packages importable if ROS 2 is sourced, whose std_msgs, tf2_ros, ... are first on PYTHONPATH.
+"""Make ROS 1's Python packages importable if ROS 2 is sourced, which puts its std_msgs, tf2_ros, ... first on PYTHONPATH.
 
 `import rospy` and the commands call :func:`prefer_ros1` before the process imports ROS 1 messages. The bridge to
 ROS 2 does not call it, because its process needs ROS 2's packages.

@@ -14,7 +14,7 @@ __all__ = ["did_you_mean", "nearest"]
 def nearest(name: str, known: Iterable[str]) -> list[str]:
     """Return up to three names in ``known`` that are similar to ``name``."""
     if not isinstance(name, str):
-        # Programs may pass a value that is not a string; no name is similar to it.
+        # Programs may pass a value that is not a string. No name is similar to it.
         return []
     names = sorted(set(known))
     # The most common mistake is to omit the package or namespace.

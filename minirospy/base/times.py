@@ -118,7 +118,7 @@ class Time(TVal):
             raise TypeError("time values must be positive")
 
     def to_time(self) -> float:
-        """Return the seconds as a float, as ``time.time()`` does; the same as ``to_sec``."""
+        """Return the seconds as a float, like ``time.time()``. The same as ``to_sec``."""
         return self.to_sec()
 
     def __add__(self, other: Duration) -> Time:

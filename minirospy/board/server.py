@@ -58,7 +58,7 @@ def main(argv: list[str]) -> int:
         # On Windows, do not keep the log file open as on other systems, because neither the file nor its folder could
         # then be removed.
         sys.stderr = _LogOnDemand(directory.log_path)
-    # A board that already has saved state is not temporary, even if another process starts it again.
+    # A board with saved state is not temporary, even if another process starts it again.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not directory.state_path.exists()
     with _locked(directory) as owned:
         if owned:

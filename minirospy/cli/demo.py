@@ -85,7 +85,7 @@ def _demo(presses: int | None) -> int:
 
 
 def _is_dumb() -> bool:
-    """Return whether the output is a terminal that cannot move the cursor back, as in an editor."""
+    """Return whether the output is a terminal that cannot move the cursor back, such as an editor's."""
     from rich.console import Console
 
     return Console().is_dumb_terminal
@@ -199,7 +199,7 @@ def _rest(board: Board, launch: subprocess.Popen[bytes], show: _Lines | _Picture
 
 
 class _Lines:
-    """Prints one line per press, for outputs that are not a terminal or cannot be redrawn."""
+    """Prints one line per press, for an output that is not a terminal or cannot be redrawn."""
 
     def __enter__(self) -> None:
         print("\n".join(_WAY), flush=True)

@@ -38,7 +38,7 @@ class Deferral:
             self.poll()
 
     def poll(self) -> None:
-        """Dispatch a pending signal, unless this thread is not the main thread or is inside a critical section."""
+        """Dispatch a pending signal, if called in the main thread outside of a critical section."""
         if self.pending and not self._depth and is_main_thread():
             self.dispatch()
 

@@ -52,7 +52,7 @@ class SubscribeListener:
         """Handle a new subscriber. ``topic_publish`` publishes to all subscribers, ``peer_publish`` only to the new one."""
 
     def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
-        """Handle the disconnection of a subscriber; ``num_peers`` remain."""
+        """Handle the disconnection of a subscriber. ``num_peers`` remain."""
 
 
 class Publisher(Topic[_M_co]):

@@ -331,8 +331,8 @@ class SubscribedTopic(SharedTopic):
             self._deliver(frame, link.header, receivers)
             newest = link.latched
             if newest is not None and newest is not frame:
-                # A newer message has arrived in the meantime, and may have been delivered before this older one:
-                # deliver the newer one again, so that it is the last.
+                # A newer message has arrived in the meantime, and may have been delivered before this older one.
+                # Deliver it again, so that it comes last.
                 self._deliver(newest, link.header, receivers)
 
     def _handle_with(self, callback: _Callback) -> Subscriber[Message]:

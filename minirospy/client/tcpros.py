@@ -1,4 +1,4 @@
-"""A TCPROS connection that a program makes itself: the classes of rospy.impl.tcpros_base and tcpros_service.
+"""TCPROS connections that programs make themselves: the classes of rospy.impl.tcpros_base and tcpros_service.
 
 minirospy's own connections are in ``runtime/`` and do not use these classes. Source: http://wiki.ros.org/ROS/TCPROS, and
 the behaviour of rospy.impl.

@@ -157,7 +157,7 @@ def run(
         _flush()
         return 0
     except OSError as error:
-        # The cause may be a full disk or a missing permission: print the file's name and the system's message.
+        # The cause may be a full disk or missing permissions: print the file's name and the system's message.
         why = error.strerror or str(error)
         return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:

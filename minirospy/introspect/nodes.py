@@ -73,7 +73,7 @@ class NodeDetail(NamedTuple):
 
 
 class Connections(NamedTuple):
-    """The connections that a node reports."""
+    """The connections that a node reports: its process id and its links."""
 
     pid: int
     links: list[BusConnection]

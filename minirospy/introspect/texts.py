@@ -43,7 +43,7 @@ def connections_text(graph: Graph, connections: Connections) -> str:
         lines.append("Connections:")
         for link in connections.links:
             to = link.destination
-            # For an inbound connection, ``to`` is the publisher's URI instead of its name.
+            # For an inbound connection, ``to`` is the publisher's URI, not its name.
             shown = f"{names[to]} ({to})" if to in names else to
             lines += (
                 f" * topic: {link.topic}",

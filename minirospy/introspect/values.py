@@ -61,7 +61,7 @@ def parse_value(text: str) -> object:
         return yaml_text.load(text, _loader())
     except yaml.YAMLError as error:
         if isinstance(error.__cause__, UnicodeEncodeError):
-            # An argument that is not UTF-8 is a usage error, which the command reports.
+            # An argument that is not UTF-8 is a usage error. The command reports it.
             raise error.__cause__ from None
         raise ValueTextError(text, one_line(error)) from error
 

@@ -54,7 +54,7 @@ def host_names() -> list[str]:
 
 
 def qr_code(text: str) -> str:
-    """Return a QR code for a terminal, or "" if the library segno is missing."""
+    """Return a QR code for a terminal, or "" if the segno library is missing."""
     try:
         import segno
     except ImportError:

@@ -94,7 +94,7 @@ class Dependencies:
         return self._manifests[name]
 
     def direct(self, name: str) -> list[str]:
-        """Return a package's direct dependencies, ordered by kind of tag. Raise the same exceptions as :meth:`manifest`."""
+        """Return a package's direct dependencies, sorted by the kind of tag. Raise the same exceptions as :meth:`manifest`."""
         self.folder(name)
         dependencies = self.manifest(name).dependencies
         wanted = [each.name for tag in _RUNNING for each in dependencies if each.tag == tag]

@@ -185,7 +185,7 @@ SUBMODULES = {
     "roslaunch.remoteprocess": "roslaunch.parent.ROSLaunchParent starts nodes on other machines by ssh",
     "roslaunch.netapi": "`rosnode list` lists the nodes; a roslaunch does not serve its list of processes",
 }
-"""Submodules of ROS packages that minirospy's packages lack, with their replacements. `overlay/` has a module for each."""
+"""Dict from submodule of a ROS package that minirospy's package lacks to its replacement. `overlay/` has a module for each."""
 
 
 def advice(name: str) -> str:

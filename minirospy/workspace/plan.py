@@ -67,7 +67,7 @@ _BEFORE = {
 """Commands that catkin requires before other commands, although the order has no effect here."""
 _GENERATORS = {"message_generation", "genmsg", "actionlib_msgs"}
 """Packages that define CMake's message macros; at least one must be found before the macros are used."""
-_CMAKE_VERSION = "3.25.1"  # the version that CMakeLists.txt files see as CMake's
+_CMAKE_VERSION = "3.25.1"  # CMake's version, as seen by CMakeLists.txt files
 
 
 class Install(NamedTuple):

@@ -105,7 +105,7 @@ class Declared(Protocol):
 
 
 class Matching(Protocol):
-    """A publisher's matching status, that is, whether it has subscribers."""
+    """A publisher's matching status: whether it has subscribers."""
 
     matching: bool
 

@@ -194,7 +194,7 @@ class ChunkStream:
         all_offsets: list[array[int]],
         known: Mapping[int, Connection],
     ) -> None:
-        """Compare each connection's record, which precedes its first message, with the record in the bag's index.
+        """Compare each connection's record in the chunk, before its first message, with the one in the bag's index.
 
         This is done once per connection. Raise BagFormatError if the records differ, or if the chunk's index is wrong.
         """

@@ -132,7 +132,7 @@ def _compress_lz4(data: Buffer) -> bytes:
 
 
 class _Output:
-    """Collects decompressed data; ``size`` bytes are expected. Raise BagFormatError if there are more.
+    """Collects decompressed data, which must have ``size`` bytes. Raises BagFormatError if there is more.
 
     Large data is decompressed in pieces, because a library would need twice the memory to join its own pieces, and Ctrl-C
     would have no effect until it finishes.

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 _END_OF_TIME = 1 << 64
-_MAX_NAME = 32  # maximum bytes in the name of a compression
+_MAX_NAME = 32  # maximum bytes in a compression's name
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequence, log time and publish time
 _CHUNK_HEAD = struct.Struct("<BQQQQII")

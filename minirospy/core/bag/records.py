@@ -125,7 +125,7 @@ class Connection(NamedTuple):
 
     @property
     def callerid(self) -> str:
-        """The name of the publisher's node, or "" if it is not stored."""
+        """The name of the publisher's node, or "" if it was not stored."""
         return self._text("callerid")
 
     @property

@@ -192,7 +192,7 @@ class Repair:
         return record.end
 
     def _read(self, position: int, limit: int) -> int:
-        """Read the record at a position and, after a chunk, its index records; return the position after them.
+        """Read the record at a position. If it is a chunk, also read its index records. Return the position after them.
 
         Raise BagFormatError if a record is damaged.
         """
@@ -394,7 +394,7 @@ class _Any:
 
 
 def _partial_chunk(stream: BinaryIO, position: int, limit: int) -> Record | None:
-    """Return the record of an uncompressed chunk whose data is truncated, or None if the record is not such a chunk."""
+    """Return the record of an uncompressed chunk whose data is truncated, or None if it is not such a record."""
     try:
         stream.seek(position)
         head = stream.read(min(4096, limit - position))

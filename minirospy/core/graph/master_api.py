@@ -179,7 +179,7 @@ class MasterApi(ABC):
     def collect_system_state(self) -> Steps[Answer]:
         """Return the response to :meth:`get_system_state`, in steps."""
         if self.registry.is_large:
-            # Build one list at a time, so that there is not one in memory for each client that waits for a response.
+            # Build one list at a time, so that memory does not hold one for each client that waits for a response.
             yield ALONE
         publishers = yield from _collect(self.registry.publisher_rows())
         subscribers = yield from _collect(self.registry.subscriber_rows())

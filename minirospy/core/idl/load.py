@@ -395,7 +395,7 @@ def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> 
         # Python has its own limits, for example on nested loops, which nested arrays generate.
         raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
     found: type[Message] = module.__dict__[name.partition("/")[2]]
-    # Use genpy's naming, because programs that read bags look for `_sensor_msgs__Image`.
+    # Use genpy's naming, because programs that read bags look for names such as `_sensor_msgs__Image`.
     found.__name__ = found.__qualname__ = f"_{name.replace('/', '__')}"
     found.__reduce__ = _reduced  # type: ignore[assignment, method-assign]
     _running[id(found)] = found
@@ -404,7 +404,7 @@ def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> 
     return found
 
 
-# Dict from id to a class created at run time, so that unpickling a message finds its class
+# Dict from id to class, for classes created at run time, so that unpickling a message finds its class
 _running: weakref.WeakValueDictionary[int, type[Message]] = weakref.WeakValueDictionary()
 
 

@@ -95,7 +95,7 @@ def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list
     try:
         order = list(TopologicalSorter(needed).static_order())
     except CycleError as error:
-        # In graphlib's list of the cycle, the first name is repeated at the end.
+        # The first name is repeated at the end of graphlib's list of the cycle.
         around = spec.full_name if spec.full_name in error.args[1] else error.args[1][0]
         raise DefinitionError(spec.full_name, 1, f"[{around}] contains itself") from None
 

@@ -235,7 +235,7 @@ class TransformBuffer(FrameTree):
         if target is source:
             return self._newest_of(target.name)
 
-        # This is :meth:`_ancestors`, inlined for speed: most lookups need only this part.
+        # This inlines :meth:`_ancestors` for speed: most lookups need only this part.
         above_source: list[tuple[int, Frame]] = []
         common = _FOREVER
         frame, arrived = source, self._arrived

@@ -35,7 +35,7 @@ __all__ = [
 
 CHUNK = 64 * 1024  # bytes per receive while messages are small
 
-LENGTH_BYTES = 4  # bytes in the length prefix of a frame or of a connection header
+LENGTH_BYTES = 4  # bytes in the length prefix of a frame or connection header
 
 MAX_FRAME = 1024 * 1024 * 1024  # bytes; a longer frame is rejected as invalid
 
@@ -71,7 +71,7 @@ class LargeFrame(NamedTuple):
 
 
 class Pieces(list[Any]):
-    """The target for a message's ``serialize``: joins small byte strings once, and does not join large ones."""
+    """The target for a message's ``serialize``: joins small byte strings once, and keeps large ones separate."""
 
     __slots__ = ()
     write = list.append
@@ -195,7 +195,7 @@ class FrameReader:
         self._small[: self._end] = data
 
     def space(self) -> memoryview:
-        """Return the memory for the next bytes, which is never empty."""
+        """Return the memory for the next bytes. It is never empty."""
         if self._large is not None:
             if self._filled == len(self._large):
                 # Grow the buffer as bytes arrive, so that a length prefix alone cannot allocate all the memory in

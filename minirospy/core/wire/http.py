@@ -83,7 +83,7 @@ class HttpMessage(NamedTuple):
 
 
 class HttpReader:
-    """A parser that splits received bytes into complete messages; several messages may be pipelined.
+    """A parser that splits received bytes into complete messages. Several messages may be pipelined.
 
     Optimized for the usual case: a single message in one piece, or its head and then its body.
     """

@@ -267,7 +267,7 @@ class Journal:
         return len(data)
 
     def _put_in_place(self, file: int) -> int:
-        """Rename the new, synced file to the journal's name; return its open descriptor. Raise OSError if renaming fails."""
+        """Rename the new, synced file to the journal's name. Return its open descriptor. Raise OSError if renaming fails."""
         if sys.platform == "win32":
             # Windows can neither replace an open file nor rename one.
             self._close_file()

@@ -221,7 +221,7 @@ class Master(MasterApi):
         return state
 
     def notify(self, action: Notice) -> None:
-        """Send the notification to its node."""
+        """Send the notification to the node that it is for."""
         if isinstance(action, NodeShutdown):
             self.parameters.unsubscribe_node(action.name, action.uri)
             self._replaced.warning("another node took the name %s: %s is stopped", action.name, action.uri)

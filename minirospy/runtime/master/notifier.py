@@ -114,7 +114,7 @@ class Notifier:
         # The last serialized large update, of a topic or a parameter.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
 
-        # The queued large calls; the bytes of those in progress; whether one is being serialized.
+        # The queued large calls, the bytes of those in progress, and whether one is being serialized.
         self._large: deque[Callable[[], None]] = deque()
         self._large_bytes = 0
         self._is_writing = False

@@ -63,7 +63,7 @@ _REFUSALS_LOGGED = 10
 TOGETHER_SECONDS = 0.25
 MAX_TOPICS_SHOWN = 5  # maximum number of topics named in one log line about an unreachable publisher
 _LEAVE_SECONDS = 10.0
-# a link counts as working once it has received a message or has been open for this many seconds
+# a link counts as working once it has received a message, or has been open for this many seconds
 _WORKED_SECONDS = 5.0
 
 Deliver = Callable[[Frame, Header], None]
@@ -118,7 +118,7 @@ class Publication:
 
     @property
     def is_sending(self) -> bool:
-        """Return whether a thread is publishing, and therefore holds a link's lock."""
+        """Return whether a thread is publishing, and therefore holds a lock."""
         return self._latch_lock.locked() or any(link.is_sending for link in self.links)
 
     def publish(self, frame: bytes | LargeFrame) -> None:

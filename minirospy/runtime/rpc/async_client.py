@@ -37,7 +37,7 @@ KEEP_SECONDS = 10.0
 # 10035 is WSAEWOULDBLOCK, which Windows reports while connecting.
 _UNDER_WAY = {errno.EINPROGRESS, errno.EWOULDBLOCK, 10035}
 
-# Matches nearly all node URIs, because a complete parse costs as much as the call
+# Matches nearly all node URIs and avoids a complete parse, which costs as much as the call
 _USUAL_URI = re.compile(r"http://([A-Za-z0-9._-]+):([1-9][0-9]{0,3}|[1-5][0-9]{4})(/[A-Za-z0-9._/-]*)?")
 
 _Address = tuple[str, int]

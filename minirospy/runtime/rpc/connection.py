@@ -221,7 +221,7 @@ class Connection:
         self._server.turns.start(self._read_much(reading))
 
     def _read_much(self, reading: object) -> Steps[None]:
-        """Read until nothing more is available, or until other code has stopped or restarted reading."""
+        """Read until nothing is left to read, or until other code has stopped or restarted reading."""
         while self._reading is reading:
             data = self._receive(_RECEIVE if self._reader.in_chunks else _RECEIVE_MORE)
             if data is None:

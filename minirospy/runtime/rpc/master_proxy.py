@@ -64,7 +64,7 @@ def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
 
 
 class MasterProxy:
-    """A proxy for the master at ``uri``; calls are made as the node ``caller_id``.
+    """A proxy for the master at ``uri``. Calls are made as the node ``caller_id``.
 
     Each method raises MasterUnreachableError if the master does not respond, RpcRefused if it refuses the call.
     """

@@ -14,7 +14,7 @@ _T = TypeVar("_T")
 class Deadlines(Generic[_T]):
     """The time limit of each operation in progress.
 
-    ``late`` is called on the loop with each operation that has passed its limit, in the order of the limits.
+    ``late`` is called on the loop with each overdue operation, in the order of the limits.
     """
 
     def __init__(self, late: Callable[[_T], object]) -> None:

@@ -32,9 +32,7 @@ class UnixAddress(NamedTuple):
 
 
 def this_host() -> str:
-    """Return a string that is the same in two processes if and only if abstract sockets can connect them, or "" if
-    unsupported.
-    """
+    """Return a string that is equal in two processes if and only if abstract sockets can connect them; "" if unsupported."""
     if sys.platform != "linux":
         return ""
     try:

@@ -214,7 +214,7 @@ class BagSession(JsonSession):
         self._sent.pop("state", None)
         if bag:
             bag.output.close()
-            # If the client leaves now, only the waiting is cancelled, not the closing of the bag.
+            # If the client leaves now, cancel only the wait, not the closing of the bag.
             await asyncio.shield(asyncio.wrap_future(self._thread.submit(bag.close)))
 
     async def _play(self, fields: Fields) -> None:

@@ -52,7 +52,7 @@ class JsonSession:
     """The subject of the operations, for error messages."""
 
     owners_only: ClassVar[str] = ""
-    """A description of the operations that require the token, for error messages; "" if other clients may use some of them."""
+    """The operations that require the token, as described in error messages; "" if other clients may use some of them."""
 
     longest: ClassVar[int] = 256_000
     """Maximum number of characters in an operation, because parsing it delays all clients."""

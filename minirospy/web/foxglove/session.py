@@ -203,7 +203,7 @@ class FoxgloveSession:
         self.send(serializing.status(level, text, id_))
 
     def _require(self, capability: str, doing: str) -> None:
-        """Raise BridgeError if the client lacks a capability that ``doing`` requires."""
+        """Raise BridgeError, whose message names what the client is ``doing``, if the client lacks a capability."""
         if capability not in self._endpoint.capabilities_of(self.client):
             why = (
                 "this token is read-only" if not self.client.may_write else f"'{capability}' is switched off"

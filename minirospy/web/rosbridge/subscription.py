@@ -77,7 +77,7 @@ class Pacer(Generic[_T]):
         self._trim()
 
     def arrived(self, message: _T, now: float) -> bool:
-        """Return whether to send a message now; otherwise it is queued or dropped."""
+        """Return whether to send a message now. Otherwise it is queued or dropped."""
         if not self._waiting and now >= self._last + self.throttle:
             self._last = now
             return True

@@ -141,8 +141,8 @@ class Connection:
         self._is_held_back = False  # True if the client has used up its frame quota for the current second
         self._is_paused = False  # True while the session works on an earlier message, see hold()
         self._worked_on = 0  # bytes of the message that the session works on
-        self._are_jobs_held = False  # True while a job continues in a thread, see hold_jobs()
-        self._held = 0  # bytes that the session uses for the client, see session_holds()
+        self._are_jobs_held = False  # True while a job continues in a thread; see hold_jobs()
+        self._held = 0  # bytes that the session uses for the client; see session_holds()
         self._is_in_turn = False  # True while _work() runs
         # Calls _handshake_late at first, later the check of an open connection, and finally _abort for a closing one.
         self._timer = loop.call_later(limits.handshake_seconds, self._handshake_late)

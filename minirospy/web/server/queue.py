@@ -52,7 +52,7 @@ class _Waiting:
 
 
 class SendQueue:
-    """The output queue of one client, in the order of arrival."""
+    """One client's output queue, in the order of arrival."""
 
     def __init__(
         self, limit: int = DEFAULT_LIMIT, entry_bytes: int = ENTRY_BYTES, share: Share | None = None

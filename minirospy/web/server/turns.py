@@ -240,7 +240,7 @@ class FairTurns:
         self._bulk_credit = max(-MAX_DEBT_TURNS * most, min(most, self._bulk_credit + change))
 
     def _run(self, share: Share, start: float) -> bool:
-        """Run some of a client's work, which starts at the tag ``start``; return whether more is left."""
+        """Run some of a client's work, which starts at the tag ``start``. Return whether any is left."""
         if share.is_closed:
             return False
         end, before = self._clock() + self._slice, self._meter()

@@ -201,7 +201,7 @@ class VideoPages:
     # --- internals
 
     async def _look(self, exchange: Exchange) -> Snapshot | None:
-        """Return the graph; if it cannot be read, send an error response and return None."""
+        """Return the graph. If it cannot be read, send an error response and return None."""
         try:
             found = await fetch(self._graph.node.call_master)
         except (MasterUnreachableError, RpcError) as error:

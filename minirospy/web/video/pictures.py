@@ -131,7 +131,7 @@ def _by_opencv(image: Pixels, encoding: str) -> Pixels:
         return converted(image, encoding, "mono8")
     if encoding == "yuv422":
         return cv2.cvtColor(image, cv2.COLOR_YUV2BGR_UYVY)  # type: ignore[no-any-return]
-    # OpenCV names a pattern by the pixels in its second row and column.
+    # OpenCV names a Bayer pattern by the pixels in its second row and column.
     name = {"rggb": "BG", "bggr": "RG", "gbrg": "GR", "grbg": "GB"}[encoding[6:10]]
     found: Pixels = cv2.cvtColor(image, getattr(cv2, f"COLOR_Bayer{name}2BGR"))
     return converted(found, "bgr16", "bgr8") if encoding.endswith("16") else found
