@@ -48,7 +48,7 @@ _MAX_CHARACTERS = 4096  # maximum length of a name, a type or a URI
 _MAX_URIS = 20_000
 """Maximum number of URIs in a list, because checking them blocks the node for some milliseconds.
 
-No topic has that many nodes at any master.
+No master lists as many for one topic.
 """
 
 
@@ -238,7 +238,7 @@ def subgraph(value: object, name: str, caller_id: str) -> str:
 
 
 def global_key(value: object, name: str, caller_id: str) -> str:
-    """Return a parameter's global name, resolved relative to the caller."""
+    """Return a parameter's name, which must be global."""
     found = text(value, name, caller_id)
     if found[0] != "/":
         raise CallRefused(f"ERROR: parameter [{name}] must be a globally referenced name")
