@@ -42,7 +42,7 @@ class Handle:
         await self.close()
 
     async def wait_until_registered(self) -> None:
-        """Wait until the registration has finished. Does not raise if it failed or was cancelled, unlike ``await handle``."""
+        """Wait until the registration has finished. Unlike ``await handle``, does not raise if it failed or was cancelled."""
         await asyncio.wait([self._registration])
 
     async def close(self) -> None:
@@ -53,7 +53,7 @@ class Handle:
 async def registered(
     register: Callable[[_T], Awaitable[None]], part: _T, what: str, faults: RateLimitedLogger
 ) -> None:
-    """Wait for a registration to finish; as in rospy, only log it if the master refuses."""
+    """Wait for a registration to finish. If the master refuses it, only log that, as rospy does."""
     try:
         await register(part)
     except (MasterUnreachableError, RpcError) as error:

@@ -56,7 +56,7 @@ _PROBE_SECONDS = 5.0
 MAX_REGISTRATION_FAULTS = 5
 _BILLION = 1_000_000_000
 _REQUEST = re.compile(r"external shutdown request from \[.*?\]: \[(.+)\]$", re.DOTALL)
-"""The message that the Slave API logs when `shutdown` is called."""
+"""Matches the message that the Slave API logs when `shutdown` is called."""
 
 
 class _Unspecified:
@@ -110,12 +110,11 @@ class Node:
         name = special.get("__name") or (names.anonymous_name(name) if anonymous else name)
         self.name = names.canonicalize(self._environment.namespace + "/" + name)
         self.log = logging.getLogger("rosout" + self.name.replace("/", "."))
-        """The node's logger, which writes to the terminal, as rospy does, and to /rosout."""
+        """The node's logger. It writes to the terminal, as rospy does, and to /rosout."""
         # Logs registrations that the master refused
         self.registration_faults = RateLimitedLogger(self.log, registration_fault_lines)
 
-        # The reason for the shutdown that another process requested, such as the master if a new node has the same
-        # name
+        # The shutdown reason from another process, such as the master if a new node has the same name
         self.shutdown_request = ""
 
         self._remappings = self._arguments.resolved_remappings(self.name)
@@ -247,7 +246,7 @@ class Node:
         return self._stopping.is_set()
 
     async def spin(self) -> None:
-        """Wait until the node is requested to shut down."""
+        """Wait until the node is asked to shut down."""
         await self._stopping.wait()
 
     @property
@@ -256,7 +255,7 @@ class Node:
         return self._node.uri
 
     def resolve(self, name: str) -> str:
-        """Return the global name of ``name``, resolved relative to this node."""
+        """Return ``name`` as a global name, resolved relative to this node."""
         return names.resolve(name, self.name, self._remappings)
 
     # --- topics
@@ -287,8 +286,8 @@ class Node:
     ) -> RawSubscription:
         """Subscribe to ``topic``, of any type unless ``type_`` is given, and receive its messages as bytes.
 
-        ``deliver(data, publisher's connection header)`` is called on the loop and must return quickly, and so must
-        ``on_change``, which is called when a publisher has connected. ``deliver`` may keep the data. ``await
+        ``deliver(data, header)``, with the publisher's connection header, is called on the loop; so is ``on_change``,
+        when a publisher has connected. Both must return quickly. ``deliver`` may keep the data. ``await
         node.subscribe_raw(...)`` waits until the subscription is registered with the master.
         """
         resolved = self.resolve(topic)
@@ -317,7 +316,7 @@ class Node:
         tcp_nodelay: bool = False,
         on_change: Callable[[], object] | None = None,
     ) -> Publisher[_M]:
-        """Return a publisher for ``topic``; ``await node.advertise(...)`` waits until it is registered with the master.
+        """Return a publisher for ``topic``. ``await node.advertise(...)`` waits until it is registered with the master.
 
         ``queue_size``: maximum number of messages queued for a slow subscriber; beyond that the oldest is dropped (0:
         no limit; None: ``publish`` itself waits until all are written). ``latch``: a subscriber that connects later
@@ -356,7 +355,7 @@ class Node:
             publisher: Publisher[Message] = self.advertise(resolved, type(message))
             kept = self._kept[resolved] = (publisher, self._spawn(publisher.wait_for_expected()))
         publisher, expected = kept
-        # Concurrent calls that publish on the topic wait here too.
+        # Concurrent calls that publish on the topic also wait here.
         await asyncio.wait([expected])
         await publisher.publish(message)
 
@@ -380,7 +379,7 @@ class Node:
         persistent: bool = False,
         headers: Mapping[str, str] | None = None,
     ) -> ServiceProxy[_Response]:
-        """Return a function for repeated calls: ``await proxy(...)``; ``persistent`` keeps one connection for all calls."""
+        """Return a function for repeated calls: ``await proxy(...)``. ``persistent`` keeps one connection for all calls."""
         return ServiceProxy(self, self.resolve(service), service_class, persistent, headers)
 
     def serve(
@@ -389,7 +388,7 @@ class Node:
         service_class: ServiceClass[_Request, _Response],
         handler: Callable[[_Request], Awaitable[object]] | Callable[[_Request], object],
     ) -> Service:
-        """Offer a service; ``await node.serve(...)`` waits until it is registered with the master.
+        """Offer a service. ``await node.serve(...)`` waits until it is registered with the master.
 
         ``handler(request)`` returns a response, a dictionary of some of its fields, a list or tuple of all
         its field values, or the value of its only field. An ``async def`` handler runs as a task on the loop, any
@@ -481,7 +480,7 @@ class Node:
     # --- time
 
     def now(self) -> Time:
-        """Return the current time: if /use_sim_time is set, simulated time (zero until the first /clock), else system time."""
+        """Return the current time: system time or, if /use_sim_time is set, simulated time (zero until the first /clock)."""
         now = self._simulated.now if self._simulated else time.time_ns()
         return Time(*divmod(now, _BILLION))
 
@@ -527,7 +526,7 @@ class Node:
         return task
 
     def _later(self, work: Callable[[], Coroutine[object, object, None]]) -> None:
-        """Run ``work`` on the loop, from any thread; do nothing if the node is closed."""
+        """Run ``work`` on the loop, from any thread. Do nothing if the node is closed."""
         if self._loop and not self._is_closed:
             with contextlib.suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(lambda: None if self._is_closed else self._spawn(work()))

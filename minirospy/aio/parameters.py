@@ -16,7 +16,7 @@ __all__ = ["ParameterWatch"]
 
 
 class ParameterWatch:
-    """The parameters that a node has subscribed to. ``listeners(name, value)`` are called on the loop when a value changes.
+    """A node's parameter subscriptions. When a value changes, ``listeners`` are called with (name, value), on the loop.
 
     A deleted parameter has the value ``{}``, as the master sends it. After a restart of the master, the subscriptions
     are renewed. Source: http://wiki.ros.org/ROS/Parameter%20Server%20API (subscribeParam).
@@ -28,7 +28,7 @@ class ParameterWatch:
         self._loop = loop
 
     async def add(self, name: str) -> object:
-        """Subscribe to a parameter by its global name; return its value, or ``{}`` if it is not set.
+        """Subscribe to the parameter with the global name ``name``; return its value, or ``{}`` if it is not set.
 
         Raise MasterUnreachableError if the master does not respond, RpcError if the call fails.
         """

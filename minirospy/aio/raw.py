@@ -52,7 +52,7 @@ class RawSubscription(Handle):
 
     @property
     def headers(self) -> list[Header]:
-        """The connection headers of the connected publishers; the same objects are passed to ``deliver``."""
+        """The connection headers of the connected publishers. The same objects are passed to ``deliver``."""
         return [link.header for link in self._state.subscription.links]
 
     async def close(self) -> None:
@@ -101,7 +101,7 @@ class RawService(Handle):
 
 
 def raw_class(type_: InterfaceType) -> type[Message]:
-    """Return a message class without fields that specifies a topic's type, for ``advertise`` and ``publish_raw``."""
+    """Return a message class without fields that only specifies a topic's type, for ``advertise`` and ``publish_raw``."""
     fields = {
         "_type": type_.name,
         "_md5sum": type_.md5sum,

@@ -1,4 +1,4 @@
-"""A node's services in an event loop, and service calls."""
+"""A node's services in an event loop, and calls to services."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class ServiceProxy(Generic[_Response_co]):
         return response
 
     def close(self) -> None:
-        """Close a persistent connection; if another task is calling through it, that call fails. Idempotent."""
+        """Close a persistent connection. If another task is calling through it, that call fails. Idempotent."""
         if self._lock.locked() and self._client:
             # Let the call in progress close the socket, because closing it here would not wake that call.
             self._client.hang_up()

@@ -23,7 +23,7 @@ class ErrorReporter:
     """Reports unexpected errors in a long-running task: one line every ten seconds, with a count of the suppressed errors."""
 
     def __init__(self, log: logging.Logger, work: str) -> None:
-        """Create a reporter for the task described by ``work``, such as "the watch of the graph"."""
+        """Create a reporter for the task that ``work`` describes, such as "the watch of the graph"."""
         self._log = log
         self._lines = RateLimitedLogger(log)
         self._work = work
@@ -45,7 +45,7 @@ class ErrorReporter:
 async def keep_running(
     work: Callable[[], Awaitable[object]], reporter: ErrorReporter, *, pause: float = PAUSE_SECONDS
 ) -> None:
-    """Run ``work`` until it returns or is cancelled; if it raises, report the error and restart it after ``pause`` seconds."""
+    """Run ``work`` until it returns or is cancelled. If it raises, report the error and restart it after ``pause`` seconds."""
     while True:
         try:
             await work()

@@ -1,4 +1,4 @@
-"""Simulated time and rates, for a node in an event loop."""
+"""Simulated time, and rates, for a node in an event loop."""
 
 from __future__ import annotations
 

@@ -220,7 +220,7 @@ class Publisher(Handle, Generic[_M_co]):
             await asyncio.wait_for(self._wait_for(state.publication.expected), JOIN_SECONDS)
 
     async def close(self) -> None:
-        """Stop publishing; the node's last publisher on a topic also unregisters the topic. Idempotent."""
+        """Stop publishing. The node's last publisher on a topic also unregisters the topic. Idempotent."""
         state, self._state = self._state, None
         if state:
             await state.leave(self)
@@ -233,7 +233,7 @@ class Publisher(Handle, Generic[_M_co]):
 
 
 class SubscribedTopic:
-    """A topic subscribed to by a node; its subscriptions share this object."""
+    """A topic that a node subscribes to. Its subscriptions share this object."""
 
     def __init__(self, node: Node, topic: str, message_class: type[Message]) -> None:
         self.topic = topic
@@ -285,7 +285,7 @@ class SubscribedTopic:
 
 
 class PublishedTopic:
-    """A topic published by a node; its publishers share this object."""
+    """A topic that a node publishes. Its publishers share this object."""
 
     def __init__(self, node: Node, publication: Publication, message_class: type[Message]) -> None:
         self.publication = publication

@@ -31,14 +31,14 @@ class JobSystem(Protocol):
         """Create a Windows job object; return its handle."""
 
     def set_limits(self, job: int, flags: int) -> None:
-        """Set a job's limits."""
+        """Set the limits of the job ``job``."""
 
     def add_this_process(self, job: int) -> None:
-        """Add this process to a job; processes that it starts after that belong to the job too."""
+        """Add this process to a job. Processes that it starts afterwards belong to the job, too."""
 
 
 class ProcessJob:
-    """The job that contains this process and its children. A process cannot leave its job, so all guards share one."""
+    """The job that contains this process and its children. A process cannot leave its job, so all guards share the same one."""
 
     def __init__(self, system: JobSystem) -> None:
         self._system = system
@@ -47,7 +47,7 @@ class ProcessJob:
         self._guards = 0
 
     def guard(self) -> bool:
-        """Let the system terminate the children together with this process; return whether the system does so."""
+        """Make the system terminate the children when this process exits. Return whether the system supports that."""
         with self._lock:
             try:
                 if self._job is None:
@@ -65,7 +65,7 @@ class ProcessJob:
             return True
 
     def release(self) -> None:
-        """Undo one call of :meth:`guard`. After all calls are undone, children may outlive this process again."""
+        """Undo one call of :meth:`guard`. Once all calls are undone, children may outlive this process again."""
         with self._lock:
             self._guards -= 1
             if self._guards == 0 and self._job is not None:
@@ -76,7 +76,7 @@ class ProcessJob:
 
 
 class ChildLifetime:
-    """A context manager. If ``is_guarded`` is set, child processes are terminated with this process until :meth:`close`."""
+    """Context manager. If ``is_guarded`` is set, child processes are terminated with this process until :meth:`close`."""
 
     def __init__(self, job: ProcessJob | None) -> None:
         self._job = job if job is not None and job.guard() else None
@@ -97,7 +97,7 @@ class ChildLifetime:
 
 
 def guard_children() -> ChildLifetime:
-    """On Windows, let every process started after this terminate with this process, until the result is closed."""
+    """On Windows, let processes started after this call terminate with this process, until the result is closed."""
     return ChildLifetime(_process_job())
 
 

@@ -29,8 +29,9 @@ __all__ = [
 
 _CLOCK = struct.Struct("<II")
 _SLICE = 0.05 if sys.platform == "win32" else 0.5
-"""Seconds per slice when the main thread, which receives signals, waits: on Windows Ctrl-C does not interrupt a wait, and on
-other systems a Ctrl-C just before the start of a wait takes effect only after it.
+"""Seconds per wait of the main thread, which receives signals.
+
+On Windows, Ctrl-C does not interrupt a wait; on other systems, a Ctrl-C just before a wait is handled only after it.
 """
 
 _POLL_SECONDS = 0.1
@@ -76,7 +77,7 @@ class SignalSafeEvent(threading.Event):
         self._is_set = False
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait until the event is set, at most ``timeout`` seconds; return whether it is set."""
+        """Wait for at most ``timeout`` seconds until the event is set; return whether it is set."""
         if self._is_set:
             return True
         lock = threading.Lock()
@@ -91,7 +92,7 @@ class SignalSafeEvent(threading.Event):
 
 
 def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
-    """Wait as ``event.wait(timeout)`` does, but so that a signal can interrupt the wait on every OS."""
+    """Like ``event.wait(timeout)``, but a signal can interrupt the wait on every OS."""
     if threading.current_thread() is not threading.main_thread():
         return event.wait(timeout)
     end = None if timeout is None else time.monotonic() + timeout
@@ -104,7 +105,7 @@ def wait_for_event(event: threading.Event, timeout: float | None) -> bool:
 
 
 def time_of_clock_message(body: bytes | memoryview) -> int | None:
-    """Return the nanoseconds in a serialized /clock message, or None if it is not a rosgraph_msgs/Clock."""
+    """Return the time in a serialized /clock message, in nanoseconds, or None if it is not a rosgraph_msgs/Clock."""
     # A Clock is one time: seconds and nanoseconds. Check the size, because a node may publish another type.
     if len(body) != _CLOCK.size:
         return None
@@ -113,7 +114,7 @@ def time_of_clock_message(body: bytes | memoryview) -> int | None:
 
 
 class Clock(Protocol):
-    """The interface to the time that the sleeping functions use."""
+    """The interface to the time used by the sleeping functions."""
 
     def now(self) -> int:
         """Return the current time in nanoseconds."""
@@ -123,7 +124,7 @@ class Clock(Protocol):
 
 
 class WallClock:
-    """The system time."""
+    """A clock that returns the system time."""
 
     now = staticmethod(time.time_ns)
     """Return the nanoseconds since the epoch."""
@@ -134,13 +135,13 @@ class WallClock:
 
 
 class FirstTimeWait:
-    """Calls a function once if the first time of a simulated clock does not arrive within two seconds."""
+    """Calls a function once if a simulated clock's first time does not arrive within two seconds."""
 
     def __init__(self, on_silence: Callable[[], object]) -> None:
         self._pending = [on_silence]  # a list, whose pop() is atomic, because several threads may wait
 
     def check(self, started: float) -> None:
-        """Call the function if the wait that started at ``started``, in seconds of time.monotonic(), has lasted too long."""
+        """Call the function if the wait that began at ``started`` (in seconds of time.monotonic()) has lasted too long."""
         if self._pending and time.monotonic() - started >= _SILENT_SECONDS:
             try:
                 on_silence = self._pending.pop()
@@ -150,7 +151,7 @@ class FirstTimeWait:
 
 
 class SimulatedClock:
-    """A clock that is set by a simulator through /clock, or by a test."""
+    """A clock set by a simulator, through /clock, or by a test."""
 
     def __init__(
         self,
@@ -158,7 +159,7 @@ class SimulatedClock:
         changed: threading.Condition | None = None,
         on_silence: Callable[[], object] = lambda: None,
     ) -> None:
-        """Start at ``now``; ``changed`` is notified each time the clock is set.
+        """Create a clock set to ``now``. ``changed`` is notified each time the clock is set.
 
         ``on_silence()`` is called once, in a thread that has waited two seconds for the clock to be set for the first
         time.
@@ -171,7 +172,7 @@ class SimulatedClock:
         self._sleepers: list[SignalSafeEvent] = []
 
     def now(self) -> int:
-        """Return the time that was set last, or 0 if none was set."""
+        """Return the time that was last set, or 0 if none was set."""
         return self._now
 
     def set(self, now: int) -> None:

@@ -24,7 +24,7 @@ def close_each(functions: Iterable[CloseFunction]) -> None:
 
 
 async def close_all(functions: Iterable[AsyncCloseFunction]) -> None:
-    """Call each function in order as :func:`close_each` does, and await the results of coroutine functions.
+    """Like :func:`close_each`, but also await the results of coroutine functions.
 
     If the calling task is cancelled, the remaining functions are not called.
     """

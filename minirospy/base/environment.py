@@ -37,7 +37,7 @@ DEFAULT_MASTER_PORT = 11311
 _SWITCH = {"": False, "0": False, "off": False, "false": False, "1": True, "on": True, "true": True}
 
 DISTRO = "noetic\n"
-"""The value of /rosdistro: the ROS 1 distribution that minirospy behaves like. ROS's value ends in a newline, too."""
+"""The value of /rosdistro: the ROS 1 distribution that minirospy behaves like. Like ROS's value, it ends in a newline."""
 
 ROS_VERSION = "1.17.0\n"  # the value of /rosversion
 
@@ -75,7 +75,7 @@ class Environment(NamedTuple):
 
     @classmethod
     def read(cls, environ: Mapping[str, str] | None = None, **overrides: str) -> Environment:
-        """Return the record for ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
+        """Read the record from ``environ`` (default: the process's). Overrides: master_uri, host, namespace.
 
         Raise UsageError if ROS_MASTER_URI is not http://host:port, ROS_HOSTNAME or ROS_IP is not just a name or
         address, MINIROSPY_PORTS is not a range such as 40000-40100, MINIROSPY_TRANSPORT or MINIROSPY_LOCAL is unknown,
@@ -102,7 +102,7 @@ class Environment(NamedTuple):
         return environment.on_this_machine() if local else environment
 
     def on_this_machine(self) -> Environment:
-        """Return the record for a process that listens on loopback, advertises localhost and refuses other machines."""
+        """Return the record changed so that the process listens on loopback, advertises localhost and refuses other machines."""
         return self._replace(host="localhost", allow=LOOPBACK, local=True)
 
     @property
@@ -121,7 +121,7 @@ class Environment(NamedTuple):
 
     @property
     def uri_host(self) -> str:
-        """Return ``host`` as it is written in a URI: an IPv6 address in brackets."""
+        """Return ``host`` as written in a URI: an IPv6 address is in brackets."""
         return f"[{self.host}]" if ":" in self.host else self.host
 
     @property
@@ -132,14 +132,14 @@ class Environment(NamedTuple):
 
     @property
     def master_is_local(self) -> bool:
-        """Return whether the master's host is this machine. If it is, a tool may start a master."""
+        """Return whether the master's host is this machine. Only then may a tool start a master."""
         return is_own_host(self.master_address[0], self.host)
 
 
 def master_and_namespace(
     environ: Mapping[str, str], *, master_uri: str = "", namespace: str = "", **_: str
 ) -> tuple[str, str]:
-    """Return the master's URI and the namespace, which a tool needs for its queries.
+    """Return the master's URI and the namespace: the settings that a tool's queries need.
 
     Raise UsageError as Environment.read does, if a variable is invalid.
     """
@@ -171,7 +171,7 @@ def export_local(environ: MutableMapping[str, str]) -> None:
 
 
 def split_uri(uri: str, scheme: str = "http") -> tuple[str, int, str]:
-    """Return the (host, port, path) in ``scheme://host:port/path``. Raise ValueError if the URI is malformed.
+    """Split ``scheme://host:port/path`` into (host, port, path). Raise ValueError if the URI is malformed.
 
     This does not use urllib.parse, because importing it takes a twentieth of a command's run time.
     """
@@ -201,7 +201,7 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
         address = socket.gethostbyname(host)
         if address.startswith("127."):
             return True
-        # Only this machine's addresses can be bound (but Wine binds any address for datagrams, so use TCP).
+        # Only this machine's addresses can be bound. (Wine binds any address for datagrams, so use TCP.)
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.bind((address, 0))
     except OSError:
@@ -210,7 +210,7 @@ def is_own_host(host: str, own: str = "localhost") -> bool:
 
 
 def wrong_address(environment: Environment) -> str:
-    """Return a description of the error in ROS_IP or ROS_HOSTNAME, which peers use to reach this process, or "".
+    """Describe the error in ROS_IP or ROS_HOSTNAME, which peers use to reach this process. Return "" if there is none.
 
     Names are not checked, because an unreachable name server would delay every program.
     """
@@ -226,7 +226,7 @@ def wrong_address(environment: Environment) -> str:
 
 
 def run_folder(log_dir: Path, run_id: object) -> Path | None:
-    """Return the folder for a run's log files, or None if the /run_id is not valid as a folder name.
+    """Return the folder for a run's log files, or None if ``run_id`` is not a valid folder name.
 
     Any node may set /run_id, even to a path that leads outside of ``log_dir``.
     """
@@ -246,7 +246,7 @@ def _checked_uri(uri: str) -> str:
 
 
 def _local_uri(uri: str) -> str:
-    """Return the URI of a master on this machine, changed so that it reaches a master that listens only on loopback."""
+    """Return the URI of a master on this machine, rewritten to reach a master that listens only on loopback."""
     host, port, path = split_uri(uri)
     if host in ("localhost", "127.0.0.1", "::1"):
         return uri

@@ -231,7 +231,7 @@ class RpcRefused(RpcError):
 
 
 class RpcProtocolError(RpcError):
-    """A peer sent data that is not valid HTTP or XML-RPC; ``status`` is the HTTP status that a server responds with."""
+    """A peer sent data that is not valid HTTP or XML-RPC. ``status`` is the HTTP status of a server's response."""
 
     def __init__(self, text: str, *, status: int = 400) -> None:
         super().__init__(text)
@@ -266,7 +266,7 @@ class WireError(MinirospyError):
 
 
 class HandshakeRefused(WireError):
-    """The peer replied to a connection header with ``error=text``."""
+    """The peer replied to a connection header with an error, ``error=text``."""
 
 
 class CallFailed(WireError):
@@ -411,7 +411,7 @@ class BridgeProtocolError(BridgeError):
 
 
 class ValueTextError(MinirospyError):
-    """A value typed by a person cannot be used.
+    """A value typed by a user cannot be used.
 
     ``text`` is the value, or the name of its file or parameter; ``why`` is the reason.
     """

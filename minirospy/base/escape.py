@@ -15,7 +15,8 @@ from typing import TextIO
 __all__ = ["SafeTerminal", "escaped", "has_controls", "own_output"]
 
 _CONTROLS = r"\x00-\x1f\x7f-\x9f\u2028\u2029"
-# Direction marks are included because they reverse the text that follows, so that a name could look like another one.
+# Direction marks are included because they reverse the text that follows, which could make a name look like another
+# one.
 _CONTROL = re.compile(f"[{_CONTROLS}\u202a-\u202e\u2066-\u2069]")
 _NAME_CONTROL = re.compile(f"[{_CONTROLS}]")
 
@@ -33,12 +34,12 @@ def escaped(text: str, keep: str = "") -> str:
 
 
 def has_controls(text: str) -> bool:
-    """Return whether ``text`` contains a control character or a line separator, and therefore is neither a name nor a URI."""
+    """Return whether ``text`` contains a control character or a line separator, so that it is neither a name nor a URI."""
     return _NAME_CONTROL.search(text) is not None
 
 
 def own_output() -> TextIO:
-    """Return a standard output for drawings that move the cursor, because :class:`SafeTerminal` would escape those sequences.
+    """Return a standard output for drawings that move the cursor; :class:`SafeTerminal` would escape those sequences.
 
     The caller must escape untrusted text in the drawing.
     """
@@ -56,12 +57,12 @@ class SafeTerminal(io.TextIOWrapper):
 
     @classmethod
     def around(cls, stream: io.TextIOWrapper) -> SafeTerminal:
-        """Return a stream that writes to the terminal of ``stream``."""
+        """Return a stream that writes to the same terminal as ``stream``."""
         stream.flush()
         return cls(stream.buffer, stream.encoding, "backslashreplace", line_buffering=True)
 
     def write(self, text: str) -> int:
-        """Write ``text``, with its control characters escaped."""
+        """Write ``text`` with its control characters escaped."""
         if _CONTROL.search(text):
             end, parts = 0, []
             for own in _OWN_SEQUENCE.finditer(text):
@@ -82,6 +83,6 @@ class SafeTerminal(io.TextIOWrapper):
             self.detach()
 
     def __del__(self) -> None:
-        # Do not close the stream as TextIOWrapper.__del__ does, because that would close the buffer, which
+        # Unlike TextIOWrapper.__del__, do not close the stream, because that would close the buffer, which
         # sys.__stdout__ shares.
         pass

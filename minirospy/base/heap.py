@@ -13,7 +13,7 @@ _LARGE = 256 * 1024
 
 
 def return_large_blocks(least: int = _LARGE) -> None:
-    """Let glibc map each block of at least ``least`` bytes separately. No effect on other systems and C libraries.
+    """Make glibc map each block of at least ``least`` bytes separately. No effect on other systems and C libraries.
 
     By default glibc maps blocks of at least 128 KiB. But once a larger block (up to 32 MiB) is freed, glibc allocates
     that size from its heap, which can shrink only from its end: after some large bodies a master kept 270 MiB of unused
@@ -28,13 +28,13 @@ def return_large_blocks(least: int = _LARGE) -> None:
         library = ctypes.CDLL(None)
         library.mallopt(_M_MMAP_THRESHOLD, least)
         if least > _LARGE:
-            # Use the same ratio as glibc does by default; otherwise each block above 128 KiB would grow and shrink
-            # the heap at its end.
+            # Keep glibc's default ratio; otherwise each block above 128 KiB would grow and shrink the heap at its
+            # end.
             library.mallopt(_M_TRIM_THRESHOLD, 2 * least)
 
 
 def return_free_memory() -> None:
-    """Let glibc return free memory to the system; takes up to 0.1 s. No effect on other systems and C libraries.
+    """Make glibc return free memory to the system. Takes up to 0.1 s. No effect on other systems and C libraries.
 
     A glibc heap shrinks only from its end, and each Zenoh thread has its own heap. Source: malloc_trim(3).
     """

@@ -1,4 +1,4 @@
-"""Build the command line with which the user adds a library to minirospy's own environment.
+"""Build the command line that adds a library to minirospy's own environment.
 
 Environments created by pipx or uv have no `python -m pip`; pipx and uv have commands for this. Sources:
 https://pipx.pypa.io and https://docs.astral.sh/uv/concepts/tools.
@@ -50,7 +50,7 @@ def install_command(*requirements: str, upgrade: bool = False) -> str:
 
 
 def _uv_tool_command(receipt: Path, requirements: tuple[str, ...], option: str) -> str:
-    """Return uv's command including all earlier requirements, because uv removes those that a new command omits."""
+    """Return uv's command with all earlier requirements, because uv removes those that a new command omits."""
     try:
         text = receipt.read_text(encoding="utf-8").partition("entrypoints")[0]
     except OSError:
@@ -83,7 +83,7 @@ def _requirement(name: str, extras: dict[str, None]) -> str:
 
 
 def _python() -> str:
-    """Return "python" or "python3" if that is the running interpreter, else the interpreter's path."""
+    """Return "python" or "python3" if that runs this interpreter, else the interpreter's path."""
     import shutil
 
     for name in ("python", "python3"):
@@ -95,12 +95,12 @@ def _python() -> str:
 
 
 def _quoted(word: str) -> str:
-    """Return a word quoted for any shell, with double quotes, because cmd.exe does not treat single quotes as quotes."""
+    """Quote a word for any shell. Uses double quotes, because cmd.exe does not treat single quotes as quotes."""
     return f'"{word}"' if _SHELLS_OWN.search(word) else word
 
 
 def _quoted_path(path: str) -> str:
-    """Return a program's path, quoted for the system's shells.
+    """Quote a program's path for the system's shells.
 
     On Windows only the parts that need it are quoted: cmd.exe and PowerShell both run ``C:\\"Program Files"\\python.exe``,
     but PowerShell parses a line that starts with a quote as an expression.

@@ -15,13 +15,13 @@ LOOK_SECONDS = 0.05  # seconds that Keys.next waits for a key
 
 
 class Keys:
-    """Single keys from the terminal, without Enter and without echo; there are none if stdin is not a terminal."""
+    """Reads single keys from the terminal, without Enter and without echo. There are none if stdin is not a terminal."""
 
     _ARROWS: ClassVar = {"A": "up", "B": "down", "C": "right", "D": "left"}
     _WINDOWS_ARROWS: ClassVar = {"H": "up", "P": "down", "M": "right", "K": "left"}
 
     def __init__(self, *, end: str = "q") -> None:
-        """Start reading keys; :meth:`next` returns ``end`` when the terminal is closed."""
+        """Start reading keys. :meth:`next` returns ``end`` when the terminal is closed."""
         self._end = end
         self._is_closed = False
         self.is_terminal = sys.stdin is not None and sys.stdin.isatty()
@@ -50,7 +50,7 @@ class Keys:
                 termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
 
     def next(self) -> str:
-        """Return the typed key (an arrow key by its name), or "" if none is typed within LOOK_SECONDS."""
+        """Return the typed key (an arrow key by its name), or "" if no key is typed within LOOK_SECONDS."""
         if not self.is_terminal:
             time.sleep(LOOK_SECONDS)
             return ""

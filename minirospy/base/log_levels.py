@@ -1,4 +1,4 @@
-"""Log levels in rosgraph_msgs/Log and in Python's ``logging``, and the levels of this process's loggers.
+"""Log levels of rosgraph_msgs/Log and of Python's ``logging``, and the levels of this process's loggers.
 
 Source: http://docs.ros.org/api/rosgraph_msgs/html/msg/Log.html, http://wiki.ros.org/rospy/Overview/Logging.
 """

@@ -28,7 +28,7 @@ class NameFilter:
     def of(
         cls, allow: Iterable[str] = (), deny: Iterable[str] = (), whitelist: Iterable[str] | None = None
     ) -> NameFilter:
-        """Return the filter; an empty ``allow`` allows all names. Raise BridgeError if a regular expression is invalid."""
+        """Create the filter. An empty ``allow`` allows all names. Raise BridgeError if a regular expression is invalid."""
         compiled = None
         if whitelist is not None:
             try:

@@ -67,7 +67,7 @@ def namespace_of(name: str) -> str:
 
 
 def join(namespace: str, name: str) -> str:
-    """Return ``name`` below ``namespace``; global and private names are returned unchanged."""
+    """Return ``name`` below ``namespace``. Global and private names are returned unchanged."""
     if is_global(name) or is_private(name):
         return name
     if namespace == "~":
@@ -78,7 +78,7 @@ def join(namespace: str, name: str) -> str:
 
 
 def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = None) -> str:
-    """Return ``name`` remapped and as a global name, resolved relative to the node ``node_name`` (global)."""
+    """Remap ``name`` and return it as a global name, resolved relative to the node ``node_name`` (global)."""
     if not name:
         return namespace_of(node_name)
     name = canonicalize(name)
@@ -92,7 +92,7 @@ def resolve(name: str, node_name: str, remappings: Mapping[str, str] | None = No
 
 
 def anonymous_name(base: str) -> str:
-    """Return a unique name, different in each call: base, host, process id and a random number."""
+    """Return a unique name, different in each call, from ``base``, the host, the process id and a random number."""
     host = re.sub(r"[^A-Za-z0-9_]", "_", socket.gethostname())
     number = int.from_bytes(os.urandom(8), "big") >> 1
     return f"{base}_{host}_{os.getpid()}_{number}"
@@ -113,7 +113,7 @@ class Arguments(NamedTuple):
     wrong: list[str]
 
     def resolved_remappings(self, node_name: str) -> dict[str, str]:
-        """Return the remappings with both the old and the new name resolved to global names."""
+        """Return the remappings with old and new names resolved to global names."""
         return {resolve(a, node_name): resolve(b, node_name) for a, b in self.remappings.items()}
 
 
@@ -144,7 +144,7 @@ def parse_arguments(argv: Sequence[str] | Iterable[str]) -> Arguments:
 
 
 def parse_launch_arguments(words: Iterable[str]) -> dict[str, str]:
-    """Return a dict of the launch-file arguments ``name:=value`` among ``words``.
+    """Parse the launch-file arguments ``name:=value`` among ``words`` into a dict.
 
     As in roslaunch, spaces around a value are stripped, and an argument with an empty value keeps its default;
     special names (``__ns``) and private parameters (``_name``) are not arguments.

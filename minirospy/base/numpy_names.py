@@ -14,7 +14,7 @@ _REMOVED = {
     "ptp": ("2", "numpy.ptp(a)"),
     "tostring": ("2.3", "a.tobytes()"),
 }
-"""A dict from array method to the version of numpy that removed it and the replacement."""
+"""Dict from array method to (version of numpy that removed it, replacement)."""
 
 
 def add_numpy_note(error: BaseException) -> None:

@@ -31,7 +31,7 @@ OPEN_FLAGS = (
 
 
 def open_file(path: Path, flags: int, mode: int = 0o666) -> int:
-    """Open ``path`` as os.open does (in binary mode), and return the file descriptor.
+    """Open ``path`` like os.open, in binary mode, and return the file descriptor.
 
     Raise OSError if it cannot be opened, if it is a symbolic link, or if it is neither a device nor a regular file with a
     single hard link. With O_TRUNC the file is truncated only after these checks.
@@ -70,7 +70,7 @@ def open_text(path: Path, mode: str) -> IO[str]:
 
 
 def create_file(path: Path, mode: int = 0o600) -> int:
-    """Create ``path`` for writing, replacing any file with that name; return the descriptor. Raise OSError if that fails."""
+    """Create ``path`` for writing, replacing any file with that name. Return the descriptor. Raise OSError if that fails."""
     remove_file(path)
     return open_file(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
 
@@ -91,7 +91,7 @@ def replace_file(source: str | os.PathLike[str], target: str | os.PathLike[str])
 
 
 def remove_file(path: Path) -> None:
-    """Remove ``path``, if it exists; on Windows, retry while another process has it open. Raise OSError if that fails."""
+    """Remove ``path`` if it exists. On Windows, retry while another process has it open. Raise OSError if that fails."""
     _until_closed(lambda: path.unlink(missing_ok=True))
 
 

@@ -1,4 +1,4 @@
-"""Make ROS 1's Python packages importable if ROS 2 is sourced, whose std_msgs, tf2_ros, ... are first on PYTHONPATH.
+"""Make ROS 1's Python packages importable if ROS 2 is sourced, which puts its std_msgs, tf2_ros, ... first on PYTHONPATH.
 
 `import rospy` and the commands call :func:`prefer_ros1` before the process imports ROS 1 messages. The bridge to
 ROS 2 does not call it, because its process needs ROS 2's packages.
@@ -42,7 +42,7 @@ _GENERATED = re.compile(rb"^from [\w.]+\.(?:msg|srv|action)\._\w+ import ", re.M
 """Matches msg/__init__.py as rosidl generates it; ROS 1 generates `from ._Name import *`."""
 _INDEX = os.path.join("share", "ament_index", "resource_index", "packages")
 _MAX_PARENTS = (
-    # number of folders from a package up to the prefix: prefix/local/lib/python3.12/dist-packages/std_msgs
+    # number of folders from a package up to its prefix: prefix/local/lib/python3.12/dist-packages/std_msgs
     5
 )
 

@@ -17,7 +17,7 @@ __all__ = ["find_packages_named_like_scripts"]
 
 
 def find_packages_named_like_scripts() -> None:
-    """Let imports find packages that are hidden by files in the program's folder. Idempotent.
+    """Make imports find packages that are hidden by files in the program's folder. Idempotent.
 
     No effect if Python does not search the program's folder.
     """

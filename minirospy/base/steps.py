@@ -46,12 +46,12 @@ def finish(steps: Steps[_T]) -> _T:
 
 
 def is_small(value: object, most: int = SMALL_ITEMS) -> bool:
-    """Return whether an XML-RPC value has at most about ``most`` items; a long string counts as many items."""
+    """Return whether an XML-RPC value has at most about ``most`` items. A long string counts as many items."""
     return _left(value, most) >= 0
 
 
 def _left(value: object, left: int) -> int:
-    """Return ``left`` minus the number of items in ``value``; negative if there are more items than ``left``."""
+    """Return ``left`` minus the number of items in ``value``, which may be negative."""
     if isinstance(value, (str, bytes)):
         return left - 1 - len(value) // _LETTERS_PER_ITEM
     if not isinstance(value, (list, tuple, dict)):

@@ -12,9 +12,9 @@ __all__ = ["did_you_mean", "nearest"]
 
 
 def nearest(name: str, known: Iterable[str]) -> list[str]:
-    """Return up to three of the ``known`` names that are similar to ``name``."""
+    """Return up to three names in ``known`` that are similar to ``name``."""
     if not isinstance(name, str):
-        # Programs may pass a value that is not a string; no name is similar to it.
+        # Programs may pass a value that is not a string. No name is similar to it.
         return []
     names = sorted(set(known))
     # The most common mistake is to omit the package or namespace.
@@ -29,7 +29,7 @@ _STEM = 4  # minimum length, in letters, of a prefix for which completions are s
 
 
 def did_you_mean(word: str, known: Iterable[str], most: int = 2, *, only_slips: bool = False) -> str:
-    """Return text that suggests up to ``most`` of the ``known`` words that are similar to an unknown word, or "".
+    """Return text that suggests up to ``most`` of the ``known`` words, similar to an unknown word, or "".
 
     ``only_slips``: suggest only words with one or two missing, wrong or extra letters.
     """
@@ -38,7 +38,7 @@ def did_you_mean(word: str, known: Iterable[str], most: int = 2, *, only_slips: 
 
 
 def _similar(word: str, known: Iterable[str], cutoff: float) -> list[str]:
-    """Return the names with a similarity of at least ``cutoff``, by difflib's ratio, the most similar first.
+    """Return the names whose similarity (difflib's ratio) is at least ``cutoff``, the most similar first.
 
     Names are compared part by part, so that a common long namespace, file extension or option dashes do not count as
     similarity.
@@ -63,7 +63,7 @@ def _similar(word: str, known: Iterable[str], cutoff: float) -> list[str]:
 
 
 def _parts_of(name: str) -> list[str]:
-    """Return the parts of a name to compare, without a file extension or an option's dashes."""
+    """Return the parts of a name that are compared: without a file extension or an option's dashes."""
     stem, dot, _ = name.rpartition(".")
     return [part for part in (stem if dot else name).lstrip("-").lower().split("/") if part]
 

@@ -20,7 +20,7 @@ class TVal:
     __slots__ = ["secs", "nsecs"]  # noqa: RUF023 - genpy's order
 
     def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
-        """Create the value; ``secs`` may be a float if ``nsecs`` is 0.
+        """Create a time or duration. ``secs`` may be a float if ``nsecs`` is 0.
 
         Raise ValueError or TypeError if an argument is invalid.
         """
@@ -42,7 +42,7 @@ class TVal:
         return cls(*_split(float_secs))
 
     def is_zero(self) -> bool:
-        """Return whether the value is zero."""
+        """Return whether the time or duration is zero."""
         return not (self.secs or self.nsecs)
 
     def set(self, secs: int, nsecs: int) -> None:
@@ -61,7 +61,7 @@ class TVal:
         return self.secs + self.nsecs / 1e9
 
     def to_nsec(self) -> int:
-        """Return the nanoseconds."""
+        """Return the time or duration in nanoseconds."""
         secs, nsecs = self.secs, self.nsecs
         if type(secs) is int and type(nsecs) is int:
             return secs * _BILLION + nsecs
@@ -118,7 +118,7 @@ class Time(TVal):
             raise TypeError("time values must be positive")
 
     def to_time(self) -> float:
-        """Return the seconds as a float, as ``time.time()`` does; the same as ``to_sec``."""
+        """Return the seconds as a float, like ``time.time()``. The same as ``to_sec``."""
         return self.to_sec()
 
     def __add__(self, other: Duration) -> Time:
@@ -251,7 +251,7 @@ Time.__slots__ = Duration.__slots__ = TVal.__slots__
 
 
 def _split(seconds: float) -> tuple[int, int]:
-    """Return whole seconds, and the remaining nanoseconds, which are truncated and not rounded, as in genpy."""
+    """Split into whole seconds and the remaining nanoseconds, which are truncated, not rounded, as in genpy."""
     whole = int(seconds)
     return whole, int(float(seconds - whole) * 1e9)
 

@@ -17,7 +17,7 @@ _STYLE = (
 
 
 class Edge(NamedTuple):
-    """An arrow from a parent to its child; the lines in ``label`` are drawn beside it."""
+    """An arrow from a parent to its child. The lines of ``label`` are drawn next to it."""
 
     parent: str
     child: str
@@ -27,7 +27,7 @@ class Edge(NamedTuple):
 def tree_svg(
     edges: Sequence[Edge], title: str, *, alone: Iterable[str] = (), round_: Iterable[str] = ()
 ) -> str:
-    """Return a drawing of one or several trees, with the roots at the top.
+    """Return an SVG drawing of one or several trees, with the roots at the top.
 
     ``alone``: nodes without an edge. ``round_``: nodes drawn as ellipses. A node with several parents is drawn once, below
     the first one.
@@ -43,7 +43,7 @@ def tree_svg(
 
     drawing = _Drawing(children, frozenset(round_))
     right = float(_GAP_X)
-    # Draw the roots first; nodes that remain after that are part of a cycle.
+    # Draw the roots first. Nodes that remain afterwards are part of a cycle.
     for name in [*(name for name in children if name not in below), *children]:
         if name not in drawing.places:
             right = drawing.place(name, right)

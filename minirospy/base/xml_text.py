@@ -22,7 +22,7 @@ _MAX_ELEMENTS = 1_000_000
 
 
 class XmlError(MinirospyError):
-    """The text is rejected; ``line`` is the line of the error, or 0 if unknown, and ``why`` is the reason."""
+    """The text is rejected. ``line`` is the line of the error, or 0 if unknown; ``why`` is the reason."""
 
     def __init__(self, line: int, why: str) -> None:
         super().__init__(line, why)
@@ -57,7 +57,7 @@ class XmlElement:
 
 
 def new_parser() -> expat.XMLParserType:
-    """Return a parser that rejects declarations that may expand (Parse raises XmlError), and delivers text in large pieces."""
+    """Return a parser that rejects declarations that may expand (Parse raises XmlError). It delivers text in large pieces."""
     parser = expat.ParserCreate()
     parser.buffer_text = True
 
@@ -111,7 +111,7 @@ def parse_xml(text: str | bytes) -> XmlElement:
 
 
 def check_xml(text: str | bytes) -> None:
-    """Raise XmlError if :func:`parse_xml` rejects the text; call this before a library parses the text.
+    """Raise XmlError if :func:`parse_xml` would reject the text. Call this before a library parses the text.
 
     Text that is not XML is accepted here, because callers expect the error that the library then raises.
     """

@@ -63,7 +63,7 @@ def load(text: str, loader: Loader) -> Any:
 
 
 def load_all(text: str, loader: Loader) -> Iterator[Any]:
-    """Parse YAML text as :func:`load` does; yield the value of each document.
+    """Like :func:`load`, but yield the value of each document in the text.
 
     Raise yaml.YAMLError if the text is invalid, TypeError if it is not a string.
     """
@@ -86,7 +86,7 @@ def load_all(text: str, loader: Loader) -> Iterator[Any]:
 
 
 def _require_text(text: object) -> None:
-    """Raise TypeError if a value is not a string, which is an error in the program and not in the text."""
+    """Raise TypeError if a value is not a string, which is an error in the program, not in the text."""
     if not isinstance(text, str | bytes):
         raise TypeError(f"YAML is a text, not {type(text).__name__}")
 

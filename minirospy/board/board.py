@@ -85,7 +85,7 @@ class Board:
 
     @property
     def person(self) -> Position | None:
-        """The position of the person in front of the scanner, in metres ahead and to the left, or None if there is no person."""
+        """The person's position in front of the scanner, in metres ahead and to the left, or None if there is no person."""
         return self._link.person
 
     def move_person(self, position: Position | None) -> None:

@@ -78,7 +78,7 @@ class BoardDirectory:
 
     @property
     def address_path(self) -> Path:
-        """The path of the file in which a TCP server stores "port token". Only this user may read it."""
+        """The path of the file that a TCP server stores "port token" in. Only this user may read it."""
         return self.folder / f"{self.name}.address"
 
     @property
@@ -88,12 +88,12 @@ class BoardDirectory:
 
     @property
     def state_path(self) -> Path:
-        """The path of the file in which the last server saved the board's state."""
+        """The path of the file that contains the board's state, as the last server saved it."""
         return self.folder / f"{self.name}.pins"
 
     @property
     def log_path(self) -> Path:
-        """The path of the log file to which a server writes the error that ended it."""
+        """The path of the log file for the error that ended a server."""
         return self.folder / f"{self.name}.log"
 
 

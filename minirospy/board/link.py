@@ -65,7 +65,7 @@ folder.
 
 
 class Edge(NamedTuple):
-    """Pin ``pin`` (BCM) changed to ``level`` at ``time`` (Unix seconds)."""
+    """Pin ``pin`` (BCM) changed to ``level`` at ``time``, in Unix seconds."""
 
     pin: int
     level: int
@@ -269,7 +269,7 @@ class _Connection:
 
 
 def _reach(directory: BoardDirectory, given_up: Callable[[], bool]) -> _Connection:
-    """Connect to the board's server; start one if none responds."""
+    """Connect to the board's server. Start one if none responds."""
     directory.prepare()
     deadline = time.monotonic() + START_PATIENCE
     process: subprocess.Popen[bytes] | None = None

@@ -37,7 +37,7 @@ PINS = 54  # number of pins on the chip, in BCM numbering: 0 to 53
 LEDS = {2: "green", 3: "green", 4: "yellow", 5: "yellow", 6: "red", 7: "red"}
 
 BUTTONS = (11, 12)
-"""BCM pins of the wired buttons: a resistor pulls them to 0, pressing a button drives its pin to 1."""
+"""BCM pins of the wired buttons. A resistor pulls each pin to 0; pressing the button drives it to 1."""
 
 
 class Function(IntEnum):

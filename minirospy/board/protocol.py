@@ -156,7 +156,7 @@ def encode_board(pins: list[Pin], person: Position | None) -> bytes:
 
 
 def decode_board(block: bytes) -> tuple[list[Pin], Position | None]:
-    """Return the pins and the person serialized by :func:`encode_board`. Raise ProtocolError if the block is invalid."""
+    """Parse the pins and the person serialized by :func:`encode_board`. Raise ProtocolError if the block is invalid."""
     messages = list(Stream().feed(block))
     if len(messages) != 1 or not isinstance(messages[0], Welcome) or messages[0].version != VERSION:
         raise ProtocolError("not a saved board")

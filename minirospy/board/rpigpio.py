@@ -167,7 +167,7 @@ class Gpio:
             self._set_up(one, direction, pull_up_down, level)
 
     def output(self, channel: int | Sequence[int], value: int | bool | Sequence[int | bool]) -> None:
-        """Set output channels; a single value applies to all of them."""
+        """Set output channels. A single value applies to all of them."""
         try:
             # Try the usual case first: one channel, one value.
             pin = self._writable[channel]  # type: ignore[index]
@@ -188,7 +188,7 @@ class Gpio:
             raise RuntimeError("You must setup() the GPIO channel first") from None
 
     def gpio_function(self, channel: int) -> int:
-        """Return the pin's current function: IN or OUT."""
+        """Return the current function of the channel's pin: IN or OUT."""
         pin = self._pin(channel)
         return int(self._linked().states[pin].function)
 

@@ -87,7 +87,7 @@ class Room:
         self._walls = [_nearest_wall(_angle(beam), walls) for beam in range(BEAMS)]
 
     def scan(self, noise: float = NOISE) -> Scan:
-        """Return a scan of the room."""
+        """Simulate one scan of the room."""
         ranges, intensities, reflectors = [], [], []
         gauss = self._noise.gauss
         person = self._person_ranges()

@@ -40,7 +40,7 @@ from minirospy.board.protocol import (
 
 __all__ = ["main"]
 
-LINGER = 1.5  # seconds for which a board without clients waits for the next client
+LINGER = 1.5  # seconds that a board without clients waits for the next client
 
 SAVE_AFTER = 0.05
 """Delay in seconds before a change is saved, so that a fast-blinking LED causes at most 20 writes a second."""
@@ -58,7 +58,7 @@ def main(argv: list[str]) -> int:
         # On Windows, do not keep the log file open as on other systems, because neither the file nor its folder could
         # then be removed.
         sys.stderr = _LogOnDemand(directory.log_path)
-    # A board that already has saved state is not temporary, even if another process starts it again.
+    # A board with saved state is not temporary, even if another process starts it again.
     is_temporary = bool(os.environ.get("MINIROSPY_BOARD_TEMPORARY")) and not directory.state_path.exists()
     with _locked(directory) as owned:
         if owned:
@@ -107,7 +107,7 @@ class _Server:
             await self._abandoned.wait()
         finally:
             server.close()
-            # A client may have the address file open, so that it cannot be removed; the next server replaces it.
+            # A client may have the address file open, which prevents its removal. The next server replaces it.
             with contextlib.suppress(OSError):
                 private_files.remove_file(address)
             for client in list(self._clients):
@@ -144,7 +144,7 @@ class _Server:
         return Done(request.number)
 
     def _apply(self, operation: Operation | MovePerson) -> list[Message]:
-        """Apply an operation and return the messages for all clients. Raise OperationError if the operation is invalid."""
+        """Apply an operation and return the messages to send to all clients. Raise OperationError if the operation is invalid."""
         if isinstance(operation, MovePerson):
             return [PersonMoved(operation.position)] if self._model.move_person(operation.position) else []
         now = time.time()

@@ -17,7 +17,7 @@ class Output(Protocol):
     """The output channels' interface for a wave."""
 
     def write(self, pin: int, level: int) -> None:
-        """Set the level of a pin."""
+        """Set the level at a pin."""
 
     def register_wave(self, wave: Wave) -> None:
         """Record that a wave uses its pin."""

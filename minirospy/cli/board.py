@@ -1,4 +1,4 @@
-"""`minirospy board`: a picture of the virtual board, and commands for its buttons, pins and the simulated person."""
+"""`minirospy board`: draws the virtual board, and has commands for its buttons, pins and the simulated person."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["FAMILY", "Picture", "main", "render"]
 
 _STEP = 0.05
-"""The person's step per key press in metres; it is also the width of a map cell, and half a cell's height."""
+"""The person's step per key press, in metres. It is also the width of a map cell, and half a cell's height."""
 
 _MAP_AHEAD, _MAP_ASIDE = 0.8, 0.6  # range of the map in metres, ahead and to each side
 
@@ -101,7 +101,7 @@ class Picture:
 
 
 def _map(person: Position, ascii_only: bool) -> list[Text]:
-    """Return a map of the floor in front of the scanner, seen from above: the scanner's two fields and the person."""
+    """Return a map of the floor in front of the scanner, seen from above. Shows the scanner's two fields and the person."""
     from rich.text import Text
 
     body = Circle(*person)
@@ -134,7 +134,7 @@ def _where(person: Position) -> str:
 
 
 def render(state: BoardState) -> Picture:
-    """Return the rich renderable of ``state``."""
+    """Return a rich renderable that draws ``state``."""
     return Picture(state)
 
 
@@ -166,7 +166,7 @@ def _show() -> int:
 
 @contextlib.contextmanager
 def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
-    """Yield a function that draws over the previous drawing, or below it if the cursor cannot move back (TERM=dumb)."""
+    """Yield a function that draws over the previous drawing, or below it if the terminal cannot move the cursor (TERM=dumb)."""
     from rich.live import Live
 
     if console.is_dumb_terminal:
@@ -177,7 +177,7 @@ def _drawing(console: Console) -> Iterator[Callable[[RenderableType], None]]:
 
 
 def _act(board: Board, key: str) -> None:
-    """Perform the action of a key on the board."""
+    """Perform the action bound to a key on the board."""
     if key.isdecimal() and 1 <= int(key) <= len(BUTTONS):
         pin = BUTTONS[int(key) - 1]
         (board.release if board.get(pin) else board.press)(pin)

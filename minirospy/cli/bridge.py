@@ -19,7 +19,7 @@ __all__ = ["COMMAND", "main"]
 
 
 class BridgeArguments(NamedTuple):
-    """The command line of `minirospy bridge`."""
+    """The parsed command line of `minirospy bridge`."""
 
     port: int | None
     rosbridge_port: int | None
@@ -263,7 +263,7 @@ def _check_range(name: str, value: int, low: int, high: int) -> None:
 
 
 def _given_token(option: str, given: str | None, variable: str) -> str:
-    """Return the token from an option, else from a variable, or "" if there is none."""
+    """Return the token from an option, else from an environment variable, or "" if neither is set."""
     if given is None:
         return os.environ.get(variable, "")
     if not given:

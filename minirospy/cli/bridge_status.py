@@ -24,11 +24,11 @@ class _Token(NamedTuple):
 
 
 class _NoBridgeError(BridgeError):
-    """No bridge responds at a port."""
+    """No bridge responds on a port."""
 
 
 def show_status(ports: Sequence[int], token: str, *, as_json: bool) -> int:
-    """Print the status of the local bridges at these ports; return the exit status.
+    """Print the status of the local bridges on these ports; return the exit status.
 
     Raise BridgeError if no bridge responds, or one refuses access.
     """
@@ -92,7 +92,7 @@ def _token(given: str) -> _Token:
 
 
 def _fetch(port: int, token: _Token) -> _Json:
-    """Return the JSON of a bridge's status page."""
+    """Return the JSON from a bridge's status page."""
     import http.client
     import ssl
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["COMMANDS", "DASHBOARD", "dashboard"]
 
-Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the link to the view
+Fields = Mapping[str, Sequence[str]]  # a view's settings, as in the view's link
 
 
 def dashboard(argv: Sequence[str] | None = None) -> int:
@@ -147,8 +147,8 @@ def _window(
 ) -> Command:
     """Return the command that opens an rqt window.
 
-    ``what`` describes the window; ``add_arguments`` adds the command's arguments, and ``chosen`` converts these to the
-    view and its settings.
+    ``what`` describes the window. ``add_arguments`` adds the command's arguments; ``chosen`` converts them to the view
+    and its settings.
     """
 
     def make_parser() -> Parser:
@@ -379,7 +379,7 @@ def _serve(
 
 
 def _tokens(home: Path, *, must_be_kept: bool) -> Tokens:
-    """Return this user's tokens. If they cannot be stored in ROS_HOME, return new ones, unless ``must_be_kept`` is set.
+    """Return this user's tokens. Unless ``must_be_kept`` is set, return new ones if they cannot be stored in ROS_HOME.
 
     Even on loopback, the page needs the token to start programs and open files, because other users of the machine can
     connect.
@@ -431,7 +431,7 @@ def _announce(
 
 
 def _open_browser(link: Callable[..., str], token: str, codes: Codes) -> bool:
-    """Open the browser with a one-time code instead of the token; return whether there is a browser. Runs on the loop."""
+    """Open the browser with a one-time code instead of the token. Return whether there is a browser. Runs on the loop."""
     import asyncio
 
     from minirospy.web.dashboard.browser import open_link
@@ -469,4 +469,4 @@ COMMANDS = {
     else _window(window.command, window.view, window.what, *_ARGUMENTS.get(window.command, ()))
     for window in WINDOWS
 }
-"""The commands of rqt and rviz, by name."""
+"""The commands of rqt and rviz, keyed by name."""

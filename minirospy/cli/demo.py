@@ -29,7 +29,7 @@ __all__ = ["COMMAND", "main"]
 
 BUTTON, LED = 11, 7
 _HOLD_SECONDS, _REST_SECONDS = 0.85, 0.65
-"""Seconds for which the button is pressed and then released.
+"""Seconds for which the button is held and then left released.
 
 Each is between two of the node's ten polls per second, so that the LED reacts after its typical delay.
 """
@@ -85,7 +85,7 @@ def _demo(presses: int | None) -> int:
 
 
 def _is_dumb() -> bool:
-    """Return whether the output is a terminal that cannot move the cursor back, as in an editor."""
+    """Return whether the output is a terminal that cannot move the cursor back, such as an editor's."""
     from rich.console import Console
 
     return Console().is_dumb_terminal
@@ -172,14 +172,14 @@ def _wait_until_ready(board: Board, launch: subprocess.Popen[bytes], log: Path) 
 
 
 def _follow(board: Board, level: int) -> float | None:
-    """Press or release the button; return the seconds until the LED followed, or None if it did not."""
+    """Press or release the button. Return the seconds until the LED followed, or None if it did not."""
     start = time.monotonic()
     (board.press if level else board.release)(BUTTON)
     return None if _wait_for(board, level, _FOLLOW_SECONDS) is None else time.monotonic() - start
 
 
 def _wait_for(board: Board, level: int, timeout: float) -> int | None:
-    """Wait until the LED has ``level``, and return the level; return None after ``timeout`` seconds."""
+    """Wait until the LED has ``level`` and return the level, or None after ``timeout`` seconds."""
     watch = board.watch([LED], timeout=timeout)
     if board.get(LED) == level:
         return level
@@ -199,7 +199,7 @@ def _rest(board: Board, launch: subprocess.Popen[bytes], show: _Lines | _Picture
 
 
 class _Lines:
-    """Prints one line per press, for outputs that are not a terminal or cannot be redrawn."""
+    """Prints one line per press, for an output that is not a terminal or cannot be redrawn."""
 
     def __enter__(self) -> None:
         print("\n".join(_WAY), flush=True)

@@ -1,4 +1,4 @@
-"""`minirospy VERB`: every command under one name; a verb's module is imported when the verb is used."""
+"""`minirospy VERB`: every command under one name. A verb's module is imported when the verb is used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`minirospy python FILE`: run a program with the Python in which minirospy is installed.
+"""`minirospy python FILE`: run a program with the Python that has minirospy installed.
 
 This is needed if minirospy has a separate environment (`pipx install minirospy`, `uv tool install minirospy`), because
 `python` is then a different Python.

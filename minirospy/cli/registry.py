@@ -1,4 +1,4 @@
-"""A table of all commands, from which the console scripts, `minirospy VERB` and completion are generated.
+"""A table of all commands. The console scripts, `minirospy VERB` and completion are generated from it.
 
 The build creates the console scripts (hatch_build.py); `python tools/commands.py` writes the lists for the shells and for the
 conda recipe.
@@ -38,16 +38,16 @@ class Entry(NamedTuple):
 
     @property
     def target(self) -> str:
-        """The console script's function in the syntax of an entry point."""
+        """The console script's function, in the syntax of an entry point."""
         return f"minirospy.{self.module}:{self.function}"
 
     def load_main(self) -> Callable[[Sequence[str] | None], int]:
-        """Import the module; return the function that runs the command."""
+        """Import the module and return the function that runs the command."""
         main: Callable[[Sequence[str] | None], int] = getattr(self._load_module(), self.function)
         return main
 
     def load_grammar(self) -> Command | Family | None:
-        """Import the module; return the Command or Family that it defines, or None if it defines only a function."""
+        """Import the module and return the Command or Family that it defines, or None if it defines only a function."""
         grammar: Command | Family | None = (
             getattr(self._load_module(), self.grammar) if self.grammar else None
         )
@@ -132,7 +132,7 @@ SHELL_FUNCTIONS = {
 
 
 def console_scripts() -> dict[str, str]:
-    """Return the console scripts and their functions, for ``project.scripts`` in the project's metadata."""
+    """Return a dict from console script to function, for ``project.scripts`` in the project's metadata."""
     return {entry.script: entry.target for entry in COMMANDS if entry.script}
 
 

@@ -97,7 +97,7 @@ def view_of_plugin(plugin: str) -> str:
 
 
 def write_packages(folder: Path) -> list[str]:
-    """Write the ROS package for each window below a folder; return the packages' names."""
+    """Write each window's ROS package below a folder; return the packages' names."""
     from xml.sax.saxutils import escape
 
     names = []

@@ -179,7 +179,7 @@ def on_shutdown(h: Callable[[], object]) -> None:
 def signal_shutdown(reason: object) -> None:
     """Shut the node down; the hooks run in this thread."""
     current_session().lifecycle.signal_shutdown(reason)
-    # Do not notify the calling thread again: anything that it does from now on is clean-up, and may sleep.
+    # Do not notify the calling thread again: anything it does from now on is clean-up, which may sleep.
     current_session().poll_shutdown()
 
 
@@ -197,7 +197,7 @@ def get_namespace() -> str:
 
 
 def get_node_uri() -> str | None:
-    """Return the URI of this node's Slave API; None before init_node."""
+    """Return the URI of this node's Slave API, or None before init_node."""
     node = current_session().node
     return node.uri if node else None
 

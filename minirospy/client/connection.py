@@ -1,4 +1,4 @@
-"""A topic's links, as programs read them from ``impl.connections``, with the attributes of rospy's transports.
+"""A topic's links, as programs read them from ``impl.connections``. They have the attributes of rospy's transports.
 
 Source: http://docs.ros.org/en/noetic/api/rospy/html/rospy.impl.transport-module.html (class Transport).
 """
@@ -41,7 +41,7 @@ class Connection(NamedTuple):
     done: bool = False
 
     def get_transport_info(self) -> str:
-        """Return the link's description, as getBusInfo in the Slave API returns it."""
+        """Return the link's description in the format of getBusInfo in the Slave API."""
         return connection_text(self.link)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Report what an interrupted process is still waiting for, and suppress the tracebacks of the interrupt."""
+"""Report what an interrupted process is still waiting for, and suppress the interrupt's tracebacks."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def suppress_tracebacks(is_expected: Callable[[BaseException], bool]) -> None:
 
 
 def _place(frame: FrameType | None) -> str:
-    """Return file:line of the innermost frame in the program's own code, or "" if there is none."""
+    """Return the file:line of the innermost frame in the program's own code, or "" if there is none."""
     libraries = (os.path.dirname(os.__file__), os.path.dirname(os.path.dirname(__file__)), "<frozen")
     while frame is not None and frame.f_code.co_filename.startswith(libraries):
         frame = frame.f_back

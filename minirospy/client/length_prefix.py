@@ -37,7 +37,7 @@ def deserialize_messages(
     max_msgs: int | None = None,
     start: int = 0,
 ) -> None:
-    """Move the complete messages in ``b``, from ``start`` to its position, to ``msg_queue``.
+    """Move the complete messages between ``start`` and the position of ``b`` to ``msg_queue``.
 
     Move at most ``max_msgs``; keep only the newest ``queue_size``. An incomplete message is moved to the
     front of ``b``. Raise DeserializationError if a message is invalid.

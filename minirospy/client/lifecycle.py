@@ -1,4 +1,4 @@
-"""The lifecycle of a node: its hooks, its shutdown, and the threads that have been notified of it.
+"""The lifecycle of a node: its hooks, its shutdown, and the threads notified of the shutdown.
 
 Source: http://wiki.ros.org/rospy/Overview/Initialization%20and%20Shutdown.
 """
@@ -209,7 +209,7 @@ class Lifecycle:
                     self._run(hooks.pop(0))
             with self._lock:
                 if not self.hooks and not self.late_hooks:
-                    # From now on a newly added hook is called immediately.
+                    # From now on, newly added hooks are called immediately.
                     self.shutting_down.set()
 
     def _run(self, hook: Callable[[], object]) -> None:

@@ -139,7 +139,7 @@ def _log_function(level: int, name: str) -> LogFunction:
 
 
 class _CallSites:
-    """Records when each call site last logged, and which message.
+    """Records the time and text of each call site's last message.
 
     A call site is one call expression, even if it calls several functions.
     """
@@ -158,7 +158,7 @@ class _CallSites:
         return True
 
     def is_due(self, frame: FrameType, period: float | times.Duration) -> bool:
-        """Return whether the call site at ``frame`` last logged at least ``period`` seconds ago."""
+        """Return whether the call site at ``frame`` last logged more than ``period`` seconds ago."""
         place, now = _place(frame), current_session().clock.now()
         before = self._times.get(place)
         pause = period.to_nsec() if isinstance(period, times.Duration) else int(period * 1e9)

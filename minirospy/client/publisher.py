@@ -52,7 +52,7 @@ class SubscribeListener:
         """Handle a new subscriber. ``topic_publish`` publishes to all subscribers, ``peer_publish`` only to the new one."""
 
     def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
-        """Handle the disconnection of a subscriber; ``num_peers`` remain."""
+        """Handle the disconnection of a subscriber. ``num_peers`` remain."""
 
 
 class Publisher(Topic[_M_co]):
@@ -186,8 +186,8 @@ class PublishedTopic(SharedTopic):
         with self._session.lock:
             if self._registered or not self._handles or not self._session.node or self._session.is_shutdown():
                 return
-            # Set this before registering, because a subscriber may connect immediately, and a publish() before the
-            # master's response must work too.
+            # Set this before registering, because a subscriber may connect immediately, and publish() must also work
+            # before the master's response.
             self._registered = True
             wait = self._session.start(self._session.node.advertise(self.publication))
         register_with_master("publication", self.publication.topic, wait)

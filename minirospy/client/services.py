@@ -277,7 +277,7 @@ class ServiceProxy(Generic[_S_co]):
         return self.call(*args, **kwds)
 
     def call(self, *args: object, **kwds: object) -> Any:
-        """Call the service, like calling the proxy itself."""
+        """Call the service; the same as calling the proxy itself."""
         request = args_kwds_to_message(self.request_class, args, kwds)
         if not hasattr(type(request), "_type"):
             raise TypeError("request object is not a valid request message instance")
@@ -585,7 +585,7 @@ def wait_for_service(service: str, timeout: float | Duration | None = None) -> N
             _log.warning("wait_for_service(%s): %s", name, why)
             reported.add(why)
         elif not reported and time.monotonic() - start > _SILENT_SECONDS:
-            # rospy logs nothing here, so a misspelled name would go unnoticed.
+            # rospy logs nothing here, so users would not notice a misspelled name.
             _log.info("wait_for_service(%s): %s, waiting...", name, why)
             reported.add(why)
         pause = _POLL_SECONDS if end is None else min(_POLL_SECONDS, max(0.0, end - time.monotonic()))

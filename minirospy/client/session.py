@@ -68,7 +68,7 @@ class Session:
         self.parameter_listeners: list[Callable[[str, object], object]] = (
             previous.parameter_listeners if previous else []
         )
-        """Functions to call with the name and value of each parameter that the master reports as changed."""
+        """Functions to call with the name and the value of each parameter that the master reports as changed."""
         self.on_replaced: list[Callable[[], object]] = previous.on_replaced if previous else []
         """Functions to call in the next init_node; each one removes something that this session installed in the process."""
         # The arguments of init_node; None before it is called
@@ -291,7 +291,7 @@ class Session:
             raise self.lifecycle.interrupted("rospy shutdown") from error
 
     def _on_shutdown_request(self, reason: str) -> None:
-        """Shut down because another process requested it; like rospy, print the reason."""
+        """Shut down at another process's request. Like rospy, print the reason."""
         # The terminal may have been closed.
         with contextlib.suppress(OSError, ValueError):
             print(

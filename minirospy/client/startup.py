@@ -169,7 +169,7 @@ def _is_interrupt(error: BaseException) -> bool:
 
 
 def _wait_for_master(session: Session) -> None:
-    """Wait until the master responds; print a message once if it does not.
+    """Wait until the master responds. Print a message once if it does not respond.
 
     Raise ROSInterruptException if the node shuts down.
     """

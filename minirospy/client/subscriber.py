@@ -98,7 +98,7 @@ class Subscriber(Topic[_M_co]):
             state.replay(data_class, _Callback(callback, callback_args), links)
 
     def unregister(self) -> None:
-        """Stop receiving; the topic's last Subscriber in this process also closes the connections."""
+        """Stop receiving. The topic's last Subscriber in this process also closes the connections."""
         super().unregister()
         self.callback = self.callback_args = None
 
@@ -331,8 +331,8 @@ class SubscribedTopic(SharedTopic):
             self._deliver(frame, link.header, receivers)
             newest = link.latched
             if newest is not None and newest is not frame:
-                # A newer message has arrived in the meantime, and may have been delivered before this older one:
-                # deliver the newer one again, so that it is the last.
+                # A newer message has arrived in the meantime, and may have been delivered before this older one.
+                # Deliver it again, so that it comes last.
                 self._deliver(newest, link.header, receivers)
 
     def _handle_with(self, callback: _Callback) -> Subscriber[Message]:

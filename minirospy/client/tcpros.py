@@ -1,4 +1,4 @@
-"""A TCPROS connection that a program makes itself: the classes of rospy.impl.tcpros_base and tcpros_service.
+"""TCPROS connections that programs make themselves: the classes of rospy.impl.tcpros_base and tcpros_service.
 
 minirospy's own connections are in ``runtime/`` and do not use these classes. Source: http://wiki.ros.org/ROS/TCPROS, and
 the behaviour of rospy.impl.
@@ -84,12 +84,12 @@ class TCPROSTransportProtocol:
         deserialize_messages(b, msg_queue, self.recv_data_class, queue_size=self.queue_size)
 
     def get_header_fields(self) -> dict[str, str]:
-        """Return the fields for the connection header."""
+        """Return the fields of the connection header to send."""
         return {}
 
 
 class TCPROSServiceClient(TCPROSTransportProtocol):
-    """A client's side of a connection to a service."""
+    """The client's side of a connection to a service."""
 
     def __init__(
         self,
@@ -103,7 +103,7 @@ class TCPROSServiceClient(TCPROSTransportProtocol):
         self.headers = headers or {}
 
     def get_header_fields(self) -> dict[str, str]:
-        """Return the fields for the connection header."""
+        """Return the fields of the connection header to send."""
         return {
             "service": self.resolved_name,
             "md5sum": self.service_class._md5sum,
@@ -132,14 +132,14 @@ class TCPROSServiceClient(TCPROSTransportProtocol):
 
 
 class TCPService(TCPROSTransportProtocol):
-    """A server's side of a connection to a service."""
+    """The server's side of a connection to a service."""
 
     def __init__(self, resolved_name: str, service_class: Any, buff_size: int = DEFAULT_BUFF_SIZE) -> None:
         super().__init__(resolved_name, service_class._request_class, buff_size=buff_size)
         self.service_class = service_class
 
     def get_header_fields(self) -> dict[str, str]:
-        """Return the fields for the connection header."""
+        """Return the fields of the connection header to send."""
         return {
             "service": self.resolved_name,
             "type": self.service_class._type,
@@ -159,7 +159,7 @@ class Transport:
         self.id = next(_numbers)
         self.done = False  # set by close()
         self.cleanup_cb: Callable[[Any], object] | None = None
-        # The connection's other end: the peer's URI, and the addresses of the socket
+        # The peer: its URI, and the addresses at both ends of the socket
         self.endpoint_id = ""
         self.local_endpoint: Any = (0, 0)
         self.remote_endpoint: Any = (0, 0)
@@ -208,7 +208,7 @@ class DeadTransport(Transport):
 
 
 class ProtocolHandler:
-    """The base class of a transport's handler."""
+    """The base class of handlers for a transport."""
 
     def shutdown(self) -> None:
         """Stop; a subclass overrides this."""
@@ -218,7 +218,7 @@ class ProtocolHandler:
         raise Exception("interface impl")
 
     def supports(self, protocol: str) -> bool:
-        """Return whether a protocol is supported."""
+        """Return whether ``protocol`` is supported."""
         return False
 
     def get_supported(self) -> list[Any]:

@@ -71,7 +71,7 @@ class Time(times.Time):
 
     @classmethod
     def from_seconds(cls, float_secs: float) -> Time:
-        """Return the time at ``float_secs`` seconds. An older name for ``from_sec``."""
+        """Return the time at ``float_secs`` seconds. This is an older name for ``from_sec``."""
         return cls.from_sec(float_secs)
 
 
@@ -247,7 +247,7 @@ class Timer(threading.Thread):
                 try:
                     self._callback(TimerEvent(last_expected, last_real, expected, real, last_duration))
                 except SystemExit as error:
-                    # threading reports all other exceptions in a thread; rospy's timer stops without a message.
+                    # threading reports all other exceptions in a thread, but rospy's timer stops without a message.
                     _log.error("Timer ends: its callback %s called sys.exit(%s)", self._callback, error)
                     return
                 except BaseException as error:

@@ -20,7 +20,7 @@ from minirospy.command.verbs import Family
 
 __all__ = ["Raised", "call_verb"]
 
-_MAIN_ADDS = "ERROR: "  # the prefix that the main functions of ROS print before the text of an exception
+_MAIN_ADDS = "ERROR: "  # the prefix that the main functions of ROS print before an exception's text
 _NO_NETWORK = (
     "Network communication failed"  # the message that the main functions of ROS print for a socket error
 )
@@ -34,7 +34,7 @@ class Raised(NamedTuple):
 
 
 def call_verb(family: Family, words: Sequence[str], raised: Raised) -> int | None:
-    """Run a command line without the command's name; return the status of its verb.
+    """Run a command line, given without the command's name; return its verb's status.
 
     Raise one of the exceptions in ``raised`` if the verb fails, or ConnectionRefusedError if ROS's function does not
     catch the socket error. Exit after a usage error, and after an error that ROS's function prints itself.

@@ -82,7 +82,7 @@ class RosText(NamedTuple):
 
 
 class WordedError(MinirospyError):
-    """An error whose ROS message depends on the command as well as on the error; ``ros``, printed first, is that message."""
+    """An error whose ROS message depends on the command as well as on the error. ``ros`` is that message; it is printed first."""
 
     def __init__(self, error: Exception, ros: RosText) -> None:
         super().__init__(str(error))
@@ -98,7 +98,7 @@ NO_MASTER = RosText(f"ERROR: {MasterUnreachableError.ros_text}")
 
 
 def ros_words(error: Exception, wording: Wording) -> RosText:
-    """Return ROS's message for an error; its text is empty if ROS has no message."""
+    """Return ROS's message for an error. The text is empty if ROS has no message."""
     if isinstance(error, CommandLineError):
         return RosText(error.ros_text, 2)
     if isinstance(error, WordedError):
@@ -116,7 +116,7 @@ def ros_words(error: Exception, wording: Wording) -> RosText:
 
 
 _WITH_ROS2 = ("minirospy", "minirospy ros2-bridge")
-"""Commands whose process may need ROS 2's packages; `minirospy VERB` runs the command for that verb."""
+"""Commands whose process may need ROS 2's packages. `minirospy VERB` runs the command for that verb."""
 
 
 def run(
@@ -157,7 +157,7 @@ def run(
         _flush()
         return 0
     except OSError as error:
-        # The cause may be a full disk or a missing permission: print the file's name and the system's message.
+        # The cause may be a full disk or missing permissions: print the file's name and the system's message.
         why = error.strerror or str(error)
         return complain(name, MinirospyError(f"{error.filename}: {why}" if error.filename else why))
     except KeyboardInterrupt:
@@ -225,7 +225,7 @@ def _open_streams() -> None:
 
 
 def warn(what: str, name: str = "") -> None:
-    """Print one line on stderr after flushing stdout; if ``name`` is not a legal name, add the reason."""
+    """Print one line on stderr after flushing stdout. If ``name`` is not a legal name, add the reason."""
     from minirospy.introspect.graph import why_illegal
 
     why = why_illegal(name) if name else ""
@@ -241,7 +241,7 @@ def warn_unpublished(graph: Graph, topic: str) -> None:
 
 
 def warn_no_subscribers(topic: str, subscribed: Iterable[str]) -> None:
-    """Warn that ``topic`` has no subscribers if ``subscribed`` contains a name that is almost equal.
+    """Warn that ``topic`` has no subscribers if ``subscribed`` contains a nearly identical name.
 
     A publisher may start before its subscribers, so only a likely typo is reported. If /robot1/scan has subscribers,
     /robot2/scan is not a typo.
@@ -264,7 +264,7 @@ def hint_near(name: str, known: Iterable[str]) -> None:
 
 @contextlib.contextmanager
 def tool_node(tool: str, arguments: Arguments | None = None, *, ros_time: bool = False) -> Iterator[ToolNode]:
-    """Yield the node for a command that listens or publishes; unregister the node even if `kill` ends the command.
+    """Yield the node for a command that listens or publishes. Unregister it even if `kill` ends the command.
 
     ``arguments``: the arguments that a launch file passes to nodes, such as `__name:=`, `__ns:=`, `__master:=`.
     """
@@ -313,7 +313,7 @@ def _has_terminal() -> bool:
 
 
 def _flush() -> None:
-    """Flush stdout. If that fails, discard the output, so that the interpreter's own flush at exit does not fail too."""
+    """Flush stdout. If that fails, discard the output, so that the interpreter's own flush at exit does not fail as well."""
     try:
         sys.stdout.flush()
     except OSError:

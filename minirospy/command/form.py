@@ -42,7 +42,7 @@ def ask_for(
     complain: Callable[[Exception], None],
     known: Collection[str] = (),
 ) -> _M:
-    """Prompt the user for each field of ``message``, and return the filled message; empty input keeps a field's value.
+    """Prompt the user for each field of ``message``, and return the filled message. Empty input keeps a field's value.
 
     Skip the top-level fields in ``known``.
 
@@ -68,7 +68,7 @@ def ask_for(
 
 
 def flow(value: object) -> str:
-    """Return a value as YAML on one line."""
+    """Format a value as YAML on one line."""
     if isinstance(value, bool):
         return str(value)
     if isinstance(value, bytes | list | tuple):
@@ -86,14 +86,14 @@ def _question(field: Field) -> str:
 
 
 def _value(field: Field, answer: str) -> object:
-    """Parse the user's input; a string needs no quotes."""
+    """Parse the user's input for a field. A string needs no quotes."""
     if field.type == "string" and answer[0] not in "'\"":
         return answer
     return parse_value(answer)
 
 
 def _nested(path: str, value: object) -> object:
-    """Return a value as nested dictionaries: ``a.b`` becomes {a: {b: value}}."""
+    """Nest a value in dictionaries: the path ``a.b`` gives {a: {b: value}}."""
     for name in reversed(path.split(".")):
         value = {name: value}
     return value

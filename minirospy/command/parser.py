@@ -118,7 +118,7 @@ class Parser(argparse.ArgumentParser):
         self.register("action", "accepted", _Accepted)
 
     def add_argument(self, *names: str, completer: str = "", **kwargs: Any) -> argparse.Action:
-        """Add an argument as argparse does.
+        """Add an argument, like argparse's method.
 
         ``completer`` is the name of a function of minirospy.cli.completion.completers, which is imported only for tab
         completion.
@@ -151,7 +151,7 @@ class Parser(argparse.ArgumentParser):
         return group
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, to pass to the command's function.
+        """Return a dict from argument name to value, to pass to the command's function.
 
         Raise CommandLineError if they are invalid.
         """
@@ -167,7 +167,7 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_intermixed_args(args, namespace)
 
     def error(self, message: str, ros: str = "") -> NoReturn:
-        """Raise CommandLineError with ``message``; ``ros`` is ROS's message if that differs."""
+        """Raise CommandLineError with ``message``. ``ros`` is ROS's message if it differs."""
         ros_text = ""
         if self._ros_argparse:
             ros_text = f"{self.format_usage()}{self._ros_argparse}: error: {ros or _without_hint(message)}"
@@ -233,7 +233,7 @@ class Parser(argparse.ArgumentParser):
     # --- help in optparse's form
 
     def _ros_argparse_help(self) -> str:
-        """Return the help as argparse prints it, with ROS's text above the arguments and minirospy's text at the end."""
+        """Return help formatted like argparse's, with ROS's text above the arguments and minirospy's text at the end."""
         own, self.description = self.description, self._about
         try:
             return super().format_help() + ("\n" + _filled(own) if own else "")
@@ -265,21 +265,24 @@ class Parser(argparse.ArgumentParser):
 
 
 class AssignmentParser(Parser):
-    """A parser that accepts NAME:=VALUE between the other arguments, as roslaunch does."""
+    """A parser that, like roslaunch's, accepts NAME:=VALUE between the other arguments."""
 
     def parse(self, words: Sequence[str]) -> dict[str, object]:
-        """Return the arguments by name, with the assignments as ``args``. Raise CommandLineError if they are invalid."""
+        """Return a dict from argument name to value, with the assignments as ``args``.
+
+        Raise CommandLineError if they are invalid.
+        """
         plain, assigned = split_assignments(words)
         return {**super().parse(plain), "args": assigned}
 
 
 def split_assignments(words: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Return the other arguments, and a dict of the assigned values; drop special names such as __ns, which nodes read."""
+    """Return the other arguments, and a dict of the assigned values. Drops special names such as __ns, which nodes read."""
     return [word for word in words if ":=" not in word], names.parse_launch_arguments(words)
 
 
 def integer(name: str) -> Callable[[str], int]:
-    """Return a function that parses an integer; ``name`` is the value's name in ROS's error."""
+    """Return a function that parses an integer. ``name`` is the value's name in ROS's error."""
 
     def read(text: str) -> int:
         try:
@@ -291,7 +294,7 @@ def integer(name: str) -> Callable[[str], int]:
 
 
 def attach_completer(action: argparse.Action, completer: str) -> None:
-    """Set an argument's completer by name; see :meth:`Parser.add_argument`."""
+    """Attach a completer, given by name, to an argument; see :meth:`Parser.add_argument`."""
     setattr(action, _COMPLETER, completer)
 
 

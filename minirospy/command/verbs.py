@@ -39,7 +39,7 @@ class Command(NamedTuple):
     misuse_status: int = 2
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """Run the command; return the exit status as :func:`minirospy.command.command.run` does."""
+        """Run the command; return the exit status from :func:`minirospy.command.command.run`."""
         words = sys.argv[1:] if argv is None else argv
         return run(self.name, lambda: self._run(words), self.interrupted, self.wording)
 
@@ -53,7 +53,7 @@ class Command(NamedTuple):
 
 
 class Verb(NamedTuple):
-    """A verb in a family: its name, one line of help, its parser, and the function that is called with the parsed arguments.
+    """A verb in a family: its name, one line of help, its parser, and the function to call with the parsed arguments.
 
     Without a line of help, the family's help does not list the verb. In a family that is a node, the function also takes
     ``arguments``, the remapping arguments. ``wording`` contains ROS's messages for this verb's errors.
@@ -79,7 +79,7 @@ def deferred_verb(name: str, summary: str, module: str, attribute: str = "VERB")
 def with_options(
     options: Callable[..., _Options], body: Callable[[_Options], int | None]
 ) -> Callable[..., int | None]:
-    """Return a function that takes a parser's arguments by name and calls ``body`` with a record that contains them.
+    """Return a function that takes a parser's arguments as keywords, and passes them to ``body`` in a single record.
 
     ``options`` is the record's class, whose fields have the names of the parser's arguments: a NamedTuple, because
     importing dataclasses takes longer than a command runs.
@@ -102,7 +102,7 @@ class HelpStatus(NamedTuple):
 
 
 class Family(NamedTuple):
-    """A command and its verbs. ``headline`` describes the command, ``footer`` refers to further help.
+    """A command and its verbs. ``headline`` describes the command; ``footer`` points to further help.
 
     A verb may be a family itself. ``is_node``: launch files start the command as a node (`<node pkg="rostopic"
     type="rostopic" args="pub ..."/>`), with `__name:=` and remappings among its arguments. ``interrupted``: the exit
@@ -122,7 +122,7 @@ class Family(NamedTuple):
     shows_help_on_error: bool = False
 
     def main(self, argv: Sequence[str] | None = None) -> int:
-        """Run the chosen verb; return the exit status as :func:`minirospy.command.command.run` does."""
+        """Run the chosen verb; return the exit status from :func:`minirospy.command.command.run`."""
         words = list(sys.argv[1:] if argv is None else argv)
         return run(self.name, lambda: self._dispatch(words), self.interrupted, self.wording)
 

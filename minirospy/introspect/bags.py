@@ -56,7 +56,7 @@ _WHOLE_NAMESPACE = {"eval", "exec", "locals", "vars", "globals", "dir"}
 
 @contextlib.contextmanager
 def open_reader(path: str) -> Iterator[BagReader]:
-    """Yield a reader of a bag or an MCAP file. Raise BagError if the file is invalid, OSError if it cannot be read."""
+    """Yield a reader for a bag or an MCAP file. Raise BagError if the file is invalid, OSError if it cannot be read."""
     with open(path, "rb") as stream, contextlib.closing(open_bag_or_mcap(stream)) as reader:
         yield reader
 
@@ -283,7 +283,7 @@ def check_bag_name(path: str) -> None:
 
 @contextlib.contextmanager
 def new_bag(path: str, compression: str) -> Iterator[BagWriter]:
-    """Yield a writer of a new bag; chunks are compressed in parallel. After an error or Ctrl-C the file is a valid bag.
+    """Yield a writer for a new bag. Chunks are compressed in parallel. After an error or Ctrl-C the file is a valid bag.
 
     Raise UsageError before writing if the name has an MCAP file's extension.
     """

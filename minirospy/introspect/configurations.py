@@ -1,4 +1,4 @@
-"""Parameter files of dynparam and rqt_reconfigure: YAML in which ROS stores the values as a tagged Python object."""
+"""Parameter files of dynparam and rqt_reconfigure: YAML that contains the values as a tagged Python object."""
 
 from __future__ import annotations
 

@@ -154,7 +154,7 @@ def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
     """Return ``value`` with placeholders for strings or arrays; ``type_`` is its ROS type, or "" if unknown.
 
     As in ROS, arrays of messages are not elided, the placeholder of a fixed-length array contains the length, as in ``[3``,
-    and the values of a field in all elements of an array are treated as one value of the field's type.
+    and a field's values from all elements of an array are treated as a single value of the field's type.
     """
     if type_ == "string" and isinstance(value, list):
         return value if strings else f"<string length: {len(value)}>"
@@ -173,8 +173,7 @@ def elided(value: object, type_: str, strings: bool, arrays: bool) -> object:
         name: elided(getattr(value, name), slot_type, strings, arrays)
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)
     }
-    # A placeholder is a string regardless of the field's type, and how a field is printed depends on its declared
-    # type.
+    # A placeholder is a string, whatever the field's type, but a field is printed according to its declared type.
     types = tuple(
         "string" if isinstance(fields[name], str) else slot_type
         for name, slot_type in zip(cls.__slots__, cls._slot_types, strict=True)

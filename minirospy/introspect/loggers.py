@@ -1,4 +1,4 @@
-"""A node's loggers and their levels, queried from the node.
+"""A node's loggers and their levels, as the node reports them.
 
 Source: http://wiki.ros.org/rosconsole (the services get_loggers and set_logger_level of each node).
 """
@@ -22,7 +22,7 @@ __all__ = ["logger_level", "logger_levels", "set_logger_level"]
 
 
 def logger_levels(graph: Graph, node: str) -> dict[str, str]:
-    """Return a dict from logger to level (lower case) for a node; ``node`` is a global name.
+    """Return a dict from logger to level (lower case) for the node with the global name ``node``.
 
     Raise NotFoundError if the node does not exist, NodeUnreachableError if it does not respond, or MinirospyError if it
     has no logger services.

@@ -44,7 +44,7 @@ class Received(NamedTuple):
 
 
 class MessageClasses:
-    """Message classes for received messages; each class is looked up or generated once."""
+    """Message classes for received messages. Each class is looked up or generated once."""
 
     def __init__(self) -> None:
         self._classes: dict[tuple[str, str], type[Message]] = {}

@@ -93,7 +93,7 @@ class NodeQueries(Generic[_Key, _Found]):
         self.tasks.clear()
 
     async def _query_once(self, key: _Key) -> bool:
-        """Query the node for one key; return True if there is a result and the key is still present."""
+        """Query the node for one key. Return True if there is a result and the key is still present."""
         started = asyncio.get_running_loop().time()
         try:
             found = await asyncio.wait_for(self._query(key), QUERY_SECONDS)

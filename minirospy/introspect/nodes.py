@@ -73,14 +73,14 @@ class NodeDetail(NamedTuple):
 
 
 class Connections(NamedTuple):
-    """The connections that a node reports."""
+    """The connections that a node reports: its process id and its links."""
 
     pid: int
     links: list[BusConnection]
 
 
 class Neighbours(NamedTuple):
-    """The nodes from which a node receives messages, and those to which it sends, according to the master."""
+    """The nodes that a node receives messages from, and those that it sends to, according to the master."""
 
     senders: list[str]
     receivers: list[str]

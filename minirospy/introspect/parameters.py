@@ -1,4 +1,4 @@
-"""Values on the parameter server: read, set, delete, load from YAML and dump as YAML.
+"""Parameters on the parameter server: read, set and delete them, load them from YAML, and dump them as YAML.
 
 Source: http://wiki.ros.org/rosparam, http://wiki.ros.org/ROS/Parameter%20Server%20API.
 """
@@ -51,7 +51,7 @@ def list_parameters(graph: Graph, namespace: str = "/") -> list[str]:
 
 
 def get_parameter(graph: Graph, name: str) -> object:
-    """Return the value of a parameter (global name), or a dictionary for a namespace.
+    """Return a parameter's value, or a dictionary for a namespace. ``name`` is a global name.
 
     Raise NotFoundError if it is not set.
     """
@@ -62,7 +62,7 @@ def get_parameter(graph: Graph, name: str) -> object:
 
 
 def set_parameter(graph: Graph, name: str, value: object) -> list[tuple[str, object]]:
-    """Set a parameter; a dictionary sets each of its entries and leaves other entries unchanged, as rosparam does.
+    """Set a parameter. As in rosparam, a dictionary sets each of its entries and leaves other entries unchanged.
 
     Return the individual parameters that were set. Raise ValueTextError if a value cannot be stored as a parameter.
     """
@@ -88,7 +88,7 @@ def delete_parameter(graph: Graph, name: str) -> None:
 
 
 def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFile]:
-    """Parse a parameter file named ``where``; return its documents, to be set below ``namespace`` (global).
+    """Parse a parameter file named ``where``. Return its documents, to be set below the global name ``namespace``.
 
     Raise ValueTextError if the file is not YAML, or has unnamed values at the root.
     """
@@ -108,13 +108,13 @@ def parse_parameters(text: str, where: str, namespace: str) -> list[ParameterFil
 
 
 def dump_parameters(values: object) -> str:
-    """Return ``values`` as the YAML text of a parameter file."""
+    """Dump ``values`` as the YAML text of a parameter file."""
     text = format_value(values)
     return text if text.endswith("\n") else text + "\n"
 
 
 def flatten(name: str, value: object) -> Iterator[tuple[str, object]]:
-    """Yield each individual parameter at or below ``name`` with its value, in the order of the values."""
+    """Yield (name, value) for each individual parameter at or below ``name``, in the order of the values."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from flatten(_join(name, str(key)), inner)

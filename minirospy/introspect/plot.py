@@ -18,7 +18,7 @@ class _Cell(NamedTuple):
 
 
 def plot_header(value: object, *, strings: bool = True, arrays: bool = True) -> str:
-    """Return the line of column names for messages like ``value``."""
+    """Return the header line, with the column names for messages like ``value``."""
     return "%time," + ",".join(cell.name for cell in _cells("field", value, strings, arrays, 0))
 
 
@@ -52,7 +52,7 @@ def _cells(name: str, value: object, strings: bool, arrays: bool, origin: int) -
     else:
         for field in getattr(value, "__slots__", ()):
             inner = getattr(value, field)
-            # As in ROS, fields of messages are left out, but not the value that the path itself selects.
+            # As in ROS, fields that are messages are left out, but not the value that the path itself selects.
             if (strings and arrays) or not _is_left_out(inner, strings, arrays):
                 yield from _cells(f"{name}.{field}", inner, strings, arrays, origin)
 

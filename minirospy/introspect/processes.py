@@ -1,4 +1,4 @@
-"""CPU and memory use of local processes, as rqt_top shows them for nodes."""
+"""Measures the CPU and memory use of local processes, which rqt_top shows for nodes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ProcessLoads:
         self.known: dict[int, psutil.Process] = {}
 
     def look(self, pids: Iterable[int]) -> dict[int, ProcessLoad]:
-        """Return the loads by process id, omitting processes that have exited or that this user may not inspect."""
+        """Return a dict from process id to load, without processes that have exited or that this user may not inspect."""
         before, self.known = self.known, {}
         found = {}
         for pid in set(pids):

@@ -19,7 +19,7 @@ _NO_BYTES = '!!binary ""'  # the value of an empty uint8[], which is a byte stri
 def prototype(
     spec: MessageSpec, catalogue: Catalogue, *, without: Collection[str] = (), empty_arrays: bool = False
 ) -> str:
-    """Return a message of default values as YAML, as `rosmsg-proto` writes it, for the user to edit and publish.
+    """Return a message of default values as `rosmsg-proto`'s YAML, for the user to edit and publish.
 
     A variable-length array has one element, as an example, or none with ``empty_arrays``. ``without``: names of fields to
     leave out, including those of inner messages.
@@ -34,7 +34,7 @@ class _Defaults(NamedTuple):
     empty_arrays: bool
 
     def of(self, spec: MessageSpec) -> dict[str, object]:
-        """Return the default values of a message type's fields."""
+        """Return a dict of the default values of a message type's fields."""
         fields = (field for field in spec.fields if field.name not in self.without)
         return {field.name: self._value(field.type) for field in fields}
 
@@ -65,7 +65,7 @@ class _Yaml:
         self._tight = False
 
     def lines(self, value: object) -> list[str]:
-        """Return the lines of a value, with nested values indented."""
+        """Return the YAML lines for a value, with nested values indented."""
         inner = list(value.values() if isinstance(value, dict) else value if isinstance(value, list) else ())
         if isinstance(value, dict) and max(len(inner), *map(_length, inner), 0) >= _WIDE:
             self._tight = True
@@ -95,10 +95,10 @@ def _flow(value: object) -> str:
 
 
 def _wrapped(line: str) -> str:
-    """Wrap a line that is too wide as YAML libraries do: before the first word that starts after the last column."""
+    """Wrap a line that is too wide, as YAML libraries do: before the first word that starts after the last column."""
     if len(line) <= _COLUMNS:
         return line
-    # A dash before a key counts as indentation; a dash before a brace does not.
+    # A dash before a key counts as indentation, but a dash before a brace does not.
     start = re.match(r" *(?:- (?=\w))?", line)
     indent = start.end() if start else 0
     column, depth, text = 0, 0, []

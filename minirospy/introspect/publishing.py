@@ -1,4 +1,4 @@
-"""Convert YAML values from arguments, a file or a stream to messages and publish them at a rate, as `rostopic pub` does.
+"""Convert YAML values from arguments, a file or a stream to messages, and publish them at a rate: `rostopic pub`.
 
 Source: http://wiki.ros.org/rostopic#rostopic_pub.
 """
@@ -23,7 +23,7 @@ __all__ = ["publish_all", "values_to_publish"]
 def values_to_publish(
     fields: Sequence[str], arguments: Sequence[str], file: str | None
 ) -> Iterator[list[object]]:
-    """Yield the YAML values of each message that has ``fields``; there is at least one message.
+    """Yield each message's YAML values; there is at least one message. ``fields`` are a message's field names.
 
     ``arguments`` are the values of one message. If there are none, the values are read from a file, or from standard input as
     data arrives. Raise UsageError if there are no values, NotFoundError if the file does not exist, or ValueTextError if the

@@ -30,7 +30,7 @@ _NOTHING = "no new messages"
 
 
 class Spread(NamedTuple):
-    """Mean, minimum, maximum and standard deviation of a series of times in seconds, and the number of messages."""
+    """Statistics of times in seconds: mean, minimum, maximum, standard deviation, and the number of messages."""
 
     mean: float
     min: float
@@ -40,12 +40,12 @@ class Spread(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Return the rate in Hz, assuming that the times are the periods between messages."""
+        """Return the rate in Hz; the times must be the periods between messages."""
         return 1.0 / self.mean if self.mean > 0 else 0.0
 
 
 class Bandwidth(NamedTuple):
-    """Bytes per second, and the sizes of the messages."""
+    """The bandwidth in bytes per second, and statistics of the message sizes."""
 
     rate: float
     mean: float
@@ -55,7 +55,7 @@ class Bandwidth(NamedTuple):
 
 
 class RateWindow:
-    """Measures the periods between the newest messages (at most ``size`` of them; 0 for no limit)."""
+    """Measures the periods between the newest ``size`` messages (0: no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._pauses: deque[float] = deque(maxlen=max(1, (size or UNBOUNDED) - 1))
@@ -82,7 +82,7 @@ class RateWindow:
 
 
 class BandwidthWindow:
-    """Measures the sizes of the newest messages (at most ``size`` of them)."""
+    """Measures the sizes of the newest ``size`` messages."""
 
     def __init__(self, size: int = 0) -> None:
         self._messages: deque[tuple[float, int]] = deque(maxlen=size or 100)
@@ -103,7 +103,7 @@ class BandwidthWindow:
 
 
 class DelayWindow:
-    """Measures the delays between the newest messages' stamps and arrivals (at most ``size`` of them; 0 for no limit)."""
+    """Measures the delay from stamp to arrival, for the newest ``size`` messages (0: no limit)."""
 
     def __init__(self, size: int = 0) -> None:
         self._delays: deque[float] = deque(maxlen=size or UNBOUNDED)
@@ -111,7 +111,7 @@ class DelayWindow:
         self._reported = 0
 
     def add(self, time: float, stamp: float) -> None:
-        """Record a message whose stamp is ``stamp``."""
+        """Record a message with the stamp ``stamp`` that arrived at ``time``."""
         self._arrived += 1
         self._delays.append(time - stamp)
 
@@ -124,7 +124,7 @@ class DelayWindow:
 
 
 def rate_text(reports: Mapping[str, Spread | None]) -> str:
-    """Return the text that `rostopic hz` prints once a second: two lines for one topic, a table for several."""
+    """Return the text that `rostopic hz` prints once a second: two lines for a single topic, a table for several."""
     if len(reports) == 1:
         (report,) = reports.values()
         return f"average rate: {report.rate:.3f}\n\t{_extremes(report)}" if report else _NOTHING
@@ -142,7 +142,7 @@ def delay_text(report: Spread | None) -> str:
 
 
 def bandwidth_text(reports: Mapping[str, Bandwidth | None]) -> str:
-    """Return the text that `rostopic bw` prints once a second: two lines for one topic, a table for several, "" for none."""
+    """Return the text that `rostopic bw` prints once a second: two lines for a single topic, a table for several, "" for none."""
     rows = [
         (
             name,
@@ -183,7 +183,7 @@ def _four_digits(number: float) -> str:
 
 
 def _bytes(number: float, rate: float) -> str:
-    """Format a number of bytes, in the unit that suits the rate."""
+    """Format a number of bytes, in the unit that suits ``rate``."""
     unit, size = ("B", 1.0) if rate < 1e3 else ("KB", 1e3) if rate < 1e6 else ("MB", 1e6)
     return f"{number / size:.2f}{unit}"
 

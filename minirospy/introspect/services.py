@@ -47,7 +47,7 @@ _ANY = "*"
 
 
 class ServiceNode(NamedTuple):
-    """A service and the nodes that provide it; the last one registered receives the calls."""
+    """A service and the nodes that provide it. The last one registered receives the calls."""
 
     name: str
     nodes: tuple[str, ...]
@@ -61,7 +61,7 @@ class ServiceOffer(NamedTuple):
 
 
 def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
-    """Return the services at or below ``namespace`` with their nodes, sorted by name."""
+    """Return the services at or below ``namespace`` and their nodes, sorted by service name."""
     state = graph.state()
     return [
         ServiceNode(name, tuple(state.services[name]))
@@ -71,7 +71,7 @@ def list_services(graph: Graph, namespace: str = "/") -> list[ServiceNode]:
 
 
 def service_uri(graph: Graph, service: str) -> str:
-    """Return the URI of a service (``rosrpc://host:port``). Raise NotFoundError if the service does not exist."""
+    """Return a service's URI (``rosrpc://host:port``). Raise NotFoundError if the service does not exist."""
     try:
         return graph.master.lookup_service(service)
     except RpcRefused:
@@ -95,7 +95,7 @@ def service_offer(graph: Graph, service: str) -> ServiceOffer:
 
 
 def service_arguments(type_: str) -> list[str]:
-    """Return the field names of a service type's request. Raise NotFoundError if the type is not installed."""
+    """Return the names of the request fields of a service type. Raise NotFoundError if the type is not installed."""
     from minirospy.core.idl.load import service_class
 
     return list(service_class(type_)._request_class.__slots__)
@@ -107,7 +107,7 @@ def find_services_of_type(graph: Graph, type_: str) -> list[str]:
 
 
 def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object]) -> None:
-    """Wait until a service is registered and responds; call ``on_waiting`` once if it is not available yet."""
+    """Wait until a service is registered and responds. Call ``on_waiting`` once if the service is not available yet."""
     if _probed_type(graph, service):
         return
     on_waiting()
@@ -116,7 +116,7 @@ def wait_for_service(graph: Graph, service: str, on_waiting: Callable[[], object
 
 
 def fill_request(type_: str, arguments: Sequence[object]) -> Message:
-    """Return a request for a service type, filled from YAML values (one dictionary, or all fields in order).
+    """Create a request for a service type, and fill it from YAML values (one dictionary, or all fields in order).
 
     ``now`` represents the current time, ``auto`` a stamped header. The header's ``seq`` is 1, as in a proxy's first call.
     Raise NotFoundError if the type is not installed, MessageException if the values do not match the fields.
@@ -188,7 +188,7 @@ def _probe(graph: Graph, service: str, uri: str) -> str:
 
 
 def _why(error: Exception) -> str:
-    """Return an error's message without its number (`Connection refused`); for a timeout, return the likely cause."""
+    """Return an error's message without its number (`Connection refused`). For a timeout, return the likely cause."""
     if isinstance(error, TimeoutError):
         return f"timed out; {SUSPENDED}"
     return getattr(error, "strerror", None) or str(error)

@@ -1,4 +1,4 @@
-"""The whole graph at one time, and the difference between two times.
+"""A snapshot of the whole graph, and the difference between two snapshots.
 
 Pure except for :func:`fetch`. Source: http://wiki.ros.org/ROS/Master_API (getSystemState, getTopicTypes).
 """
@@ -18,7 +18,7 @@ _ANY = "*"
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Topics and services with their nodes, in the master's order, and the topics' known types."""
+    """The graph's topics and services with their nodes, in the master's order, and the topics' known types."""
 
     publishers: Table = field(default_factory=dict)
     subscribers: Table = field(default_factory=dict)
@@ -31,7 +31,7 @@ class Snapshot:
         return {*self.publishers, *self.subscribers}
 
     def filtered(self, topic: Callable[[str], bool], service: Callable[[str], bool]) -> Snapshot:
-        """Return the part of the snapshot whose topics and services pass the filters."""
+        """Return the snapshot without the topics and services that the filters reject."""
         return Snapshot(
             {name: nodes for name, nodes in self.publishers.items() if topic(name)},
             {name: nodes for name, nodes in self.subscribers.items() if topic(name)},
@@ -65,7 +65,7 @@ class Changes:
 
 
 def compare(before: Snapshot, after: Snapshot) -> Changes:
-    """Return the difference; a changed type alone does not count."""
+    """Return the difference between two snapshots. A changed type alone does not count."""
     left = before.topics - after.topics
     return Changes(
         _changed(before.publishers, after.publishers, left),
@@ -77,7 +77,7 @@ def compare(before: Snapshot, after: Snapshot) -> Changes:
 
 
 async def fetch(call: Callable[..., Awaitable[Any]]) -> Snapshot:
-    """Return the current graph. ``call(method, *arguments)`` calls the master; its exceptions are passed on."""
+    """Return the current graph. ``call(method, *arguments)`` calls the master; this function passes on its exceptions."""
     state = await call("getSystemState")
     types = await call("getTopicTypes")
     publishers, subscribers, services = (

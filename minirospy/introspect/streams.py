@@ -1,4 +1,4 @@
-"""Nodes with which tools listen and publish; a process may have several of them.
+"""The nodes that tools use to listen and publish. A process may have several of them.
 
 Messages arrive in one worker per connection; :class:`Inbox` passes them to the reading thread, and blocks the workers
 while that thread is busy, so that a slow terminal does not make memory grow.
@@ -47,7 +47,7 @@ On Windows Ctrl-C does not interrupt a wait, so waits there are split into short
 
 
 class ToolNode:
-    """A node named ``name``, or ``<tool>_<pid>_<milliseconds>`` by default; a context manager.
+    """Context manager for a node named ``name``, by default ``<tool>_<pid>_<milliseconds>``.
 
     ``ended`` is set when the node has to stop. ``clock`` is the machine's time or, with ``ros_time`` and if the
     parameter /use_sim_time is set, the time from /clock; ``simulated`` is True in the latter case. Raise
@@ -93,7 +93,7 @@ class ToolNode:
         self._loop.close()
 
     def wait(self, seconds: float) -> bool:
-        """Sleep for ``seconds``, or until the node has to stop; return whether it has to stop.
+        """Sleep for ``seconds``, or until the node has to stop. Return whether it has to stop.
 
         Raise the exception of a function passed to :meth:`measure`, if it raised one.
         """
@@ -133,7 +133,7 @@ class ToolNode:
         self._loop.run(self._node.subscribe(subscription))
 
     def measure(self, topic: str, add: Callable[[Received], object], *, tcp_nodelay: bool = False) -> None:
-        """Call ``add`` in a worker for each message on a topic; if ``add`` raises, :meth:`wait` raises the exception."""
+        """Call ``add`` in a worker for each message on a topic. If ``add`` raises, :meth:`wait` raises the exception."""
 
         def deliver(body: Frame, header: Header) -> None:
             try:
@@ -145,11 +145,11 @@ class ToolNode:
         self.listen(topic, deliver, tcp_nodelay=tcp_nodelay)
 
     def stop(self) -> None:
-        """Make :meth:`wait` return and stop the reading of inboxes."""
+        """Make :meth:`wait` return, and end the reading of all inboxes."""
         self._end()
 
     def inbox(self, topic: str) -> Inbox:
-        """Subscribe to a topic and return its messages, for one reading thread."""
+        """Subscribe to a topic. Return an inbox with its messages, for a single reading thread."""
         inbox = Inbox(self.clock)
         self._on_end.append(inbox.close)
         self.listen(topic, inbox.put)
@@ -191,7 +191,7 @@ class ToolNode:
 
 
 class _Listeners:
-    """The functions to call once for each message on one topic."""
+    """The functions to call with each message on one topic."""
 
     def __init__(self, first: Callable[[Frame, Header], None]) -> None:
         self._functions: tuple[Callable[[Frame, Header], None], ...] = (first,)
@@ -208,7 +208,7 @@ class _Listeners:
             function(body, header)
 
     def deliver(self, body: Frame, header: Header) -> None:
-        """Call all functions with a new message; runs in a worker."""
+        """Call all functions with a new message. Runs in a worker."""
         # A function that is being added gets this message either from here or from add(), but not from both.
         with self._lock:
             functions = self._functions
@@ -285,7 +285,7 @@ class TopicPublisher:
 
 
 def wait_for_topic(graph: Graph, name: str, on_waiting: Callable[[], object]) -> TopicField:
-    """Wait until ``name``, a topic or a path to a topic's field, is published; return the topic and the field.
+    """Wait until ``name``, a topic or a path to a topic's field, is published. Return the topic and the field.
 
     Call ``on_waiting`` once if this has to wait.
     """

@@ -24,7 +24,7 @@ __all__ = ["Edge", "Survey", "describe", "survey", "traffic"]
 
 
 class Edge(NamedTuple):
-    """A topic's connection from the sending node to the receiving node."""
+    """A connection for one topic, from the sending node to the receiving node."""
 
     sender: str
     topic: str
@@ -32,7 +32,7 @@ class Edge(NamedTuple):
 
 
 class Counts(NamedTuple):
-    """Messages and bytes sent over a connection since the connection was opened."""
+    """Messages and bytes sent over a connection since it was opened."""
 
     messages: int
     bytes: int
@@ -42,7 +42,7 @@ class Counts(NamedTuple):
 class Survey:
     """The graph at one time (monotonic seconds).
 
-    ``counts`` is a dict by process, connection and edge; ``loads`` is a dict by node.
+    ``counts`` is keyed by process, connection and edge; ``loads`` is keyed by node.
     """
 
     seconds: float
@@ -54,7 +54,7 @@ class Survey:
 
 
 def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
-    """Query the master and all nodes in parallel; with ``processes``, also measure loads.
+    """Query the master and all nodes in parallel. If ``processes`` is given, also measure the loads.
 
     Raise MasterUnreachableError if no master responds.
     """
@@ -74,7 +74,7 @@ def survey(graph: Graph, processes: ProcessLoads | None = None) -> Survey:
 
 
 def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, float]]:
-    """Return the messages and bytes per second for each edge that exists in both surveys."""
+    """Return a dict from edge to (messages, bytes) per second, for the edges in both surveys."""
     if before is None or after.seconds <= before.seconds:
         return {}
     span = after.seconds - before.seconds
@@ -90,7 +90,7 @@ def traffic(before: Survey | None, after: Survey) -> dict[Edge, tuple[float, flo
 
 
 def describe(now: Survey, before: Survey | None = None) -> dict[str, object]:
-    """Return a survey as values for JSON: ``nodes``, ``traffic``, ``mismatches``.
+    """Convert a survey to values for JSON: ``nodes``, ``traffic``, ``mismatches``.
 
     A row in ``traffic`` is [sender, topic, receiver, Hz, bytes/s].
     """

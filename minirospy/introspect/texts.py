@@ -1,4 +1,4 @@
-"""Format the output of `rosnode info` and `rostopic info`. Pure, except that it looks up addresses in the graph."""
+"""Format the output of `rosnode info` and `rostopic info`. Pure, except for looking up addresses in the graph."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ def node_text(detail: NodeDetail) -> str:
 
 
 def connections_text(graph: Graph, connections: Connections) -> str:
-    """Format the information that a node reports about itself: process id and connections."""
+    """Format a node's report about itself: process id and connections."""
     lines = [f"Pid: {connections.pid}"]
     if connections.links:
         names = {graph.node_uri(node): node for node in list_nodes(graph)}
         lines.append("Connections:")
         for link in connections.links:
             to = link.destination
-            # For an inbound connection, ``to`` is the publisher's URI instead of its name.
+            # For an inbound connection, ``to`` is the publisher's URI, not its name.
             shown = f"{names[to]} ({to})" if to in names else to
             lines += (
                 f" * topic: {link.topic}",
@@ -68,7 +68,7 @@ def topic_text(detail: TopicDetail) -> str:
 
 
 def _direction(direction: str, info: str) -> str:
-    """Return ``outbound (port - host:port) [socket]``; the numbers are from the string that nodes send."""
+    """Return ``outbound (port - host:port) [socket]``. The numbers are taken from the text that nodes send."""
     import re
 
     match = re.match(r"\w+ connection on port (\S+) to \[(\S+) on socket (\d+)\]", info)

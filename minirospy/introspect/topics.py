@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 UNKNOWN_TYPE = "unknown type"
-"""Shown for a topic whose type no node has declared, because it only has subscribers to any type."""
+"""Shown for a topic of unknown type: it only has subscribers to any type, so no node has declared its type."""
 
 _ANY = "*"
 
@@ -44,7 +44,7 @@ class TopicNodes(NamedTuple):
 
 
 class TopicList(NamedTuple):
-    """The topics of a graph with publishers and with subscribers, in the master's order."""
+    """A graph's topics with their publishers, and topics with their subscribers, in the master's order."""
 
     published: list[TopicNodes]
     subscribed: list[TopicNodes]
@@ -81,7 +81,7 @@ def topic_names(
 
 
 def list_topics(graph: Graph, namespace: str = "/") -> TopicList:
-    """Return the topics at or below ``namespace`` with types and nodes."""
+    """Return the topics at or below ``namespace``, with their types and nodes."""
     state = graph.state()
     types = graph.master.get_topic_types()
 
@@ -96,7 +96,7 @@ def list_topics(graph: Graph, namespace: str = "/") -> TopicList:
 
 
 def by_host(graph: Graph, found: TopicList) -> dict[str, TopicList]:
-    """Return a dict from host, sorted, to the topics that the nodes on that host use."""
+    """Return a dict from host, sorted, to the topics used by the nodes on that host."""
     hosts = {
         node: node_host(graph.node_uri(node)) for side in found for topic in side for node in topic.nodes
     }
@@ -110,7 +110,7 @@ def by_host(graph: Graph, found: TopicList) -> dict[str, TopicList]:
 
 
 def topic_detail(graph: Graph, topic: str) -> TopicDetail:
-    """Return the type, publishers and subscribers of a topic. Raise NotFoundError if the topic does not exist."""
+    """Return a topic's type, publishers and subscribers. Raise NotFoundError if the topic does not exist."""
     state = graph.state()
     publishers, subscribers = state.publishers.get(topic, []), state.subscribers.get(topic, [])
     if not publishers and not subscribers:
@@ -124,7 +124,7 @@ def topic_detail(graph: Graph, topic: str) -> TopicDetail:
 
 
 def find_topic(graph: Graph, name: str) -> TopicField | None:
-    """Return the topic for ``name`` (global), which names a topic or a field in its messages: ``/pose/header/stamp``.
+    """Return the topic that the global name ``name`` refers to: the topic itself, or one of its fields (``/pose/header/stamp``).
 
     Return None if the topic does not exist, or its type is not known yet. A topic with the whole name takes precedence over
     a field of a topic with a shorter name.
@@ -157,7 +157,7 @@ def topic_field_type(field: TopicField) -> str:
 
 
 def require_topic(graph: Graph, name: str) -> TopicField:
-    """Return the topic as :func:`find_topic` does, but never None.
+    """Like :func:`find_topic`, but never return None.
 
     Raise NotFoundError if the topic does not exist or its type is not known.
     """

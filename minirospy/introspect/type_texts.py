@@ -49,7 +49,7 @@ def type_of_text(name: str, text: str) -> InterfaceType | None:
 
 
 class TypeTexts:
-    """Message types by topic. Importing a type's module takes milliseconds, so each is imported once, in a worker."""
+    """Message types, keyed by topic. Importing a type's module takes milliseconds, so each one is imported once, in a worker."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -59,7 +59,10 @@ class TypeTexts:
     async def of_publishers(
         self, topics: Mapping[str, tuple[str, ...]], seconds: float
     ) -> dict[str, InterfaceType]:
-        """Query these topics' publishers; return the types that arrive within ``seconds``, because a publisher may stall."""
+        """Query the publishers of these topics.
+
+        Return the types that arrive within ``seconds``, because a publisher may stall.
+        """
         if not topics:
             return {}
         limit = asyncio.Semaphore(_MAX_CONCURRENT)
@@ -79,7 +82,7 @@ class TypeTexts:
         return {topic: found for topic, found in done.items() if found}
 
     async def installed(self, name: str) -> InterfaceType | None:
-        """Return the type, or None if it is not installed."""
+        """Return the message type ``name``, or None if it is not installed."""
         if name in self._installed:
             return self._installed[name]
 
@@ -102,7 +105,7 @@ class TypeTexts:
         return None
 
     async def header_of(self, topic: str, publisher: str) -> Header:
-        """Return a publisher's connection header, by connecting as a subscriber and then disconnecting."""
+        """Connect to a publisher as a subscriber, disconnect, and return the publisher's connection header."""
         uri = await self._node.call_master("lookupNode", publisher)
         answer = await self._rpc.call(uri, "requestTopic", self._node.name, topic, [["TCPROS"]])
         match answer:

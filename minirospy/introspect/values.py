@@ -1,4 +1,4 @@
-"""Convert the YAML that users write and read to parameter values, and back.
+"""Convert parameter values from and to the YAML that users write and read.
 
 Pure. Simple values, which most parameters are, are parsed and formatted without importing a YAML library, because the import
 takes longer than everything else that `rosparam get` does. ``deg(90)`` and ``rad(pi/2)`` are angles in radians.
@@ -61,7 +61,7 @@ def parse_value(text: str) -> object:
         return yaml_text.load(text, _loader())
     except yaml.YAMLError as error:
         if isinstance(error.__cause__, UnicodeEncodeError):
-            # An argument that is not UTF-8 is a usage error, which the command reports.
+            # An argument that is not UTF-8 is a usage error. The command reports it.
             raise error.__cause__ from None
         accepted = _accepted_by_ros(text, error)
         if len(accepted) != 1:
@@ -104,7 +104,7 @@ def _accepted_by_ros(text: str, error: yaml.YAMLError) -> list[object]:
 
 
 def parse_lines(lines: Iterable[str], where: str) -> Iterator[object]:
-    """Yield values as :func:`parse_documents` does, but each one as soon as its document is complete.
+    """Like :func:`parse_documents`, but yield each value as soon as its document is complete.
 
     An example that needs this is `rostopic echo /a | rostopic pub /b TYPE`.
     """
@@ -131,7 +131,7 @@ def message_values(documents: Iterable[object]) -> Iterator[list[object]]:
 
 
 def format_value(value: object) -> str:
-    """Format a value as YAML, as `rosparam get` prints it; the string for a list or dictionary ends with a line feed."""
+    """Format a value as YAML, as `rosparam get` prints it. The text of a list or dictionary ends with a line feed."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -144,7 +144,7 @@ def format_value(value: object) -> str:
 
 
 def format_pretty(value: object, indent: str = "") -> str:
-    """Format a value for people, as `rosparam get -p` prints it: strings are unquoted, so the output may not be valid YAML.
+    """Format a value for people, like `rosparam get -p`. Strings are unquoted, so the output may not be valid YAML.
 
     ``indent`` is put before the entries of a dictionary.
     """

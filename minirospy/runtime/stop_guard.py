@@ -21,7 +21,7 @@ Stop = Callable[[], None]
 
 
 class StopGuard:
-    """Calls each function when its deadline passes. Its thread runs while there are deadlines; all methods are thread-safe."""
+    """Calls each function when its deadline passes. A thread runs as long as there are deadlines; all methods are thread-safe."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         """Create the guard; ``clock`` returns seconds."""
@@ -30,7 +30,7 @@ class StopGuard:
         self.deadlines: dict[Stop, float] = {}
         self.thread: threading.Thread | None = None
         self._next = 0.0
-        # The deadline for which the thread is waiting.
+        # The deadline that the thread is waiting for.
 
     def arm(self, stop: Stop, deadline: float) -> None:
         """Call ``stop`` at ``deadline``, in seconds of the clock. This replaces the previous deadline of ``stop``.

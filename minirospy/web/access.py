@@ -52,7 +52,7 @@ class Grant(Enum):
     READ = "read-only"
     WRITE = "read-write"
     OWN = "read-write, with the token"
-    """The client may also start programs and open files as the server's user, because it has that user's token."""
+    """The client has its user's token, so it may also start programs and open files as the server's user."""
 
 
 class Refusal(NamedTuple):

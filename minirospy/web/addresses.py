@@ -31,7 +31,7 @@ def links(addresses: list[str], port: int, *, encrypted: bool) -> Links:
 
 
 def own_addresses() -> list[str]:
-    """Return this machine's IPv4 addresses that other machines may reach, starting with the default route's address."""
+    """Return this machine's IPv4 addresses that other machines can reach, the default route's address first."""
     import psutil
 
     found: dict[str, None] = {}
@@ -48,13 +48,13 @@ def own_addresses() -> list[str]:
 
 
 def host_names() -> list[str]:
-    """Return the names by which other machines may reach this machine: its host name and its mDNS name."""
+    """Return the names that other machines may use to reach this machine: its host name and its mDNS name."""
     name = socket.gethostname()
     return [name, f"{name.partition('.')[0]}.local"]
 
 
 def qr_code(text: str) -> str:
-    """Return a QR code for a terminal, or "" if the library segno is missing."""
+    """Return a QR code for a terminal, or "" if the segno library is missing."""
     try:
         import segno
     except ImportError:

@@ -94,8 +94,7 @@ class SharedTopic:
         """Call ``listener`` with the last message of each latched publisher, then with each new message."""
         if self._subscription is None:
             self._subscription = self._graph.node.subscribe_raw(self.topic, self._deliver)
-        # If the topic is just being unsubscribed, its connections still exist and do not deliver latched messages
-        # again.
+        # If the topic is being unsubscribed, its connections still exist and do not deliver latched messages again.
         self._forget_disconnected()
         for arrival in list(self._latched.values()):
             listener(Arrival(arrival.body, arrival.header, self._graph.now()))
@@ -259,7 +258,7 @@ class SharedGraph:
     # --- graph
 
     def watch(self, listener: GraphListener) -> None:
-        """Call ``listener`` with each graph change. The first change that the first listener receives is the whole graph."""
+        """Call ``listener`` with each graph change. The first change passed to the first listener is the whole graph."""
         self._listeners.append(listener)
         if self._watching is None:
             self.snapshot = Snapshot()
@@ -382,7 +381,7 @@ class SharedGraph:
         return Publication(self, topic, shared)
 
     def left_publisher(self, topic: str, shared: _SharedPublisher) -> None:
-        """Unadvertise a topic after the last client that published it has left."""
+        """Unadvertise a topic after the last client that publishes it has left."""
         shared.clients -= 1
         if not shared.clients and self.publishers.get(topic) is shared:
             del self.publishers[topic]
@@ -414,6 +413,6 @@ class SharedGraph:
         task = asyncio.ensure_future(guarded())
         self.tasks.add(task)
         task.add_done_callback(self.tasks.discard)
-        # A task that is cancelled before its first step has not started the coroutine, so close the coroutine.
+        # A task that is cancelled before its first step has not started its coroutine, so close the coroutine.
         task.add_done_callback(lambda _: work.close())
         return task

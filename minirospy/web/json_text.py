@@ -69,7 +69,8 @@ def width_of(text: str) -> int:
     if text.isascii():
         return 1
     if len(text) == 1:
-        # Do not use the size of a single-character string, because Python 3.12 and later also store its UTF-8 copy.
+        # Do not use sys.getsizeof() of a single-character string, because from Python 3.12 on it includes the
+        # string's UTF-8 copy.
         return 1 if ord(text) <= 0xFF else 2 if ord(text) <= 0xFFFF else 4
     # For longer strings, such a UTF-8 copy can only make this value too large.
     found = (sys.getsizeof(text) - _HEAD_SIZE) // (len(text) + 1)
@@ -80,7 +81,7 @@ def is_quick_text(text: str) -> bool:
     """Return whether a string can be parsed in a few milliseconds."""
     if len(text) <= MAX_QUICK_CHARACTERS:
         return True
-    # Brackets and commas in strings are counted too. This is harmless, because a large base64 string contains none.
+    # Brackets and commas in strings count as well. This is harmless, because a large base64 string contains none.
     return len(text) <= MAX_QUICK_STRINGS and sum(map(text.count, ",[{")) <= MAX_QUICK_VALUES
 
 
@@ -95,7 +96,7 @@ def load_json(
 
 
 def load_json_in_pieces(text: str) -> object:
-    """Parse JSON as :func:`load_json` does, but without holding the GIL for long.
+    """Like :func:`load_json`, but without holding the GIL for long.
 
     Use it in a thread alongside the event loop.
     """
@@ -176,7 +177,7 @@ def _numbers(text: str, start: int, end: int) -> list[object]:
 
 
 def dump_json(value: object) -> str:
-    """Return a value as compact JSON. Raise ValueError for NaN and infinities."""
+    """Encode a value as compact JSON. Raise ValueError for NaN and infinities."""
     return json.dumps(value, separators=(",", ":"), allow_nan=False)
 
 
@@ -213,7 +214,7 @@ def _pieces(value: object) -> Iterator[str]:
 
 
 def _numbers_of(values: list[object]) -> Iterator[str]:
-    """Yield the JSON of a list's elements, which are numbers or null, with the commas between them."""
+    """Yield the JSON of a list's elements (numbers or null), with the commas between them."""
     for at in range(0, len(values), _PIECE_VALUES):
         yield ("," if at else "") + dump_json(values[at : at + _PIECE_VALUES])[1:-1]
 

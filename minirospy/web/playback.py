@@ -36,7 +36,7 @@ class PlayerPlayback:
         return self._player.state().time
 
     def state(self) -> PlaybackState:
-        """Return the player's state, with the id of the request to which it responds; each id is returned once."""
+        """Return the player's state, with the id of the request that it answers. Each id is returned once."""
         state = self._player.state()
         status = (
             PlaybackStatus.ENDED

@@ -45,7 +45,7 @@ def _is_own(found: os.stat_result) -> bool:
 
 
 def kept_tokens(home: Path, *, renews: bool = False) -> Tokens:
-    """Return the tokens in ROS_HOME; create new ones if there are none, or if ``renews`` is set.
+    """Return the tokens in ROS_HOME. Create new ones if there are none, or if ``renews`` is set.
 
     Raise BridgeError if they cannot be stored.
     """

@@ -1,4 +1,4 @@
-"""Build a workspace: generate messages and the files to source from the packages in ``src`` into ``devel``.
+"""Build a workspace: from the packages in ``src``, generate messages and setup files in ``devel``.
 
 No compiler runs, and no files are copied: Python programs stay in the source folders, and ``devel`` refers to them.
 Unchanged parts are not regenerated. Source: http://wiki.ros.org/catkin/workspaces.
@@ -69,8 +69,8 @@ with open(__file__, "rb") as _source:
 """
 
 
-# Use the interpreter that has rospy, unless its path is too long or contains white space, which shebang lines do not
-# allow.
+# Use the interpreter that has rospy, unless its path is too long or contains white space. Shebang lines allow
+# neither.
 _SHEBANG = (
     sys.executable
     if sys.executable and not re.search(r"\s|.{120}", sys.executable)
@@ -118,7 +118,7 @@ def find_workspace(start: Path) -> Path:
 
 
 def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list[Plan]:
-    """Return the plans of all packages below a folder, in build order.
+    """Return the build plans of all packages below a folder, in build order.
 
     ``variables`` are passed to read_plan; packages in CATKIN_BLACKLIST_PACKAGES are skipped. Raise BuildError if a
     package name is duplicated or dependencies form a cycle, or ManifestError or DefinitionError if a file is invalid.
@@ -141,7 +141,7 @@ def read_plans(source: Path, variables: Mapping[str, str] | None = None) -> list
 
 
 def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
-    """Return the plans ordered so that each follows its build dependencies. Raise BuildError if there is a cycle."""
+    """Sort the plans topologically: each follows its build dependencies. Raise BuildError if there is a cycle."""
     also = {name: {*plan.message_depends, *(need for need, _ in plan.needs)} for name, plan in plans.items()}
     try:
         names = build_order({name: plan.manifest for name, plan in plans.items()}, also)
@@ -157,7 +157,7 @@ def _ordered(plans: Mapping[str, Plan]) -> list[Plan]:
 class Report(NamedTuple):
     """The result of building a package.
 
-    ``made`` describes the generated parts; it is empty if nothing has changed. ``stand_ins`` lists the names of
+    ``made`` describes the generated parts, and is empty if nothing has changed. ``stand_ins`` lists the names of
     minirospy's programs and modules that replace compiled ones.
     """
 
@@ -175,7 +175,7 @@ def build(
     chosen: Collection[str] | None = None,
     report: Callable[[Report], None] = lambda each: None,
 ) -> None:
-    """Build the ``chosen`` packages, or all packages, into the devel folder; call ``report`` with the result of each.
+    """Build the ``chosen`` packages, or all, into the devel folder. Call ``report`` with each package's result.
 
     ``outside``: the packages in other workspaces and in minirospy. Raise BuildError if a package cannot be built, or
     DefinitionError if a definition is invalid.
@@ -189,7 +189,7 @@ def build(
 
 
 def own_set_up(prefix: Path, sources: tuple[Path, ...], parents: tuple[Path, ...]) -> SetUp:
-    """Return the data of this minirospy installation for setup files."""
+    """Return this minirospy installation's data for the setup files."""
     return SetUp(
         prefix=prefix,
         sources=sources,
@@ -203,7 +203,7 @@ def own_set_up(prefix: Path, sources: tuple[Path, ...], parents: tuple[Path, ...
 def write_set_up(
     prefix: Path, sources: tuple[Path, ...], environment: Mapping[str, str] = os.environ
 ) -> None:
-    """Write the setup files. The workspaces that are sourced in the environment become this workspace's parents.
+    """Write the setup files. Workspaces sourced in the environment become this workspace's parents.
 
     If no workspace is sourced, the parents of the previous build remain.
     """
@@ -311,7 +311,7 @@ class _Builder:
         return modules
 
     def _outside_key(self, names: Iterable[str]) -> str:
-        """Return a fingerprint of the messages in other workspaces, because a parent workspace may have been rebuilt."""
+        """Return a fingerprint of other workspaces' messages, because a parent workspace may have been rebuilt."""
         known = [name for name in names if name in self._folders]
         return _key(
             path
@@ -337,7 +337,7 @@ class _Builder:
             path = Path(name)
             path.unlink(missing_ok=True)
             for folder in path.parents:
-                # Also remove a folder in which only Python's cache remains.
+                # Also remove a folder that contains only Python's cache.
                 if folder == self._modules or not folder.is_dir() or any(folder.glob("*.py")):
                     break
                 for cached in folder.glob("__pycache__/*.pyc"):
@@ -349,7 +349,7 @@ class _Builder:
     # --- checks
 
     def _check_needs(self, plan: Plan) -> tuple[str, ...]:
-        """Return warnings about the package's name, and about packages that find_package() names but that do not exist."""
+        """Return warnings about the package's name, and about nonexistent packages in find_package()."""
         warnings = [warning] if (warning := naming_warning(plan.name)) else []
         known = self._folders.keys() | PROVIDED
         for name, line in plan.needs:
@@ -361,7 +361,7 @@ class _Builder:
         return tuple(warnings)
 
     def _check_messages(self, plan: Plan) -> tuple[str, ...]:
-        """Check that every type used in a package's definitions exists, and is in a package that CMakeLists.txt declares."""
+        """Check that every type that a package's definitions use exists, in a package that CMakeLists.txt declares."""
         for name in plan.message_depends:
             if name not in self._folders:
                 raise BuildError(
@@ -410,7 +410,7 @@ class _Builder:
                 raise BuildError(str(file), _line_of(file, field.name), str(error)) from error
 
     def _closure(self, names: Iterable[str]) -> set[str]:
-        """Return the packages whose messages may be used, directly or indirectly, in messages of the packages ``names``."""
+        """Return the packages whose messages may be used, directly or indirectly, by messages of the packages in ``names``."""
         found: set[str] = set()
         waiting = list(names)
         while waiting:
@@ -431,7 +431,7 @@ class _Builder:
 
 
 def _option_files(plan: Plan) -> set[Path]:
-    """Return the .cfg files of a package, and the modules next to them, which they may import."""
+    """Return a package's .cfg files, and the modules next to them, which they may import."""
     folders = {path.parent for path in plan.options}
     return {*plan.options, *(module for folder in folders for module in folder.glob("*.py"))}
 
@@ -456,7 +456,7 @@ def _read_stamp(stamp: Path) -> dict[str, Any]:
 
 
 def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
-    """Return the stub programs in devel that run the programs in the source folders, as a dict from file to source text.
+    """Return devel's stub programs, which run the programs in the source folders, as a dict from file to source text.
 
     These stubs put the programs from setup.py on PATH, and let real ROS run a program that is not executable itself.
     """
@@ -469,7 +469,7 @@ def _programs(plan: Plan, setup: PythonSetup | None, devel: Path) -> dict[Path, 
 
 
 def _program(path: Path) -> str:
-    """Return the text of a stub program that runs the program ``path``."""
+    """Return the source text of a stub that runs the program ``path``."""
     head = _PROGRAM.format(python=_SHEBANG, name=path.name, folder=str(path.parent))
     return head + _RELAY_RUN.format(file=str(path))
 
@@ -490,7 +490,7 @@ def stand_in_files(plan: Plan, found: StandIns, prefix: Path) -> dict[Path, str]
 
 
 def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
-    """Return the stub modules in devel that load the modules in the source folders, as a dict from file to source text."""
+    """Return devel's stub modules, which load the modules in the source folders, as a dict from file to source text."""
     if setup is None:
         return {}
     modules = devel / DIST_PACKAGES
@@ -507,7 +507,7 @@ def _relays(setup: PythonSetup | None, devel: Path) -> dict[Path, str]:
 
 
 def _counts(plan: Plan, setup: PythonSetup | None) -> str:
-    """Return a summary such as ``2 messages, 1 service, package foo``."""
+    """Return a summary of a package's contents, such as ``2 messages, 1 service, package foo``."""
     words = []
     for suffix, word in _KINDS.items():
         count = sum(path.suffix == suffix for path in plan.definitions)

@@ -22,7 +22,7 @@ _RUN_WITH = (Kind.BUILD_EXPORT, Kind.EXEC)
 def build_order(
     manifests: Mapping[str, Manifest], also: Mapping[str, Collection[str]] | None = None
 ) -> list[str]:
-    """Return the names of packages, each after its build dependencies.
+    """Return the package names in topological order: each follows its build dependencies.
 
     Among the packages whose dependencies are done, the alphabetically first one is next. A package's build dependencies
     are those that it needs to build and test, their run dependencies, and the packages that ``also`` lists for its name.
@@ -50,7 +50,7 @@ def build_order(
 
 
 def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str]) -> dict[str, str]:
-    """Return a package's direct and indirect build dependencies, as a dict from each to the package that names it."""
+    """Return a package's direct and indirect build dependencies, as a dict from each one to the package that depends on it."""
     found = dict.fromkeys(sorted({*manifests[name].depends(*_BUILT_FROM), *also} & manifests.keys()), name)
     waiting = list(found)
     for each in waiting:
@@ -62,7 +62,7 @@ def _routes(name: str, manifests: Mapping[str, Manifest], also: Collection[str])
 
 
 def _generators(manifests: Mapping[str, Manifest], routes: Mapping[str, Mapping[str, str]]) -> set[str]:
-    """Return the packages that export a message generator, and their build dependencies."""
+    """Return the packages that export a message generator, with their build dependencies."""
     waiting = {
         name
         for name, manifest in manifests.items()

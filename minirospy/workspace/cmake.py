@@ -61,7 +61,7 @@ def parse_cmake(text: str, where: str) -> tuple[Statement, ...]:
 
 
 def keyword_arguments(arguments: tuple[str, ...], keywords: frozenset[str]) -> dict[str, list[str]]:
-    """Return arguments grouped by the preceding keyword; arguments before the first keyword are under ``""``."""
+    """Group arguments by the preceding keyword. Arguments before the first keyword are under ``""``."""
     found: dict[str, list[str]] = {"": []}
     current = ""
     for word in arguments:
@@ -132,7 +132,7 @@ def _commands(text: str, where: str) -> Iterator[Statement]:
 
 
 def _is_closed(text: str, bracket: re.Match[str], unclosed: set[str]) -> bool:
-    """Return whether the bracket that opens here is closed later; if not, record that in ``unclosed``.
+    """Return whether the bracket that opens here is closed later. If not, record that in ``unclosed``.
 
     Without the record, each of thousands of opening brackets would cause a search to the end of the file.
     """
@@ -143,7 +143,7 @@ def _is_closed(text: str, bracket: re.Match[str], unclosed: set[str]) -> bool:
 
 
 def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
-    """Yield each token and its line number."""
+    """Yield each token with its line number."""
     position, line = 0, 1
     unclosed: set[str] = set()
     while position < len(text):
@@ -159,7 +159,7 @@ def _tokens(text: str, where: str) -> Iterable[tuple[re.Match[str], int]]:
 
 
 def _shown(text: str) -> str:
-    """Return a string's first words, for an error message."""
+    """Return the first words of a string, for an error message."""
     return " ".join(text[:40].split())
 
 

@@ -23,7 +23,7 @@ _VARIABLE = re.compile(r"(?<!\\)\$(ENV)?\{([^${}]*)\}")
 _FALSE = re.compile(r"(?i)^(0|off|no|false|n|ignore|notfound|.*-notfound|)$")
 _TRUE = re.compile(r"(?i)^(on|yes|true|y|[+-]?(?=.*[1-9])\d*(?:\.\d*)?)$")
 _HERE = {"catkin", "rostest", "rosunit", "roslaunch", "PythonInterp", "Python3"}
-"""Optional packages that Python packages search for and that are reported as found."""
+"""Optional packages that Python packages look for; they are reported as found."""
 _ROS_2 = re.compile(
     r"(ament|rcl|rosidl)"
 )  # ROS 2 packages that a CMakeLists.txt for both ROS 1 and ROS 2 may look for
@@ -79,7 +79,7 @@ def _escaped(text: str) -> str:
 
 
 def _substituted(statements: Sequence[Statement], values: Mapping[str, str]) -> tuple[Statement, ...]:
-    """Return a macro's commands with its arguments substituted as text, before variables are expanded, as CMake does."""
+    """Substitute a macro's arguments into its commands as text, before variables are expanded, as CMake does."""
 
     def value(match: re.Match[str]) -> str:
         given = None if match[1] else values.get(match[2])
@@ -151,13 +151,13 @@ class _Run:
         yield from self._body(parse_cmake(text, str(file)), file)
 
     def _body(self, statements: Sequence[Statement], file: Path) -> Iterator[Command]:
-        """Yield a file's or a function's commands, up to its ``return()``."""
+        """Yield the commands of a file or function, up to its ``return()``."""
         with self._nested(statements, file), suppress(_Leave):
             yield from self._run(statements, file)
 
     @contextmanager
     def _nested(self, statements: Sequence[Statement], file: Path) -> Iterator[None]:
-        """Count a level of nesting while the context is active. Raise BuildError if there are too many levels."""
+        """Enter one nesting level for the duration of the context. Raise BuildError if there are too many levels."""
         self._depth += 1
         if self._depth > _MAX_DEPTH:
             raise BuildError(str(file), statements[0].line if statements else 0, "includes or calls itself")
@@ -182,7 +182,7 @@ class _Run:
                 yield Command(statement.name, tuple(arguments), statement.line, file, self._folder)
 
     def _arguments(self, words: Sequence[Word]) -> list[str]:
-        """Return words with variables expanded; a list in an unquoted word expands to several words."""
+        """Return words with their variables expanded. A list in an unquoted word expands to several words."""
         found: list[str] = []
         for word in words:
             text = self._filled(word.text)
@@ -302,7 +302,7 @@ class _Run:
             break
 
     def _find(self, statement: Statement, arguments: list[str], file: Path) -> Iterator[Command]:
-        """Yield find_package() itself and the commands of the package's own module ``FindNAME.cmake``."""
+        """Yield find_package() itself, then the commands of the package's own module ``FindNAME.cmake``."""
         self._find_package(arguments)
         yield Command(statement.name, tuple(arguments), statement.line, file, self._folder)
         for name in arguments[:1]:
@@ -412,7 +412,7 @@ class _Run:
             self._known.update(dict.fromkeys((f"{name}_FOUND", f"{name.upper()}_FOUND"), "1"))
 
     def _handle_standard_args(self, arguments: list[str]) -> None:
-        """Report the library of a ``FindNAME.cmake`` or of pkg-config as found, because nothing is compiled with it."""
+        """Report a library found by ``FindNAME.cmake`` or pkg-config as found, because nothing is compiled with it."""
         for name in arguments[:1]:
             self._known.update(dict.fromkeys((f"{name}_FOUND", f"{name.upper()}_FOUND"), "TRUE"))
 

@@ -1,4 +1,4 @@
-"""Create a package: its package.xml and CMakeLists.txt, with common entries as comments that the user can edit.
+"""Create a package: a package.xml and a CMakeLists.txt that contain common entries as comments, for the user to edit.
 
 Source: http://wiki.ros.org/catkin/commands/catkin_create_pkg, http://wiki.ros.org/catkin/package.xml.
 """
@@ -73,7 +73,7 @@ def create_package(parent: Path, package: NewPackage) -> list[Path]:
 
 
 def _person(tag: str, person: str, user: str) -> str:
-    """Return the tag for a person, given as a name or as ``Name <mail>``; a maintainer must have an address."""
+    """Return the XML tag for a person, given as a name or as ``Name <mail>``. A maintainer must have an address."""
     match = re.match(r"^(.*?)\s*<([^<>]+)>$", person)
     name, mail = (match[1], match[2]) if match else (person, "")
     if not mail and tag == "maintainer":

@@ -23,7 +23,7 @@ _RUNNING = ("run_depend", "exec_depend", "depend")
 
 
 class CircularDependencyError(MinirospyError):
-    """Packages depend on each other; ``circle`` lists them, and starts and ends with the same package."""
+    """Packages depend on each other. ``circle`` lists them, starting and ending with the same package."""
 
     def __init__(self, circle: tuple[str, ...]) -> None:
         super().__init__(circle)
@@ -36,7 +36,7 @@ class CircularDependencyError(MinirospyError):
 
 
 class Dependencies:
-    """The dependencies between packages; each manifest is read once, on first use.
+    """The dependencies between packages. Each manifest is read once, on first use.
 
     Metapackages are left out, as in rospack; ``with_metapackages`` includes them, as in rosstack. When all manifests are
     searched, ``complain`` is called with the error for each manifest that cannot be read.
@@ -57,12 +57,12 @@ class Dependencies:
 
     @property
     def roots(self) -> tuple[Path, ...]:
-        """Return the folders that are searched."""
+        """Return the folders that are searched for packages."""
         return self._packages.roots
 
     @cached_property
     def copies(self) -> dict[str, list[Path]]:
-        """Return all packages, sorted, each with the folders that contain a package of that name; the first one is used."""
+        """Return a dict of all packages, sorted, to the folders that contain a package of that name. The first folder is used."""
         return {
             name: folders
             for name, folders in sorted(self._packages.copies().items())
@@ -71,11 +71,11 @@ class Dependencies:
 
     @cached_property
     def metapackages(self) -> dict[str, Path]:
-        """Return all metapackages and their folders."""
+        """Return a dict from metapackage to folder."""
         return {name: folder for name, folder in self._packages.folders().items() if is_metapackage(folder)}
 
     def folder(self, name: str) -> Path:
-        """Return the folder of a package. Raise NotFoundError, with similar names, if it does not exist."""
+        """Return a package's folder. Raise NotFoundError, with similar names, if it does not exist."""
         folder = self._packages.find(name)
         if self._left_out(folder):
             raise NotFoundError("package", name, (), f"a metapackage of that name is in {folder}")
@@ -94,14 +94,14 @@ class Dependencies:
         return self._manifests[name]
 
     def direct(self, name: str) -> list[str]:
-        """Return a package's direct dependencies, ordered by kind of tag. Raise the same exceptions as :meth:`manifest`."""
+        """Return a package's direct dependencies, sorted by the kind of tag. Raise the same exceptions as :meth:`manifest`."""
         self.folder(name)
         dependencies = self.manifest(name).dependencies
         wanted = [each.name for tag in _RUNNING for each in dependencies if each.tag == tag]
         return [each for each in dict.fromkeys(wanted) if each == name or each in self.copies]
 
     def all(self, name: str) -> list[str]:
-        """Return a package's direct and indirect dependencies, each after its own dependencies.
+        """Return a package's direct and indirect dependencies in topological order: each follows those that it depends on.
 
         Raise CircularDependencyError if the dependencies form a cycle; otherwise raise the same exceptions as :meth:`direct`.
         """
@@ -119,14 +119,14 @@ class Dependencies:
         return list(found)
 
     def tree(self, name: str) -> Iterator[tuple[int, str]]:
-        """Yield (dependency, depth), each dependency after the package that depends on it; depths start at 0.
+        """Yield (dependency, depth), each dependency after the package that depends on it. Depths start at 0.
 
         A dependency of several packages is yielded several times. Raise the same exceptions as :meth:`all`.
         """
         return _walk(name, self.direct, ())
 
     def chains(self, name: str, target: str) -> list[tuple[str, ...]]:
-        """Return each path from a package to one of its dependencies. Raise the same exceptions as :meth:`all`."""
+        """Return every dependency path from the package ``name`` to ``target``. Raise the same exceptions as :meth:`all`."""
         found = []
         path: list[str] = [name]
         for depth, each in self.tree(name):

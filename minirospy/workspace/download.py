@@ -20,7 +20,7 @@ _TIMEOUT = 30.0  # maximum number of seconds for which a download may receive no
 
 
 def download(plan: Plan, wanted: Iterable[Download]) -> None:
-    """Download the files that do not exist or have the wrong MD5 sum, and print one line per download.
+    """Download the files that are missing or have the wrong MD5 sum. Print one line per download.
 
     Raise BuildError if a REQUIRED file cannot be downloaded, or if a downloaded file has the wrong MD5 sum.
     """
@@ -44,7 +44,7 @@ def download(plan: Plan, wanted: Iterable[Download]) -> None:
 
 
 def _is_right(wanted: Download) -> bool:
-    """Return whether the file exists and has the wanted MD5 sum, if one is given."""
+    """Return whether the file exists and, if an MD5 sum is given, matches it."""
     if not wanted.path.is_file():
         return False
     if not wanted.md5:
@@ -57,7 +57,7 @@ def _is_right(wanted: Download) -> bool:
 
 
 def _fetch(wanted: Download) -> None:
-    """Download a file. The file appears under its name only once it is complete. Raise OSError or ValueError otherwise."""
+    """Download a file. It appears under its name only once it is complete."""
     # Imported here, because the import takes as long as a build without downloads.
     from http.client import HTTPException
     from urllib.request import Request, urlopen

@@ -124,7 +124,7 @@ CPP = {
     "yocs_cmd_vel_mux": "nodelets, in C++",
     "yocs_velocity_smoother": "nodelets, in C++",
 }
-"""Packages with compiled programs, and their descriptions."""
+"""Dict from package with compiled programs to its description."""
 
 _MUX = "`rosrun topic_tools mux /cmd_vel IN1 IN2` passes one of several topics on; services choose which"
 INSTEAD = {
@@ -134,7 +134,7 @@ INSTEAD = {
     "rosserial_server": "`rosrun rosserial_python serial_node.py` serves the same devices",
     "ps3joy": "pair the pad with the system's Bluetooth settings, then `rosrun joy joy_node`",
 }
-"""minirospy's replacements for some of the packages in CPP, and for other packages."""
+"""Dict from package, in CPP or not, to minirospy's replacement."""
 
 _QT_REPOSITORIES = (
     "ros-visualization's python_qt_binding, qt_gui_core (branch melodic-devel of both), rqt (kinetic-devel) and {plugin} "
@@ -165,7 +165,7 @@ QT_LIBRARIES = (
 MESSAGES = {
     "costmap_converter": "https://github.com/rst-tu-dortmund/costmap_converter",
 }
-"""Packages of message definitions, with the arguments that `git clone` needs to get their ROS 1 version."""
+"""Dict from message package to the arguments with which `git clone` gets its ROS 1 version."""
 
 IMPORTED = frozenset(
     {
@@ -185,7 +185,7 @@ SUBMODULES = {
     "roslaunch.remoteprocess": "roslaunch.parent.ROSLaunchParent starts nodes on other machines by ssh",
     "roslaunch.netapi": "`rosnode list` lists the nodes; a roslaunch does not serve its list of processes",
 }
-"""Submodules of ROS packages that minirospy's packages lack, with their replacements. `overlay/` has a module for each."""
+"""Dict from submodule of a ROS package that minirospy's package lacks to its replacement. `overlay/` has a module for each."""
 
 
 def advice(name: str) -> str:

@@ -36,7 +36,7 @@ def install(workspace: Workspace, plan: Plan) -> int:
 
 
 def _copies(workspace: Workspace, plan: Plan) -> Iterator[tuple[Path, tuple[Path, bool]]]:
-    """Yield target and (source, whether to make it executable) for each installed file."""
+    """Yield (target, (source, whether to make it executable)) for each file to install."""
     share = workspace.install / "share" / plan.name
     modules = workspace.install / DIST_PACKAGES
     yield share / "package.xml", (plan.folder / "package.xml", False)
@@ -89,7 +89,7 @@ def _rule(workspace: Workspace, plan: Plan, rule: Install) -> Iterator[tuple[Pat
 
 
 def _is_compiled(workspace: Workspace, name: str) -> bool:
-    """Return whether CMake or a compiler would make the file.
+    """Return whether CMake or a compiler would generate the file.
 
     ``name`` is then a generator expression, or a file that is missing in the build or devel folder.
     """

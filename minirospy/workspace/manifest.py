@@ -56,7 +56,7 @@ class Kind(Enum):
 
 
 class Dependency(NamedTuple):
-    """A dependency on a package or a rosdep key; ``tag`` is its tag in the file (``run_depend``), ``line`` the tag's line."""
+    """A dependency on a package or a rosdep key. ``tag`` is its tag in the file (``run_depend``); ``line`` is the tag's line."""
 
     name: str
     kinds: frozenset[Kind]
@@ -124,12 +124,12 @@ class Manifest(NamedTuple):
 
     @property
     def build_type(self) -> str:
-        """Return the name of the package's build tool; catkin by default."""
+        """Return the name of the package's build tool (default: catkin)."""
         return next((export.text for export in self.exports if export.tag == "build_type"), "") or "catkin"
 
 
 def naming_warning(name: str) -> str | None:
-    """Return catkin's warning about a package name that does not follow the conventions (REP 144), or None if it does."""
+    """Return catkin's warning if a package name does not follow the conventions (REP 144), else None."""
     if _CONVENTIONAL_NAME.match(name):
         return None
     return (
@@ -139,7 +139,7 @@ def naming_warning(name: str) -> str | None:
 
 
 def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
-    """Read the manifest in a file, or in a folder's package.xml; ``variables`` override VARIABLES in conditions.
+    """Read the manifest from a file, or from a folder's package.xml. ``variables`` override VARIABLES in conditions.
 
     Raise ManifestError if the file does not exist, is not a package's XML, has no name, or contains an invalid condition.
     """
@@ -153,7 +153,7 @@ def read_manifest(path: Path, variables: Mapping[str, str] | None = None) -> Man
 
 
 def parse_manifest(text: bytes | str, path: Path, variables: Mapping[str, str] | None = None) -> Manifest:
-    """Parse a manifest; ``path`` is used in errors. Raise the same exceptions as :func:`read_manifest`."""
+    """Parse a manifest. ``path`` is used in error messages. Raise the same exceptions as :func:`read_manifest`."""
     root = _parse(text, path)
     if root.tag != "package":
         raise ManifestError(str(path), root.line, f"the root tag is <{root.tag}> instead of <package>")
@@ -173,7 +173,7 @@ def evaluate_condition(condition: str, variables: Mapping[str, str]) -> bool:
 
 
 class _Element:
-    """A tag, with its line, its children, and the text in the tag and its children."""
+    """A tag, with its line, its children, and all text inside it, including the children's."""
 
     __slots__ = ("attributes", "children", "line", "parts", "tag")
 
@@ -263,7 +263,7 @@ EMAIL = re.compile(r"[-\w%+]+(\.[-\w%+]+)*@[-a-z\d%]+(\.[-a-z\d%]+)*\.[a-z]{2,}"
 
 
 class _Reader:
-    """Reads the children of <package>, by tag, into the parts of a manifest."""
+    """Reads <package>'s children, tag by tag, into the parts of a manifest."""
 
     def __init__(self, root: _Element, path: Path, variables: Mapping[str, str]) -> None:
         self._path = path

@@ -52,7 +52,7 @@ class NotExecutableError(MinirospyError):
 
 
 class Packages:
-    """The packages that are visible in an environment. A package's name is the name in its package.xml."""
+    """The packages that are visible in an environment. A package's name is taken from its package.xml."""
 
     def __init__(self, environment: Environment | None = None) -> None:
         # Packages do not depend on ROS_MASTER_URI or on the machine's name, so skip both lookups.
@@ -69,7 +69,7 @@ class Packages:
         return packages
 
     def find(self, name: str) -> Path:
-        """Return the folder of a package. Raise NotFoundError, with similar names, if it does not exist."""
+        """Return a package's folder. Raise NotFoundError, with similar names, if it does not exist."""
         for root in self.roots:
             # If a folder's name is the package's name, try that folder before searching.
             if package_name(root / name) == name:
@@ -91,11 +91,11 @@ class Packages:
         return sorted(self.folders())
 
     def folders(self) -> dict[str, Path]:
-        """Return all packages and their folders."""
+        """Return a dict from package to folder."""
         return {name: folders[0] for name, folders in self.copies().items()}
 
     def copies(self) -> dict[str, list[Path]]:
-        """Return all packages, each with the folders that contain a package of that name; the first one is used."""
+        """Return a dict from package to the folders that contain a package of that name. The first folder is used."""
         found: dict[str, dict[Path, None]] = {}
         for root in self.roots:
             for folder in self._crawled(root):
@@ -108,7 +108,7 @@ class Packages:
         return sorted({path.name for path in _files(folder) if _is_program(path)})
 
     def find_executable(self, package: str, name: str) -> list[str]:
-        """Return the command that runs a package's program; if several programs have this name, use the first.
+        """Return the command that runs a package's program. If several programs have this name, use the first.
 
         Python programs run in this interpreter, not in the one that ``env`` finds. Raise NotFoundError, with similar
         names, if there is none, or NotExecutableError if the file cannot be run.
@@ -116,7 +116,7 @@ class Packages:
         return self.find_executables(package, name)[0]
 
     def find_executables(self, package: str, name: str) -> list[list[str]]:
-        """Return the commands for a program name or a path in a package; several folders may contain a program with that name.
+        """Return the commands for a program's name or path in a package. Several folders may contain a program of that name.
 
         Raise the same exceptions as :meth:`find_executable`.
         """
@@ -140,7 +140,7 @@ class Packages:
         raise NotFoundError("executable", name, known, f"package [{package}] in {folder} has {has}{hidden}")
 
     def find_resource(self, package: str, name: str) -> Path:
-        """Return a launch file of a package, by its path in the package or by its name.
+        """Find a package's launch file, by its path in the package or by its name.
 
         Raise NotFoundError if there is none.
         """
@@ -156,7 +156,7 @@ class Packages:
         raise NotFoundError("file", name, same_kind, hint)
 
     def hidden_hint(self, package: str, name: str, found: Path) -> str:
-        """Return a hint if the file is in another package with the same name, which the found package hides; otherwise ""."""
+        """Return a hint if the file is in another package with the same name, hidden by the found package; otherwise ""."""
         for folder in self.copies().get(package, ()):
             if folder != found and any(path.name == name for path in _files(folder)):
                 return f"; the package of that name in {folder}, which this one hides, has it"
@@ -177,7 +177,7 @@ class CrawlTime(NamedTuple):
 
 
 def crawl_times(root: Path) -> list[CrawlTime]:
-    """Return the search times of a folder and its subfolders, except for packages."""
+    """Measure the search time of a folder and of each subfolder, except for packages."""
     found: list[CrawlTime] = []
 
     def visit(folder: Path) -> bool:
@@ -205,7 +205,7 @@ def built_in_roots() -> tuple[Path, ...]:
 
 
 def crawl(root: Path) -> Iterator[Path]:
-    """Yield the package folders at or below ``root`` as rospack does: skip folders inside packages and hidden folders."""
+    """Yield the package folders at or below ``root``. Like rospack, skip hidden folders and folders inside packages."""
     if (root / _MANIFEST).is_file():
         if not (root / "CATKIN_IGNORE").exists():
             yield root
@@ -215,7 +215,7 @@ def crawl(root: Path) -> Iterator[Path]:
 
 
 def _subfolders(folder: Path) -> list[Path]:
-    """Return the subfolders that may contain packages, sorted; [] if a marker file marks the folder as ignored."""
+    """Return the subfolders that may contain packages, sorted, or [] if a marker file marks the folder as ignored."""
     try:
         entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
     except OSError:
@@ -230,12 +230,12 @@ def _subfolders(folder: Path) -> list[Path]:
 
 
 def _leads_back(entry: os.DirEntry[str]) -> bool:
-    """Return whether an entry is a link to one of its own parent folders, which would make the search infinite."""
+    """Return whether an entry is a link to one of its parent folders, which would make the search infinite."""
     return entry.is_symlink() and Path(entry.path).parent.resolve().is_relative_to(Path(entry.path).resolve())
 
 
 def package_name(folder: Path) -> str | None:
-    """Return the name in a folder's package.xml (by default the folder's name); None if it has no package.xml."""
+    """Return the name in a folder's package.xml (default: the folder's name), or None if there is no package.xml."""
     try:
         text = (folder / _MANIFEST).read_bytes()
     except OSError:
@@ -245,7 +245,7 @@ def package_name(folder: Path) -> str | None:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Yield a package's files, first those in its own folder, then those where a build or an installation puts programs.
+    """Yield a package's files: first those in its own folder, then programs from builds and installations.
 
     The Python modules in minirospy's own packages are skipped, because `rosrun` does not run them.
     """

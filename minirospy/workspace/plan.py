@@ -67,11 +67,11 @@ _BEFORE = {
 """Commands that catkin requires before other commands, although the order has no effect here."""
 _GENERATORS = {"message_generation", "genmsg", "actionlib_msgs"}
 """Packages that define CMake's message macros; at least one must be found before the macros are used."""
-_CMAKE_VERSION = "3.25.1"  # the version that CMakeLists.txt files see as CMake's
+_CMAKE_VERSION = "3.25.1"  # CMake's version, as seen by CMakeLists.txt files
 
 
 class Install(NamedTuple):
-    """Files to install: ``sources`` are below the package, ``destination`` is below the install folder.
+    """Files to install. ``sources`` are below the package's folder; ``destination`` is below the install folder.
 
     For a folder with a trailing slash, its contents are copied; otherwise the folder itself. ``chosen`` and
     ``excluded`` are regular expressions for paths to include (none: all) and to exclude. ``program``: make the files
@@ -100,7 +100,7 @@ class Install(NamedTuple):
 
 
 class Test(NamedTuple):
-    """A test: a file or folder below the package, its runner, arguments and working folder."""
+    """A test: a file or folder below the package, and its runner, arguments and working folder."""
 
     path: str
     kind: str
@@ -125,7 +125,7 @@ class Download(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """A package's part in the build.
+    """The plan for building one package.
 
     ``definitions`` are the .msg, .srv and .action files; ``message_depends`` the packages whose messages these may
     contain; ``needs`` the packages in find_package(), with their lines; ``skipped`` the targets that need a compiler;
@@ -156,7 +156,7 @@ class Plan(NamedTuple):
 
 
 def read_plan(folder: Path, variables: Mapping[str, str] | None = None) -> Plan:
-    """Return the plan of the package in ``folder``; ``variables`` are those set by ``catkin_make -DNAME=VALUE``.
+    """Return the plan of the package in ``folder``. ``variables`` are set by ``catkin_make -DNAME=VALUE``.
 
     Raise ManifestError if package.xml is invalid, or BuildError if CMakeLists.txt is invalid.
     """
@@ -251,7 +251,7 @@ class _Collector:
                 self._refused(command, f"{command.name}() must be called before {later}()")
 
     def _refused(self, command: Command, text: str) -> None:
-        """Warn about an error that real catkin reports, but that this build can ignore."""
+        """Warn about an error that real catkin reports, but that this build ignores."""
         self.warn(command.file, command.line, f"real catkin refuses this: {text}")
 
     def warn(self, file: Path, line: int, text: str) -> None:
@@ -300,7 +300,7 @@ class _Collector:
         )
 
     def _path(self, command: Command, name: str) -> str:
-        """Return a path that a command names, relative to the package."""
+        """Return a path from a command's arguments, relative to the package."""
         if command.folder == self._folder:
             return name
         path = Path(os.path.relpath(command.folder / name, self._folder)).as_posix()
@@ -501,7 +501,7 @@ def _patterns(arguments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, .
 
 
 def _variables(folder: Path, name: str) -> dict[str, str]:
-    """Return the variables that catkin and CMake set in advance. Destinations are relative to the install folder."""
+    """Return the variables that catkin and CMake predefine. Destinations are relative to the install folder."""
     source = folder.as_posix()
 
     places = {"BIN": "lib", "ETC": "etc", "INCLUDE": "include", "SHARE": "share"}

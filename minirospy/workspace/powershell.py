@@ -54,12 +54,12 @@ _OTHERS = """if ($args[0] -ne '--extend') {
 
 
 def quoted(path: object) -> str:
-    """Return a path as one PowerShell word, in single quotes; a quote inside is doubled."""
+    """Quote a path as one PowerShell word, in single quotes. A quote inside is doubled."""
     return "'" + str(path).replace("'", "''") + "'"
 
 
 def powershell_base(base: Mapping[str, str], programs: Path) -> str:
-    """Return the code that sets ROS's variables if they are not set, and adds minirospy's commands to the path."""
+    """Return code that sets ROS's variables if they are unset, and adds minirospy's commands to the path."""
     variables = "".join(
         f"if (-not $env:{name}) {{ $env:{name} = {quoted(value)} }}\n" for name, value in base.items()
     )

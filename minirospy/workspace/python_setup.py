@@ -29,7 +29,7 @@ _Kind = TypeVar("_Kind")
 
 
 class PythonSetup(NamedTuple):
-    """Top-level packages (folders), modules (files) and scripts (files), by name.
+    """The contents of a setup.py: dicts from name to folder or file for top-level packages and modules, and script files.
 
     ``warnings`` has a line for each package whose folder is missing, which catkin ignores.
     """
@@ -70,7 +70,7 @@ def read_python_setup(folder: Path) -> PythonSetup:
 
 
 def _given(file: Path, given: Mapping[str, object], name: str, kind: type[_Kind], form: str) -> _Kind:
-    """Return an argument of ``setup()``, or an empty ``kind`` if it is missing or None.
+    """Return the ``setup()`` argument ``name``, or an empty ``kind`` if it is missing or None.
 
     Raise BuildError if its type is wrong.
     """
@@ -116,7 +116,7 @@ def _run(file: Path) -> Mapping[str, object]:
 
 
 class _StandIn(types.ModuleType):
-    """A module that has every attribute. Each attribute is an empty class, unless it has been set."""
+    """A module that has every attribute. An attribute that has not been set is an empty class."""
 
     def __getattr__(self, name: str) -> type:
         if name.startswith("__"):
@@ -150,7 +150,7 @@ _TOOLS = {"catkin_pkg", "distutils", "setuptools"}
 
 @contextmanager
 def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
-    """Replace the modules that a setup.py imports, so that ``setup`` records its arguments; change to the file's folder.
+    """Replace the modules that a setup.py imports, so that ``setup`` records its arguments. Change to the file's folder.
 
     As in a script, modules in the file's folder can be imported; they are unloaded afterwards.
     """
@@ -191,8 +191,7 @@ def _stand_ins(given: dict[str, object], folder: Path) -> Iterator[None]:
     sys.meta_path.insert(0, finder)
     sys.path.insert(0, str(folder))
     os.chdir(folder)
-    # Set the variables that catkin's build sets, because a terminal in which no setup.bash is sourced has none of
-    # them.
+    # Set the variables that catkin's build sets, because without a sourced setup.bash, none of them is set.
     os.environ.update({name: VARIABLES[name] for name in unset})
     try:
         yield

@@ -1,4 +1,4 @@
-"""The files to source, such as ``devel/setup.bash``, as strings. Pure.
+"""The setup files that users source, such as ``devel/setup.bash``, as strings. Pure.
 
 The files run without Python, so that a new terminal starts quickly. Sourcing a workspace's setup file removes the values
 that the previously sourced workspace set, and prepends the values for the parent workspaces and the workspace itself.
@@ -156,7 +156,7 @@ _minirospy_workspace() {
 
 
 def _others_make_way(setup: SetUp) -> str:
-    """Return the code that removes the previously sourced workspaces from the environment and adds this workspace's parents."""
+    """Return code that removes previously sourced workspaces from the environment and adds this workspace's parents."""
     chain = "\n".join(f"  _minirospy_workspace {_quoted(parent)} put" for parent in reversed(setup.parents))
     return f"""if [ "${{1:-}}" != --extend ]; then
   # Remove the workspaces that were sourced before.
@@ -219,7 +219,7 @@ _BASE = {
 
 
 def _quoted(path: Path) -> str:
-    """Return a path quoted as one word for a POSIX shell."""
+    """Quote a path as one word for a POSIX shell."""
     return "'" + str(path).replace("'", "'\\''") + "'"
 
 
@@ -296,7 +296,7 @@ def _fish_base(setup: SetUp) -> str:
 
 
 def _fish_quoted(path: Path) -> str:
-    """Return a path quoted as one word for fish, whose single quotes allow two escapes, unlike those of other shells."""
+    """Quote a path as one word for fish. Unlike in other shells, two escapes work within fish's single quotes."""
     return "'" + str(path).replace("\\", "\\\\").replace("'", "\\'") + "'"
 
 

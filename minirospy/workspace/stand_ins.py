@@ -1,4 +1,4 @@
-"""Replace the compiled parts of a workspace's package by programs and modules from minirospy's package with the same name.
+"""Replace a workspace package's compiled parts with programs and modules of minirospy's package of the same name.
 
 A package in a workspace hides minirospy's package with the same name. If the package's CMakeLists.txt compiles a program or
 a Python module that minirospy has, the build writes a file to devel that runs minirospy's program or module.
@@ -21,20 +21,20 @@ _OVERLAY = Path(__file__).parents[1] / "overlay"
 class StandIns(NamedTuple):
     """minirospy's files that replace a package's compiled programs and modules.
 
-    ``programs`` is a dict by program name; ``modules`` is a dict by dotted name, which includes the enclosing packages.
+    ``programs`` is keyed by program name; ``modules`` is keyed by dotted name, and includes the enclosing packages.
     """
 
     programs: dict[str, Path]
     modules: dict[str, Path]
 
     def names(self) -> str:
-        """Return the names to show to the user, without packages that only enclose a module; "" if there are none."""
+        """Return the names to show to the user, "" if there are none. Omits packages that only enclose a module."""
         inner = [name for name, path in self.modules.items() if path.name != "__init__.py"]
         return ", ".join([*self.programs, *inner])
 
 
 def find_stand_ins(plan: Plan) -> StandIns:
-    """Return the programs and modules that replace the skipped targets of a package."""
+    """Return the programs and modules that replace a package's skipped targets."""
     if not plan.compiled:
         return StandIns({}, {})
     return StandIns(dict(_programs(plan)), dict(_modules(plan)))
@@ -56,7 +56,7 @@ def _programs(plan: Plan) -> Iterator[tuple[str, Path]]:
 
 
 def _modules(plan: Plan) -> Iterator[tuple[str, Path]]:
-    """Yield the modules that replace extension modules, each after its enclosing packages, except for the outermost one."""
+    """Yield the modules that replace extension modules, each after its enclosing packages except the outermost one."""
     top = _OVERLAY / plan.name
     for path in sorted(top.rglob("*.py")):
         if path.stem in plan.compiled and path.parent.name != "__pycache__":

@@ -1,4 +1,4 @@
-"""Zenoh's library for all bridges: protocol classes for its API, which has no type hints, and a session's configuration."""
+"""The Zenoh library for all bridges: protocol classes for its API, which has no type hints, and a session's configuration."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MAX_PORT = 65_535
 _MAX_PORT_DIGITS = 5
 INTERNET_PROTOCOLS = frozenset({"quic", "quic_datagram", "tcp", "tls", "udp", "ws", "wss"})
 PROTOCOLS = INTERNET_PROTOCOLS | {"serial", "shm", "unixpipe", "unixsock-stream", "vsock"}
-"""Zenoh's link protocols; Zenoh reports an error for a protocol that its build lacks."""
+"""Zenoh's link protocols. Zenoh reports an error for a protocol that its build lacks."""
 _HOST = re.compile(r"[\w*][\w.*%-]*|\[[0-9A-Fa-f:.]+(%[\w.-]+)?\]")
 _SESSIONS = 10_000
 _SEND_BUFFER = 65_536
@@ -47,7 +47,7 @@ CONNECT_MS = 3000
 
 
 class EndpointError(BridgeError):
-    """An endpoint in the arguments can never work."""
+    """An endpoint in the arguments that can never work."""
 
     def __init__(self, endpoint: str, reason: str) -> None:
         super().__init__(f"[{escaped(endpoint)}] {reason}")
@@ -65,7 +65,7 @@ class Bytes(Protocol):
 
 
 class Sample(Protocol):
-    """A message, a reply, or a token change."""
+    """A message, a reply, or a change of a liveliness token."""
 
     key_expr: object
     payload: Bytes
@@ -105,7 +105,7 @@ class Declared(Protocol):
 
 
 class Matching(Protocol):
-    """A publisher's matching status, that is, whether it has subscribers."""
+    """A publisher's matching status: whether it has subscribers."""
 
     matching: bool
 
@@ -182,7 +182,7 @@ class NetworkOptions:
 
 
 def to_endpoint(text: str, *, listens: bool = False) -> str:
-    """Return a Zenoh endpoint; HOST and HOST:PORT mean TCP. Raise EndpointError if the endpoint can never work.
+    """Convert text to a Zenoh endpoint; HOST and HOST:PORT mean TCP. Raise EndpointError if the endpoint can never work.
 
     ``listens``: the port may be 0, which selects any free port.
     """
@@ -214,7 +214,7 @@ def to_endpoint(text: str, *, listens: bool = False) -> str:
 
 
 def unresolved(endpoints: Iterable[str]) -> list[str]:
-    """Return the hosts in endpoints that do not resolve at present.
+    """Return the endpoints' hosts that do not resolve at present.
 
     The hosts may resolve later, for example once mDNS runs. Blocks.
     """
@@ -242,7 +242,7 @@ def is_loopback_endpoint(endpoint: str) -> bool:
 
 
 def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False, needs_hash: bool = False) -> None:
-    """Raise BridgeError, with installation advice, if Zenoh's library is missing or uses another protocol version.
+    """Raise BridgeError, with installation advice, if the Zenoh library is missing or uses another protocol version.
 
     ``who``: the feature that needs Zenoh, named in the message. ``has_many_links``: many peers will connect.
     ``needs_hash``: the feature also needs the library xxhash.
@@ -264,7 +264,7 @@ def require_zenoh(who: str = "the fleet", *, has_many_links: bool = False, needs
 
 
 def configured(options: NetworkOptions) -> Config:
-    """Return Zenoh's configuration from the file and the options.
+    """Build Zenoh's configuration from the file and the options.
 
     The session listens only if the file or an option requests that.
     """

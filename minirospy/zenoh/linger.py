@@ -23,7 +23,7 @@ _LINGER = struct.Struct("ii")
 _ZENOHS = _LINGER.pack(1, 10)
 _NONE = _LINGER.pack(0, 0)
 LOOKS = 10
-"""Number of polls in which to examine a new file descriptor: Zenoh sets SO_LINGER only after it has connected the socket."""
+"""Number of polls that examine a new file descriptor. Zenoh sets SO_LINGER only after it has connected the socket."""
 
 
 class LingerRemover:
@@ -31,7 +31,7 @@ class LingerRemover:
 
     def __init__(self) -> None:
         self._looks: dict[tuple[int, int], int] = {}
-        """Dict from open file to the number of polls that have examined it."""
+        """Dict from each open file to the number of polls that have examined it."""
 
     def look(self) -> int:
         """Remove SO_LINGER from new links; return the number of links changed. Does nothing on Windows."""
@@ -53,7 +53,7 @@ class LingerRemover:
 
 
 def _removes(number: int, file: os.stat_result) -> bool:
-    """Remove SO_LINGER from a socket if Zenoh has set it; return whether it was set."""
+    """Remove SO_LINGER from a socket if Zenoh has set it. Return whether it was set."""
     if not stat.S_ISSOCK(file.st_mode):
         return False
     with socket.socket(fileno=os.dup(number)) as sock:

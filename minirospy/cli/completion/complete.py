@@ -62,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def candidates(
     index: int, words: Sequence[str], *, one_line: bool = False, shell: Shell = POSIX
 ) -> list[str]:
-    """Return the candidates for ``words[index]`` as the shell inserts them; if ``one_line`` is set, without line feeds."""
+    """Return the candidates for ``words[index]`` in the form that the shell inserts. With ``one_line``, without line feeds."""
     if not 0 < index <= len(words):
         return []
     word = shell.read(words[index] if index < len(words) else "")

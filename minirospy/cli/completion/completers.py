@@ -39,7 +39,7 @@ _LAUNCH = (".launch", ".launch.xml", ".test")
 
 
 class Cursor(NamedTuple):
-    """The cursor's position: in an argument of ``verb``, after the arguments ``given``; ``word`` is the incomplete word."""
+    """The cursor's position: in an argument of ``verb``, after the arguments ``given``. ``word`` is the incomplete word."""
 
     verb: str
     given: tuple[str, ...]
@@ -47,7 +47,7 @@ class Cursor(NamedTuple):
 
 
 class Text(str):
-    """A candidate that the user will edit. The shell code quotes it instead of putting a backslash before each blank."""
+    """A candidate that the user will edit. The shell code quotes it instead of escaping each blank with a backslash."""
 
     __slots__ = ()
 
@@ -56,7 +56,7 @@ Completer = Callable[[Cursor], Iterable[str]]
 
 
 def nothing(_: Cursor) -> Iterable[str]:
-    """Return no candidates, because the argument is a number, an expression or a new name."""
+    """Return no candidates, for an argument that is a number, an expression or a new name."""
     return ()
 
 
@@ -75,14 +75,14 @@ def package_names(_: Cursor) -> Iterable[str]:
 
 
 def build_targets(cursor: Cursor) -> Iterable[str]:
-    """Return the targets of catkin_make."""
+    """Return catkin_make's targets."""
     names = _packages().names()
     tests = [f"run_tests_{name}" for name in names] if cursor.word.startswith("run_tests_") else []
     return ("install", "run_tests", "test", "clean", *tests, *names)
 
 
 def package_folders(cursor: Cursor) -> Iterable[str]:
-    """Return ``pkg/`` first, then ``pkg/folder/``; for roscd, also the folders of logs and test results."""
+    """Return ``pkg/`` first, then ``pkg/folder/``. For roscd, also return the folders of logs and test results."""
     if any(not word.startswith("-") for word in cursor.given):
         return []
     package, slash, _ = cursor.word.partition("/")
@@ -137,7 +137,7 @@ def _names_below(root: Path, endings: str | tuple[str, ...] = "") -> list[str]:
 
 
 def _below(root: Path, shown: str, word: str) -> list[str]:
-    """Return the contents of the folder that contains ``word``; ``shown`` replaces ``root`` at the start of each path."""
+    """Return the contents of the folder that contains ``word``. In each path, ``shown`` replaces ``root``."""
     head, _, prefix = word.rpartition("/")
     folder = root.joinpath(*head.split("/")[1:])
     assert head.split("/")[0] == shown
@@ -152,7 +152,7 @@ def files(cursor: Cursor) -> Iterable[str]:
 
 
 def bag_files(cursor: Cursor) -> Iterable[str]:
-    """Return local bags and folders."""
+    """Return local bag files and folders."""
     return [name for name in files(cursor) if name.endswith(("/", ".bag", ".bag.active", ".mcap"))]
 
 
@@ -283,7 +283,7 @@ def launch_nodes(cursor: Cursor) -> Iterable[str]:
 
 
 def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
-    """Return the result of ``ask``, which queries the master and nodes; [] if that takes longer than LIVE_SECONDS."""
+    """Return the result of ``ask``, which queries the master and nodes, or [] if that takes longer than LIVE_SECONDS."""
     import threading
 
     from minirospy.introspect.graph import Graph
@@ -302,12 +302,12 @@ def _live(ask: Callable[[Graph], Iterable[str]]) -> list[str]:
 
 
 def _as_typed(names: Iterable[str], word: str) -> list[str]:
-    """Return global names, keeping the leading slash only if ``word`` has one."""
+    """Return global names, with the leading slash only if ``word`` has one."""
     return [name.removeprefix("/") for name in names] if word and not word.startswith("/") else list(names)
 
 
 def topics(cursor: Cursor) -> Iterable[str]:
-    """Return the topics; for `echo` and `type`, also return the fields of their messages."""
+    """Return the topics. For `echo` and `type`, also return the fields of their messages."""
     from minirospy.introspect.topics import find_topic, topic_names
 
     fields = cursor.verb in ("echo", "type") and "/" in cursor.word[1:]
@@ -515,14 +515,14 @@ def on_one_line(text: str) -> str:
 
 
 def pins(cursor: Cursor) -> Iterable[str]:
-    """Return the virtual board's wired pins; for `press`, return the pins with buttons."""
+    """Return the virtual board's wired pins. For `press`, return the pins with buttons."""
     from minirospy.board.model import BUTTONS, LEDS
 
     return map(str, BUTTONS if cursor.verb in ("press", "release") else (*LEDS, *BUTTONS))
 
 
 def dashboard_views(_: Cursor) -> Iterable[str]:
-    """Return the dashboard's views, and the layouts that do not have the name of a view."""
+    """Return the dashboard's views, and the layouts whose name is not that of a view."""
     from minirospy.web.dashboard.views import LAYOUTS, VIEWS
 
     return dict.fromkeys((*VIEWS, *LAYOUTS))

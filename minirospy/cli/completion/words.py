@@ -16,11 +16,14 @@ _LINE_FEED = "\v"
 _PLAIN = re.compile(r"[\w@%+=:,./~-]*\Z")
 """Strings that need no quotes in any POSIX shell."""
 _PLAIN_IN_POWERSHELL = re.compile(r"[\w+=:./\\~-]*\Z")
-"""Strings that need no quotes in PowerShell, in which a comma makes an array, and @ and % have other meanings."""
+"""Strings that need no quotes in PowerShell.
+
+Commas are excluded because they make an array, and @ and % because they have other meanings.
+"""
 
 
 class Word(NamedTuple):
-    """A word without its quotes. If a ``quote`` is not closed, ``text[at:]`` is the part after the opening quote."""
+    """A word without its quotes. If a ``quote`` is left open, ``text[at:]`` is the part after the opening quote."""
 
     text: str
     quote: str
@@ -28,7 +31,7 @@ class Word(NamedTuple):
 
 
 class Shell(NamedTuple):
-    """A shell's syntax: a function that parses a word, and one that writes a candidate in place of a word."""
+    """A shell's syntax: a function that parses a word, and one that formats a candidate to replace a word."""
 
     read: Callable[[str], Word]
     write: Callable[[str, Word], str]
@@ -38,7 +41,7 @@ class Shell(NamedTuple):
 
 
 def _read_posix(word: str) -> Word:
-    """Return a word without its quotes; $NAME is replaced by its value, except within single quotes."""
+    """Remove a word's quotes. $NAME is replaced by its value, except within single quotes."""
     text = ""
     quote = ""
     at = read = 0
@@ -65,7 +68,7 @@ def _read_posix(word: str) -> Word:
 
 
 def _write_posix(text: str, word: Word) -> str:
-    """Return ``text`` in the shell's syntax: in the quotes that the user opened, or in double quotes for a :class:`Text`."""
+    """Return ``text`` in the shell's syntax: in the quotes opened by the user, or in double quotes for a :class:`Text`."""
     if word.quote:
         # Leave the quotes around a folder open, because the user may continue the path.
         end = "" if text.endswith("/") else word.quote
@@ -91,7 +94,7 @@ def _escaped(text: str) -> str:
 
 
 def _read_powershell(word: str) -> Word:
-    """Return a word without its quotes; ``quote`` is the quote at the word's start, even if it is closed."""
+    """Remove a word's quotes. ``quote`` is the quote at the word's start, even if it is closed."""
     text = ""
     quote = ""
     read = 0
@@ -114,7 +117,7 @@ def _read_powershell(word: str) -> Word:
 
 
 def _write_powershell(text: str, word: Word) -> str:
-    """Return ``text`` in the quotes that the user opened, else in single quotes if ``text`` needs quotes."""
+    """Return ``text`` in the quotes opened by the user, else in single quotes if ``text`` needs quotes."""
     if word.quote == '"':
         return '"' + re.sub(r'([`$"])', r"`\1", text) + '"'
     if word.quote or not _PLAIN_IN_POWERSHELL.match(text):

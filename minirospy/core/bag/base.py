@@ -64,7 +64,7 @@ class BagReader(ABC):
     def blocks(
         self, connections: Sequence[int], start: int | None = None, end: int | None = None
     ) -> Iterator[Block]:
-        """Yield the same messages as :meth:`messages`, in blocks, for reading millions of messages."""
+        """Yield the same messages as :meth:`messages`, but in blocks, for reading millions of messages."""
 
     def messages(
         self, connections: Iterable[int] | None = None, start: int | None = None, end: int | None = None
@@ -84,14 +84,14 @@ class BagReader(ABC):
 
     @abstractmethod
     def message_at(self, position: Position) -> StoredMessage:
-        """Return the message at the position given by an index entry or another message.
+        """Return the message at a position that comes from an index entry or another message.
 
         Raise BagFormatError if there is none.
         """
 
     @abstractmethod
     def index(self, connections: Iterable[int]) -> list[ConnectionIndex]:
-        """Return the indexes of these connections; read those that are not in memory yet from the file.
+        """Return the indexes of these connections. Indexes that are not in memory yet are read from the file.
 
         Raise BagFormatError if the bag is damaged.
         """

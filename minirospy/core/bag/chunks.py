@@ -32,7 +32,7 @@ class StoredChunk(NamedTuple):
 
     @property
     def end(self) -> int:
-        """The position after the chunk, at which its index records start."""
+        """The position after the chunk, where its index records start."""
         return self.data_position + self.chunk.compressed_size
 
 
@@ -171,7 +171,7 @@ class ChunkStream:
     ) -> tuple[list[tuple[int, int, int, int]], list[array[int]]]:
         """From a chunk's index records, return (offset, time, rank, connection) for each requested message.
 
-        Also return the offsets of all messages, by connection.
+        Also return the offsets of all messages, keyed by connection.
         """
         limit = size_of(self.stream)
         self.stream.seek(header.end)
@@ -194,7 +194,7 @@ class ChunkStream:
         all_offsets: list[array[int]],
         known: Mapping[int, Connection],
     ) -> None:
-        """Compare each connection's record, which precedes its first message, with the record in the bag's index.
+        """Compare each connection's record in the chunk, before its first message, with the one in the bag's index.
 
         This is done once per connection. Raise BagFormatError if the records differ, or if the chunk's index is wrong.
         """
@@ -259,7 +259,7 @@ Leaves one core to the reader's thread.
 """
 
 
-# Maximum size in bytes; larger chunks are not decompressed in advance, because several of them would be in memory
+# Maximum size in bytes of a chunk to decompress in advance, because several of them may be in memory
 _MAX_AHEAD = 64 * 1024 * 1024
 
 # Chunk bytes per requested message; above this, read only the requested messages, not the whole chunk

@@ -30,7 +30,7 @@ __all__ = [
 NONE = "none"
 BZ2 = "bz2"
 LZ4 = "lz4"
-COMPRESSIONS = (NONE, BZ2, LZ4)  # in the order in which rosbag lists them
+COMPRESSIONS = (NONE, BZ2, LZ4)  # in rosbag's order
 
 MAX_CHUNK_SIZE = 1088 * 1024 * 1024
 """Maximum size of a compressed chunk's data in bytes: enough for the longest message (1 GiB) and the records before it."""
@@ -53,12 +53,12 @@ def check_compression(name: str) -> None:
 
 
 def compress(name: str, data: Buffer) -> bytes:
-    """Return a chunk's data compressed with ``name``. Raise BagCompressionError if that is not possible."""
+    """Compress a chunk's data with ``name``. Raise BagCompressionError if that is not possible."""
     return _choose(_COMPRESS, name)(data)
 
 
 def decompress(name: str, data: bytes, size: int, is_cancelled: Callable[[], bool] = lambda: False) -> bytes:
-    """Return a chunk's data, which must have ``size`` bytes after decompression.
+    """Decompress a chunk's data, which must then have ``size`` bytes.
 
     Allocates at most ``size`` bytes and one piece. ``is_cancelled`` is polled between pieces, possibly in another
     thread than the caller's. Raise BagFormatError if the data is damaged, if its size is not ``size``, or after a
@@ -68,7 +68,7 @@ def decompress(name: str, data: bytes, size: int, is_cancelled: Callable[[], boo
 
 
 def decompress_mcap(name: str, data: bytes, size: int) -> bytes:
-    """Return the data of a chunk in an MCAP file; ``name`` is zstd, lz4, or "" for none.
+    """Decompress the data of a chunk in an MCAP file. ``name`` is zstd, lz4, or "" for none.
 
     Raise the same exceptions as :func:`decompress`.
     """
@@ -132,7 +132,7 @@ def _compress_lz4(data: Buffer) -> bytes:
 
 
 class _Output:
-    """Collects decompressed data; ``size`` bytes are expected. Raise BagFormatError if there are more.
+    """Collects decompressed data, which must have ``size`` bytes. Raises BagFormatError if there is more.
 
     Large data is decompressed in pieces, because a library would need twice the memory to join its own pieces, and Ctrl-C
     would have no effect until it finishes.

@@ -1,6 +1,6 @@
 """Serialize bag records from named tuples to bytes.
 
-Fields are written in the same order as rosbag's Python writer does. Source: http://wiki.ros.org/Bags/Format/2.0.
+Fields are in the same order as in rosbag's Python writer. Source: http://wiki.ros.org/Bags/Format/2.0.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _MESSAGE_HEADER = struct.Struct("<I I3sB I5sI I5sII I")
 
 
 def message_prefix(connection: int) -> bytes:
-    """Return the 34 bytes before a message's time, which are the same for each message on a connection.
+    """Return the 34 bytes before a message's time. They are the same for all messages on a connection.
 
     The prefix is followed by seconds, nanoseconds and the body's size, 32 bits each, then the body.
     """

@@ -93,7 +93,7 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
         end = seconds(max(index.times[-1] for index in indexes if index))
 
     if frequencies:
-        # Omit connections without messages, as ROS's reader does; ROS's Python writer stores them too.
+        # Omit connections without messages, as ROS's reader does. ROS's Python writer also stores those.
         connections = [each for each in connections if counts[each.id]]
     types: dict[str, str] = {}
     by_topic: dict[str, list[Connection]] = {}
@@ -129,7 +129,7 @@ def summarize(reader: BagReader, path: str | None, *, frequencies: bool) -> Summ
 
 
 def compression_of(reader: BagReader) -> list[Stored]:
-    """Return the compressions used for a bag's chunks, the most frequent one first."""
+    """Return the compressions used for a bag's chunks, most frequent first."""
     found: dict[str, list[int]] = {}
     for header in reader.chunk_headers().values():
         sums = found.setdefault(header.chunk.compression, [0, 0, 0])
@@ -209,7 +209,7 @@ def as_yaml(summary: Summary) -> str:
 
 
 def value_of(text: str, key: str) -> str:
-    """Return a key's value from the output of :func:`as_yaml`, as `rosbag info -k` prints it.
+    """Look up a key in the output of :func:`as_yaml`; return its value in the format of `rosbag info -k`.
 
     Keys are, for example, ``start`` or ``topics[0].type``. Raise LookupError if the key does not exist.
     """
@@ -230,7 +230,7 @@ def value_of(text: str, key: str) -> str:
 
 
 def _printed(value: object) -> str:
-    """Return a list item as -k prints it."""
+    """Format a list item as -k prints it."""
     if not isinstance(value, dict):
         return f"  {value}"
     return "\n  ".join(f"{name}: {each}" for name, each in value.items())

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["MAGIC", "McapReader", "open_bag_or_mcap"]
 
 _END_OF_TIME = 1 << 64
-_MAX_NAME = 32  # maximum bytes in the name of a compression
+_MAX_NAME = 32  # maximum bytes in a compression's name
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQQ")  # the start of a message: its channel, sequence, log time and publish time
 _CHUNK_HEAD = struct.Struct("<BQQQQII")
@@ -211,7 +211,10 @@ class _Selection(NamedTuple):
 
 
 class _Run:
-    """The messages in a chunk, in time order: time, index in the chunk, channel, start and end of the body."""
+    """The messages in one chunk, in time order.
+
+    Each has a time, an index in the chunk, a channel, and the start and end of its body.
+    """
 
     def __init__(self, position: int, start: int) -> None:
         self.position = position

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["MAGIC", "McapRepair", "chunk_data", "mcap_faults"]
 
-MAGIC = b"\x89MCAP0\r\n"  # the first and the last bytes of a file
+MAGIC = b"\x89MCAP0\r\n"  # the first and last bytes of a file
 
 _HEAD = struct.Struct("<BQ")  # the prefix of each record: its opcode, and the length of its content
 _MESSAGE = struct.Struct("<HIQ")  # the start of a message: its channel, sequence and time
@@ -51,13 +51,13 @@ def mcap_faults() -> Iterator[None]:
     except (McapError, ZstdError, struct.error, LookupError, StopIteration, UnicodeDecodeError) as error:
         raise BagFormatError(f"not a whole MCAP file: {error or type(error).__name__}") from error
     except (EOFError, OSError, ValueError, RuntimeError, ArithmeticError, MemoryError, TypeError) as error:
-        # Decompressors raise these errors for lengths that exceed the memory; a seek before the start of a short file
-        # raises them too.
+        # Decompressors raise these errors for lengths that exceed the memory. A seek before the start of a short file
+        # also raises them.
         raise BagFormatError(f"not a whole MCAP file: {error}") from error
 
 
 def chunk_data(name: str, data: bytes, size: int) -> bytes:
-    """Return a chunk's data, decompressed.
+    """Decompress a chunk's data.
 
     Raise BagFormatError if the data is damaged, BagCompressionError if the compression is not supported.
     """
@@ -68,7 +68,7 @@ def chunk_data(name: str, data: bytes, size: int) -> bytes:
 
 
 class _Recovered(NamedTuple):
-    """A chunk, the messages on each of its channels, and its end including its message indexes."""
+    """A recovered chunk: the messages on each of its channels, and the end of the chunk including its message indexes."""
 
     info: ChunkIndex
     counts: Counter[int]

@@ -56,7 +56,7 @@ def check_mcap_compression(name: str) -> None:
 
 
 class McapWriter:
-    """Writes an MCAP file to a binary stream, which it does not close; like :class:`minirospy.core.bag.writer.BagWriter`.
+    """Like :class:`minirospy.core.bag.writer.BagWriter`, but writes an MCAP file. Does not close the stream.
 
     ``compression``: none, lz4 or zstd. Raise BagCompressionError if it is none of these, BagError if the extra is missing.
     """

@@ -228,7 +228,7 @@ class _Merge:
         self._size = 0
 
     def blocks(self) -> Iterator[Block]:
-        """Yield the blocks in order."""
+        """Yield the messages as blocks, in order."""
         # The run's number is the tie-breaker between runs whose next messages have equal time, connection and offset.
         heap: list[tuple[int, int, int, int, _Run]] = []
         number, count = 0, len(self._chunks)

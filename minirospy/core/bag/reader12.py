@@ -129,7 +129,7 @@ class Reader12(ScannedReader):
         return [self._indexes[number] for number in connections]
 
     def _seek(self, position: int, limit: int) -> None:
-        """Seek to a position from the index. Raise BagFormatError if it is beyond the end of the file."""
+        """Seek to a position taken from the index. Raise BagFormatError if it is beyond the end of the file."""
         if position > limit:
             raise BagFormatError("an index entry is behind the file's end", position)
         self.stream.seek(position)

@@ -125,7 +125,7 @@ class Connection(NamedTuple):
 
     @property
     def callerid(self) -> str:
-        """The name of the publisher's node, or "" if it is not stored."""
+        """The name of the publisher's node, or "" if it was not stored."""
         return self._text("callerid")
 
     @property
@@ -191,15 +191,15 @@ class Record(NamedTuple):
         return self.data_position + self.data_size
 
     def uint32(self, name: str) -> int:
-        """Return a field's 32-bit number. Raise BagFormatError if the field is missing or does not have 4 bytes."""
+        """Return a field as a 32-bit integer. Raise BagFormatError if the field is missing or does not have 4 bytes."""
         return int(self._number(name, _UINT32))
 
     def uint64(self, name: str) -> int:
-        """Return a field's 64-bit number. Raise BagFormatError if the field is missing or does not have 8 bytes."""
+        """Return a field as a 64-bit integer. Raise BagFormatError if the field is missing or does not have 8 bytes."""
         return int(self._number(name, _UINT64))
 
     def time(self, name: str) -> int:
-        """Return a field's time in nanoseconds. Raise BagFormatError if the field is missing or does not have 8 bytes."""
+        """Return a time field in nanoseconds. Raise BagFormatError if the field is missing or does not have 8 bytes."""
         value = self.field(name)
         if len(value) != 8:
             raise BagFormatError(f'error reading field "{name}": it has {len(value)} bytes', self.position)
@@ -210,7 +210,7 @@ class Record(NamedTuple):
         return self.field(name).decode("utf-8", "replace")
 
     def field(self, name: str) -> bytes:
-        """Return a field. Raise BagFormatError if it is missing."""
+        """Return a field's bytes. Raise BagFormatError if it is missing."""
         try:
             return self.fields[name]
         except KeyError:
@@ -273,7 +273,7 @@ def read_record(stream: BinaryIO, limit: int) -> Record:
 
 
 def parse_record(buffer: bytes, position: int) -> Record:
-    """Return the record at a position in a buffer, such as a chunk's data. Raise BagFormatError if it is damaged."""
+    """Parse the record at a position in a buffer, such as a chunk's data. Raise BagFormatError if it is damaged."""
     limit = len(buffer)
     if position + 8 > limit or position < 0:
         raise BagFormatError("a record's header does not fit into its chunk", position)
@@ -325,7 +325,7 @@ def parse_fields(header: bytes, position: int | None = None) -> Fields:
 
 
 def parse_bag_header(record: Record) -> BagHeader:
-    """Return the bag header in a record.
+    """Parse a bag header record.
 
     Raise BagFormatError if the record is invalid, BagEncryptedError if it names an encryptor.
     """
@@ -336,7 +336,7 @@ def parse_bag_header(record: Record) -> BagHeader:
 
 
 def parse_connection(record: Record, data: bytes) -> Connection:
-    """Return the connection in a record. Raise BagFormatError if the record is invalid or lacks the type."""
+    """Parse a connection record. Raise BagFormatError if the record is invalid or lacks the type."""
     record.expect(OP_CONNECTION)
     header = parse_fields(data, record.position)
     for name in ("type", "md5sum", "message_definition"):
@@ -346,13 +346,13 @@ def parse_connection(record: Record, data: bytes) -> Connection:
 
 
 def parse_message_data(record: Record, body: bytes) -> MessageData:
-    """Return the message in a record. Raise BagFormatError if the record is invalid."""
+    """Parse a message record. Raise BagFormatError if it is invalid."""
     record.expect(OP_MESSAGE_DATA)
     return MessageData(record.uint32("conn"), record.time("time"), body)
 
 
 def parse_index_data(record: Record, data: bytes) -> IndexData:
-    """Return the entries in a version 2.0 index record. Raise BagFormatError if the record is invalid."""
+    """Parse the entries of a version 2.0 index record. Raise BagFormatError if the record is invalid."""
     record.expect(OP_INDEX_DATA)
     version, count = record.uint32("ver"), record.uint32("count")
     if version != 1:
@@ -368,13 +368,13 @@ def parse_index_data(record: Record, data: bytes) -> IndexData:
 
 
 def parse_chunk_header(record: Record) -> Chunk:
-    """Return the chunk header in a record. Raise BagFormatError if the record is invalid."""
+    """Parse a chunk record's header. Raise BagFormatError if the record is invalid."""
     record.expect(OP_CHUNK)
     return Chunk(record.text("compression"), record.uint32("size"), record.data_size)
 
 
 def parse_chunk_info(record: Record, data: bytes) -> ChunkInfo:
-    """Return the chunk info in a record. Raise BagFormatError if the record is invalid."""
+    """Parse a chunk info record. Raise BagFormatError if it is invalid."""
     record.expect(OP_CHUNK_INFO)
     version, count = record.uint32("ver"), record.uint32("count")
     if version != 1:

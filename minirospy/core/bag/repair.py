@@ -77,7 +77,7 @@ class _Rewriting:
 
     @property
     def shift(self) -> int:
-        """The number of bytes by which the following data moves."""
+        """The offset, in bytes, to add to the positions of the following data."""
         return self._written + len(self._waiting) - self._read
 
     def copy_until(self, position: int) -> None:
@@ -96,7 +96,7 @@ class _Rewriting:
         self._put(edit.data)
 
     def finish(self) -> int:
-        """Truncate the file at the current position; return the number of bytes by which its end has moved."""
+        """Truncate the file at the current position; return how many bytes its end has moved."""
         shift, self._read = self.shift, self._read + len(self._waiting)
         self._put(b"")
         self._stream.seek(self._written)
@@ -128,7 +128,7 @@ class Repair:
         self.problems: list[str] = []
         self._stream = stream
         self._edits: list[_Edit] = []
-        # chunk infos that are included in the bag header's count and have not been read yet
+        # chunk infos counted in the bag header that have not been read yet
         self._infos_left = 0
         self._total = 0  # total of the message counts in the chunk infos read so far
 
@@ -192,7 +192,7 @@ class Repair:
         return record.end
 
     def _read(self, position: int, limit: int) -> int:
-        """Read the record at a position and, after a chunk, its index records; return the position after them.
+        """Read the record at a position. If it is a chunk, also read its index records. Return the position after them.
 
         Raise BagFormatError if a record is damaged.
         """
@@ -247,7 +247,7 @@ class Repair:
                 )
 
     def _add_connections(self, content: _Content) -> None:
-        # Add the connections in file order, which is the order in which ROS writes them to the index.
+        # Add the connections in file order, because ROS writes them to the index in that order.
         for number, connection in content.connections.items():
             self.connections.setdefault(number, connection)
 
@@ -281,7 +281,7 @@ class Repair:
         return following
 
     def _go_on(self, position: int, error: BagFormatError, limit: int) -> int:
-        """Return the position of the next chunk after the damage, or ``limit`` if there is none."""
+        """Return the position of the next chunk after damaged data, or ``limit`` if there is none."""
         following = next_chunk(self._stream, position + 1, limit)
         end = limit if following is None else following
         is_saved = self._read_partial(position, end, limit)
@@ -342,7 +342,7 @@ _BLOCK = 4 * 1024 * 1024
 
 
 def _read_index(stream: BinaryIO, position: int, limit: int) -> tuple[int, list[_Entry]]:
-    """Return the position after the index records at ``position``, and the sorted entries in them."""
+    """Return the end position of the index records at ``position``, and their sorted entries."""
     found: list[_Entry] = []
     try:
         while position < limit:
@@ -363,7 +363,7 @@ def _times(entries: list[_Entry]) -> list[int]:
 
 
 def _whole_records(data: bytes) -> int:
-    """Return the total length of the complete message and connection records at the start of the data."""
+    """Return the total length of the complete message and connection records at the start of ``data``."""
     at = 0
     try:
         for record in records.parse_records(data):
@@ -394,7 +394,7 @@ class _Any:
 
 
 def _partial_chunk(stream: BinaryIO, position: int, limit: int) -> Record | None:
-    """Return the record of an uncompressed chunk whose data is truncated, or None if the record is not such a chunk."""
+    """Return the record of an uncompressed chunk whose data is truncated, or None if it is not such a record."""
     try:
         stream.seek(position)
         head = stream.read(min(4096, limit - position))

@@ -80,7 +80,7 @@ class _Stream:
         return to_nanoseconds(*first), to_nanoseconds(*last)
 
     def encode_index(self) -> bytes:
-        """Return the index record to write after the current chunk."""
+        """Serialize the index record that follows the current chunk."""
         fields = {
             "op": bytes((OP_INDEX_DATA,)),
             "conn": _UINT32.pack(self.connection.id),
@@ -103,7 +103,7 @@ class _Complete(NamedTuple):
 
 
 class Continued(NamedTuple):
-    """The index of a bag to which messages will be appended, and the index's position."""
+    """The index of a bag to append messages to, and the index's position."""
 
     connections: Iterable[Connection]
     chunks: Iterable[ChunkInfo]

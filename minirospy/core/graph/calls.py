@@ -48,7 +48,7 @@ _MAX_CHARACTERS = 4096  # maximum length of a name, a type or a URI
 _MAX_URIS = 20_000
 """Maximum number of URIs in a list, because checking them blocks the node for some milliseconds.
 
-No master has as many for a topic.
+No master lists as many for one topic.
 """
 
 
@@ -64,7 +64,7 @@ class Parameter(NamedTuple):
 
 
 class Method(NamedTuple):
-    """A method: the function to call with the caller_id and the arguments, and the value to return if the call is refused."""
+    """A method: the function to call with the caller_id and the arguments, and the value to return for a refused call."""
 
     function: Callable[..., Answer | Steps[Answer]]
     refused: object
@@ -81,7 +81,7 @@ class Dispatcher:
         *,
         refusals: tuple[type[Exception], ...] = (),
     ) -> None:
-        """Treat the exceptions in ``refusals`` like CallRefused if a method raises them."""
+        """Create the dispatcher. Exceptions in ``refusals`` raised by a method are treated like CallRefused."""
         self.methods = methods
         self._refusals: tuple[type[Exception], ...] = (CallRefused, *refusals)
 
@@ -198,7 +198,7 @@ def node_name(value: object, name: str, caller_id: str) -> str:
 
 
 def parameter_key(value: object, name: str, caller_id: str) -> str:
-    """Return a parameter name, resolved relative to the caller; like rosmaster, allow any characters."""
+    """Return a parameter name, resolved relative to the caller. Like rosmaster, allow any characters."""
     return _resolve(plain_key(value, name, caller_id), caller_id)
 
 
@@ -238,7 +238,7 @@ def subgraph(value: object, name: str, caller_id: str) -> str:
 
 
 def global_key(value: object, name: str, caller_id: str) -> str:
-    """Return a parameter's global name."""
+    """Return a parameter's name, which must be global."""
     found = text(value, name, caller_id)
     if found[0] != "/":
         raise CallRefused(f"ERROR: parameter [{name}] must be a globally referenced name")

@@ -66,7 +66,7 @@ class MasterApi(ABC):
         # called for each change, with the record that the journal stores
         self.record: Callable[..., object] = nothing
         self.store: Callable[[object], Steps[int]] = _store_nothing
-        """Writes a large value to the journal, and returns the number by which a change refers to it."""
+        """Writes a large value to the journal; returns the number that a change uses to refer to it."""
 
         topic = parameters(topic=global_name, caller_api=api_uri)
         typed_topic = parameters(topic=global_name, topic_type=type_name, caller_api=api_uri)
@@ -121,7 +121,7 @@ class MasterApi(ABC):
         """Send the notification that a change in the tables requires."""
 
     def notify_in_steps(self, actions: Iterable[Notice]) -> Steps[None]:
-        """Send the notifications, possibly many, that a change in the tables requires."""
+        """Send the notifications that a change in the tables requires. There may be many."""
         for number, action in enumerate(actions):
             self.notify(action)
             if number % _FEW == _FEW - 1:
@@ -179,7 +179,7 @@ class MasterApi(ABC):
     def collect_system_state(self) -> Steps[Answer]:
         """Return the response to :meth:`get_system_state`, in steps."""
         if self.registry.is_large:
-            # Build one list at a time, so that there is not one in memory for each client that waits for a response.
+            # Build one list at a time, so that memory does not hold one for each client that waits for a response.
             yield ALONE
         publishers = yield from _collect(self.registry.publisher_rows())
         subscribers = yield from _collect(self.registry.subscriber_rows())

@@ -1,4 +1,4 @@
-"""The cache of parameters that a node has read, which change notifications invalidate.
+"""The cache of parameters that a node has read. Change notifications invalidate its entries.
 
 Pure. A change only invalidates the affected values, and the next read queries the master. Therefore updates may overtake
 each other, and an empty dictionary may mean both "deleted" and "empty".

@@ -25,7 +25,7 @@ _MAX_DEPTH = 56
 _MAX_INT = 2**31
 
 _STEP_ITEMS = 1000
-# Approximate bytes for a number, an empty list, and a dictionary or an entry in it
+# Approximate bytes for a number, an empty list, and a dictionary or one of its entries
 _ITEM_BYTES, _LIST_BYTES, _ENTRY_BYTES = 40, 70, 120
 
 MAX_BYTES = 96 * 1024 * 1024  # maximum total bytes of all parameters in memory
@@ -113,7 +113,7 @@ class ParameterTree:
         return self._bytes > _MANY_BYTES
 
     def is_small_at(self, key: str, most: int = SMALL_ITEMS) -> bool:
-        """Return whether the value of a parameter or namespace is small, or not set; see :func:`is_small`."""
+        """Return whether a parameter's or namespace's value is small, or not set; see :func:`is_small`."""
         return is_small(self._find(_split(key)), most)
 
     def has_room(self, weight: int) -> bool:

@@ -120,7 +120,7 @@ class Registry:
         return Registered(list(subscribers.values()), chain(actions, self._updates(topic)))
 
     def unregister_publisher(self, node: str, topic: str, uri: str) -> Iterable[Action] | None:
-        """Unregister ``node`` as a publisher of ``topic``; return None if it was not registered from ``uri``."""
+        """Unregister ``node`` as a publisher of ``topic``. Return None if it was not registered from ``uri``."""
         if self._publishers.get(topic, {}).get(node) != uri:
             return None
         self._drop(self._publishers, topic, node, PUBLISHES)
@@ -278,7 +278,7 @@ class Registry:
         return _rows(self._subscribers)
 
     def service_rows(self) -> Iterator[tuple[str, list[str]]]:
-        """Yield each service and the node that offers it, in a list. The table may change during the iteration."""
+        """Yield (service, [node that offers it]) for each service. The table may change during the iteration."""
         return ((service, [entry.node]) for service, entry in list(self._services.items()))
 
     def count_topics(self) -> int:
@@ -417,6 +417,6 @@ def _remove(table: dict[str, dict[str, str]], topic: str, node: str) -> None:
 
 
 def _pairs(table: dict[str, dict[str, str]]) -> Iterator[tuple[str, str]]:
-    # This is the fastest way to copy many small tables, which every rewrite of a journal does first.
+    # The fastest way to copy many small tables; every rewrite of a journal starts with this copy.
     rows = list(zip(table, map(tuple, table.values()), strict=True))
     return ((node, topic) for topic, nodes in rows for node in nodes)

@@ -35,7 +35,7 @@ FEW_OF_ONE = _MIB // 4
 
 MAX_ENTRIES = 10_000  # maximum number of topics, services and parameters per node
 
-# Approximate bytes for a node and for each name that it registers, without their strings
+# Approximate bytes for a node, and for each name that it registers, not counting their strings
 _NODE_BYTES, _NAME_BYTES = 400, 150
 
 PUBLISHES, SUBSCRIBES, SERVES, PARAMETER = 1, 2, 4, 8  # kinds of registration for a name, as bits
@@ -61,7 +61,7 @@ def new_shares() -> Shares:
 
 
 def describe(excess: Excess, shares: Shares) -> str:
-    """Return a description of the limit that was exceeded."""
+    """Describe the limit that was exceeded."""
     match excess:
         case Excess.ALL:
             return f"{shares.most // _MIB} MiB for all registrations"

@@ -56,5 +56,5 @@ class Shares:
 
 
 def holder_of(uri: str) -> str:
-    """Return the host and port of a URI."""
+    """Return the host and port in a URI."""
     return uri.partition("://")[2].partition("/")[0]

@@ -49,7 +49,7 @@ class SubscriptionPlan:
         self._refusals: set[str] = set()
 
     def publishers_changed(self, uris: Iterable[str], *, keep: bool = False) -> list[Connect | Disconnect]:
-        """Apply the master's list of publishers. The list is complete, or, with ``keep``, lacks some existing publishers.
+        """Apply the master's list of publishers. If ``keep`` is set, the list lacks some existing publishers.
 
         Publishers beyond MAX_PUBLISHERS are ignored, because any process may send a list.
         """

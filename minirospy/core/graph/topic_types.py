@@ -21,7 +21,7 @@ _TYPE_BYTES = 100  # approximate bytes for a type without its string
 
 class _Type(NamedTuple):
     text: str
-    node: str  # the node for which the type is counted; "" if no node registers the topic
+    node: str  # the node to which the type is charged; "" if no node registers the topic
 
 
 class TopicTypes:
@@ -78,7 +78,7 @@ class TopicTypes:
             self.set(topic, before.text if before else type_, node)
 
     def keep(self, topic: str, type_: str) -> None:
-        """Store the type of a topic that is no longer registered, as the most recent one."""
+        """Keep the type of a topic that is no longer registered, as the most recent one."""
         before = self._types.get(topic)
         if before and before.node:
             return

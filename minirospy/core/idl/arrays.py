@@ -58,7 +58,7 @@ class _Field(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def _fields(message_class: type[Message]) -> tuple[_Field, ...]:
-    """Return the fields of a class that are number arrays, or messages."""
+    """Return a message class's fields that are number arrays or messages."""
     found = []
     for name, type_ in zip(message_class.__slots__, message_class._slot_types, strict=True):
         base, array, _ = type_.partition("[")

@@ -66,7 +66,7 @@ class Text(NamedTuple):
 
 
 class Sequence(NamedTuple):
-    """Elements that each have the layout ``items``; ``length`` is None if their number varies."""
+    """Elements that each have the layout ``items``. ``length`` is None if their number varies."""
 
     items: tuple[Item, ...]
     length: int | None = None
@@ -117,7 +117,7 @@ def make_transcoder(name: str, layout: Layout) -> Transcoder:
 
 
 class _Position(NamedTuple):
-    """A position in CDR, as far as known: its remainder after division by ``modulus``, which is 1, 2, 4 or 8."""
+    """What is known about a position in CDR: its remainder after division by ``modulus``, which is 1, 2, 4 or 8."""
 
     modulus: int
     remainder: int
@@ -126,7 +126,7 @@ class _Position(NamedTuple):
         return _Position(self.modulus, (self.remainder + size) % self.modulus)
 
     def after_any(self, width: int) -> _Position:
-        """Return the position after any number of items of ``width`` bytes, as far as known."""
+        """Return what is known about the position after any number of items of ``width`` bytes."""
         modulus = min(self.modulus, width)
         return _Position(modulus, self.remainder % modulus)
 
@@ -155,7 +155,7 @@ class _Walk:
         self._known: dict[tuple[int, _Position], _Position] = {}
 
     def after(self, layout: Layout, start: _Position) -> _Position:
-        """Return the position after a layout, as far as known."""
+        """Return what is known about the position after a layout."""
         key = (id(layout), start)
         if key not in self._known:
             position = start
@@ -165,7 +165,7 @@ class _Walk:
         return self._known[key]
 
     def in_loop(self, layout: Layout, start: _Position) -> _Position:
-        """Return the position before each element and after the last one, as far as known."""
+        """Return what is known about the position before each element and after the last one."""
         while True:
             both = start.or_(self.after(layout, start))
             if both == start:
@@ -457,7 +457,7 @@ class _Generator:
         self._source.line(f"at += -at & {mask}")
 
     def _length(self, side: Side, *, is_text: bool) -> str:
-        """Generate code that reads a length after the pending tokens; return its local name.
+        """Generate code that reads a length after the pending tokens; return the local variable's name.
 
         The code writes the length if both messages have it. In CDR a string's length includes the trailing NUL.
         """
@@ -473,7 +473,7 @@ class _Generator:
         return count
 
     def _flush(self) -> None:
-        """Generate the lines for the pending tokens."""
+        """Generate the lines of code for the pending tokens."""
         tokens, self._tokens = _joined(self._tokens), []
         if not tokens:
             return

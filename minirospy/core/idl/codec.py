@@ -247,7 +247,7 @@ class _Writer:
         return [name]
 
     def _prepared(self, leaf: _Leaf) -> str:
-        """Return a local name for a field's value, converted to the object whose length is written."""
+        """Return the local name of a field's value, converted to the object whose length is written."""
         if leaf.type.is_bytes:
             return self._bytes(leaf)
         name = self._source.local(leaf.path.rpartition(".")[2])
@@ -444,7 +444,7 @@ class _Reader:
         return count
 
     def _slice(self, size: str, whole: bool = False) -> str:
-        """Return an expression for the next bytes.
+        """Return an expression for the next ``size`` bytes.
 
         ``whole``: the message stores the bytes, so they must not reference the buffer.
         """

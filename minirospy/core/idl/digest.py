@@ -34,7 +34,7 @@ _SEPARATOR = "=" * 80
 
 
 def md5_text(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return the text to compute the md5sum from: constants, then fields, with nested types replaced by their md5sums.
+    """Return the text from which the md5sum is computed: constants, then fields, with nested types replaced by their md5sums.
 
     Raise DefinitionError if a message contains itself.
     """

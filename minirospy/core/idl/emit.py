@@ -114,17 +114,17 @@ _HELPERS = {
         "            return value",
     ],
 }
-"""Helper functions in a module: a dict from name to lines, in the order in which they are emitted."""
+"""Helper functions in a module: a dict from name to lines, in output order."""
 
 
 def emit_message(spec: MessageSpec, lookup: Lookup) -> str:
-    """Return a message's module. Raise DefinitionError if a name is not legal in Python."""
+    """Generate a message's module. Raise DefinitionError if a name is not legal in Python."""
     check_types(spec, lookup)
     return _Module(_checked(lookup)).source([spec], None, f"{spec.full_name}.msg")
 
 
 def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
-    """Return the source of a message's class; its globals must contain the classes of its fields.
+    """Generate the source of a message's class. Its globals must contain the classes of its fields.
 
     Raise DefinitionError if a name is not legal in Python.
     """
@@ -135,7 +135,7 @@ def emit_class(spec: MessageSpec, lookup: Lookup) -> ClassSource:
 
 
 def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
-    """Return a service's module: request, response, and the class that combines them.
+    """Generate a service's module: request, response, and the class that combines them.
 
     Raise DefinitionError if a name is not legal in Python.
     """
@@ -146,7 +146,7 @@ def emit_service(spec: ServiceSpec, lookup: Lookup) -> str:
 
 
 def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[str] = ("",)) -> str:
-    """Return the ``__init__`` for a package's msg or srv folder. Module ``_Name`` defines ``Name`` with each suffix in ``parts``.
+    """Emit the ``__init__`` of a package's msg or srv folder. Module ``_Name`` defines ``Name`` with each suffix in ``parts``.
 
     Each module is loaded when one of its names is first used. Raise DefinitionError if a name is not legal in Python.
     """
@@ -183,7 +183,7 @@ def emit_package(package: str, kind: str, names: Sequence[str], parts: Sequence[
 
 
 def emit_top(package: str, kinds: Sequence[str]) -> str:
-    """Return the ``__init__`` of a package that contains the modules ``kinds`` (msg, srv).
+    """Generate the ``__init__`` of a package that contains the modules ``kinds`` (msg, srv).
 
     Each module is imported when it is first used. In real ROS other packages import it, and programs rely on that. Type
     checkers do not see these imports, so that they report names that do not exist.

@@ -50,7 +50,7 @@ _SEPARATOR = "=" * 80
 
 
 class Catalogue:
-    """The definitions in some packages, from a dict of package name to folder. Each spec is parsed once.
+    """The definitions in some packages, given as a dict from package name to folder. Each spec is parsed once.
 
     A package's definitions are the files in its folders msg, srv and action, or, if ``definitions`` contains the package,
     only the files listed there.
@@ -95,7 +95,7 @@ class Catalogue:
         return self._specs[full_name]
 
     def messages(self, package: str) -> list[MessageSpec]:
-        """Return all messages in a package by name, including those of its actions."""
+        """Return all messages in a package, sorted by name, including those of its actions."""
         names = {*self.files(package, "msg")}
         for action in self.actions(package):
             names |= {message.name for message in action.messages}
@@ -215,7 +215,7 @@ def write_package(catalogue: Catalogue, package: str, root: Path, *, on_demand: 
     if on_demand:
         sources = _on_demand(sources)
         for kind in ("msg", "srv"):
-            # Remove modules that remain from an earlier build, which compiled them in advance.
+            # Remove modules that remain from an earlier build, which precompiled them.
             for stale in (root / package / kind).glob("_[!_]*.py"):
                 stale.unlink()
     folder = root / package
@@ -239,7 +239,7 @@ def _is_generated(file: Path) -> bool:
 
 
 def _on_demand(sources: dict[str, str]) -> dict[str, str]:
-    """Return the files for a package whose modules are compiled when they are imported."""
+    """Return the files of a package whose modules are compiled when they are imported."""
     modules = [text for name, text in sources.items() if _is_module(name)]
     fingerprint = zlib.crc32("".join(modules).encode())
     kept = {name: text for name, text in sources.items() if not _is_module(name)}
@@ -338,7 +338,7 @@ def specs_of_text(full_name: str, text: str) -> dict[str, MessageSpec]:
 
 
 def checked_text(full_name: str, text: str) -> tuple[dict[str, MessageSpec], str]:
-    """Return the specs in a full text that the message uses, dependencies first, and the message's md5sum.
+    """Return the specs used by the message in a full text, dependencies first, and the message's md5sum.
 
     Does not create a class. Raise DefinitionError if the text is invalid.
     """
@@ -356,7 +356,7 @@ def checked_text(full_name: str, text: str) -> tuple[dict[str, MessageSpec], str
 
 
 def class_from_text(full_name: str, text: str) -> type[Message]:
-    """Return a message class created from a full text, as a publisher sends it, for a type that is not installed.
+    """Create a message class for a type that is not installed, from the full text that a publisher sends.
 
     Raise DefinitionError if the text is invalid.
     """
@@ -395,7 +395,7 @@ def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> 
         # Python has its own limits, for example on nested loops, which nested arrays generate.
         raise DefinitionError(name, 1, f"Python cannot make a class of it: {error}") from error
     found: type[Message] = module.__dict__[name.partition("/")[2]]
-    # Use genpy's naming, because programs that read bags look for `_sensor_msgs__Image`.
+    # Use genpy's naming, because programs that read bags look for names such as `_sensor_msgs__Image`.
     found.__name__ = found.__qualname__ = f"_{name.replace('/', '__')}"
     found.__reduce__ = _reduced  # type: ignore[assignment, method-assign]
     _running[id(found)] = found
@@ -404,12 +404,12 @@ def _run(emitted: ClassSource, name: str, made: Mapping[str, type[Message]]) -> 
     return found
 
 
-# Dict from id to a class created at run time, so that unpickling a message finds its class
+# Dict from id to class, for classes created at run time, so that unpickling a message finds its class
 _running: weakref.WeakValueDictionary[int, type[Message]] = weakref.WeakValueDictionary()
 
 
 def _reduced(message: Any) -> tuple[Any, ...]:
-    """Return the data with which pickle and copy recreate a message whose class is in no module.
+    """Return the data that pickle and copy need to recreate a message whose class is in no module.
 
     The data contains the class's full text.
     """

@@ -178,7 +178,7 @@ def check_type(field_name: str, field_type: str, field_val: object) -> None:
 
 
 def args_kwds_to_message(data_class: type[_M], args: Sequence[object], kwds: Mapping[str, object]) -> _M:
-    """Return the message passed to publish() or a service call, or create it from the passed field values.
+    """Return the message passed to publish() or a service call, or create one from the field values passed.
 
     Raise TypeError or AttributeError if the values do not match the fields.
     """
@@ -228,7 +228,7 @@ def fill_message_args(msg: object, msg_args: object, keys: Mapping[str, object] 
 
 
 def get_printable_message_args(msg: protocols.Message, buff: TextIO | None = None, prefix: str = "") -> str:
-    """Return the names of a message's fields in order, nested ones with dots; also write them to ``buff``, if given."""
+    """Return the names of a message's fields in order, nested ones with dots. If ``buff`` is given, also write them to it."""
     found: list[str] = []
 
     def walk(current: protocols.Message, path: str) -> None:
@@ -459,7 +459,7 @@ _STRICT_CHECKS: dict[str, _Check] = {
     **dict.fromkeys(("float32", "float64"), _check_strict_float),
     **dict.fromkeys(("time", "duration"), _check_strict_time),
     **dict.fromkeys(_INTEGERS, _check_strict_integer),
-}  # checks that are like genpy's but also accept numpy's numbers, which genpy's messages can contain anyway
+}  # checks like genpy's that also accept numpy's numbers, which genpy's messages can contain anyway
 
 
 def _check_array(name: str, type_: str, value: object, checks: Mapping[str, _Check]) -> None:

@@ -86,7 +86,7 @@ class _Loader(SourceFileLoader):
         self._fingerprint = fingerprint
 
     def path_stats(self, path: str | bytes) -> dict[str, int]:
-        """Return the values with which Python compares a cached module; the source's size is not known in advance."""
+        """Return the values that Python compares with a cached module's header. The source's size is not known in advance."""
         return {"mtime": self._fingerprint, "size": 0}
 
     def set_data(self, path: str, data: ReadableBuffer, *, _mode: int = 0o666) -> None:

@@ -110,7 +110,7 @@ class ServiceClass(Protocol):
 
 
 class ActionGoal(Stamped, Protocol):
-    """The message with which an action client sends a goal."""
+    """The message that an action client sends to start a goal."""
 
     @property
     def goal_id(self) -> GoalID:
@@ -150,15 +150,15 @@ class Action(Message, Protocol):
 
     @property
     def action_goal(self) -> ActionGoal:
-        """A goal message."""
+        """The action's goal message."""
 
     @property
     def action_result(self) -> ActionResult:
-        """A result message."""
+        """The action's result message."""
 
     @property
     def action_feedback(self) -> ActionFeedback:
-        """A feedback message."""
+        """The action's feedback message."""
 
 
 def is_message(value: object) -> TypeGuard[Message]:

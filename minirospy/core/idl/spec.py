@@ -24,7 +24,7 @@ PRIMITIVES = {
     "duration": "ii",
     "string": "",
 }
-"""Dict from primitive type to its format characters for ``struct``; a string has no format characters."""
+"""Dict from primitive type to its format characters for ``struct``. Strings have none."""
 
 
 class FieldType(NamedTuple):
@@ -51,7 +51,7 @@ class FieldType(NamedTuple):
 
 
 class Field(NamedTuple):
-    """A field, with the name from the definition."""
+    """A field, with its name as in the definition."""
 
     name: str
     type: FieldType

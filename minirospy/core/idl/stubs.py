@@ -17,7 +17,7 @@ _TYPES = {"bool": "bool", "float32": "float", "float64": "float", "string": "str
 
 
 def emit_stub(messages: Sequence[MessageSpec], services: Sequence[ServiceSpec] = ()) -> str:
-    """Return the stub for a package's msg or srv folder. ``emit`` must have checked its names."""
+    """Generate the stub for a package's msg or srv folder. ``emit`` must have checked its names."""
     stub = _Stub(messages, has_services=bool(services))
     for message in messages:
         stub.message(message)
@@ -63,7 +63,7 @@ class _Stub:
         )
 
     def text(self) -> str:
-        """Return the complete stub."""
+        """Return the complete stub's text."""
         return "\n".join(
             [
                 *(["import builtins as _builtins"] if self._builtins else []),

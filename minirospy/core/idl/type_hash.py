@@ -1,4 +1,4 @@
-"""The hash of a type's fields (RIHS01), by which ROS 2 distinguishes definitions with the same name. Pure.
+"""The hash of a type's fields (RIHS01). ROS 2 uses it to distinguish definitions with the same name. Pure.
 
 Source: https://github.com/ros-infrastructure/rep/pull/381 (REP 2016), and rosidl's type description.
 """
@@ -63,7 +63,7 @@ def type_hash(name: str, fields: Callable[[str], Fields]) -> str:
 
 
 def _described(text: str) -> tuple[int, int, str]:
-    """Return a field's type as type number, maximum number of elements, and message name, or "" if it is not a message."""
+    """Return a field's type as (type number, maximum number of elements, message name). The name is "" if it is not a message."""
     added, capacity, base = 0, 0, text
     if text.startswith("sequence<"):
         base, _, bound = text[len("sequence<") : -1].partition(",")

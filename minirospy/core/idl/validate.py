@@ -39,7 +39,7 @@ _SHOWN = 80
 
 
 def is_type_name(name: str) -> bool:
-    """Return whether a string is ``pkg/Name`` in ROS's grammar, and neither part is a Python keyword."""
+    """Return whether a string is ``pkg/Name`` in ROS's grammar, without a Python keyword in either part."""
     package, slash, short = name.partition("/")
     return bool(slash) and all(
         _NAME.fullmatch(part) and not keyword.iskeyword(part) for part in (package, short)
@@ -95,7 +95,7 @@ def check_types(spec: MessageSpec, lookup: Callable[[str], MessageSpec]) -> list
     try:
         order = list(TopologicalSorter(needed).static_order())
     except CycleError as error:
-        # In graphlib's list of the cycle, the first name is repeated at the end.
+        # The first name is repeated at the end of graphlib's list of the cycle.
         around = spec.full_name if spec.full_name in error.args[1] else error.args[1][0]
         raise DefinitionError(spec.full_name, 1, f"[{around}] contains itself") from None
 

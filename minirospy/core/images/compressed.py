@@ -38,7 +38,7 @@ class Options(NamedTuple):
     quality: int = _QUALITY  # JPEG quality, from 1 to 100
     progressive: bool = False
     optimize: bool = False
-    # PNG compression, from 0 to 9 (the smallest file); None for the library's default
+    # PNG compression level, from 0 to 9 (the smallest file); None for the library's default
     level: int | None = None
 
 
@@ -142,7 +142,7 @@ def encode(image: Pixels, format: str, options: Options | None = None) -> bytes:
 
 
 def _swapped(image: Pixels) -> Pixels:
-    """Return an image with red and blue exchanged, because OpenCV uses BGR and Pillow RGB."""
+    """Swap an image's red and blue channels, because OpenCV uses BGR and Pillow RGB."""
     import numpy as np
 
     if image.ndim == 2:

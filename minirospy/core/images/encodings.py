@@ -60,7 +60,7 @@ def is_converted_by_opencv(source: str, wanted: str) -> bool:
 
 
 def converted(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Return an image in another encoding, or the same array if nothing changes.
+    """Convert an image to another encoding. Return the same array if nothing changes.
 
     Raise ValueError, with ROS's message, if there is no such conversion.
     """
@@ -129,7 +129,7 @@ def _recolored(image: Pixels, source: str, wanted: str) -> Pixels:
 
 
 def _of_depth(image: Pixels, source: str, wanted: str) -> Pixels:
-    """Return an image converted to another depth: 8 and 16 bits are scaled, other depths are rounded and clipped."""
+    """Convert an image to another depth: 8 and 16 bits are scaled, other depths are rounded and clipped."""
     import numpy as np
 
     depths = list(DEPTHS)

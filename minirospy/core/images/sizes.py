@@ -121,4 +121,4 @@ _READERS = {
     b"MM\0*": _tiff,
     b"\0\0\0\x0cjP  ": _jpeg_2000,
     b"\xff\x4f\xff\x51": _jpeg_2000,
-}  # dict from a format's first bytes to the function that reads the size
+}  # dict from a format's first bytes to the function that reads an image's size

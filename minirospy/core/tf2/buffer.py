@@ -45,7 +45,7 @@ class _Walk(NamedTuple):
 
 
 class TransformBuffer(FrameTree):
-    """The frame tree over the last ``cache_time`` nanoseconds, and lookups in it."""
+    """The frame tree over the last ``cache_time`` nanoseconds, with lookups in it."""
 
     # --- lookups
 
@@ -235,7 +235,7 @@ class TransformBuffer(FrameTree):
         if target is source:
             return self._newest_of(target.name)
 
-        # This is :meth:`_ancestors`, inlined for speed: most lookups need only this part.
+        # This inlines :meth:`_ancestors` for speed: most lookups need only this part.
         above_source: list[tuple[int, Frame]] = []
         common = _FOREVER
         frame, arrived = source, self._arrived

@@ -12,7 +12,7 @@ from minirospy.core.tf2.rotation import slerp
 
 __all__ = ["Frame", "Misfit", "Sample", "StaticCache", "TimeCache", "seconds"]
 
-# Maximum number of expired samples before the lists are shortened, so that not every insertion moves all samples
+# Maximum number of expired samples before the lists are trimmed, so that not every insertion moves all samples
 _COMPACT_ABOVE = 32
 
 
@@ -179,7 +179,7 @@ class StaticCache:
         return self._sample
 
     def latest(self) -> tuple[int, Frame]:
-        """Return stamp 0 and the parent."""
+        """Return stamp 0 and the parent frame."""
         return 0, self._sample[0]
 
     def why_not(self, time: int) -> str:

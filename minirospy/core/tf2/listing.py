@@ -75,7 +75,7 @@ def _root(frame: Frame, now: int) -> str:
 
 
 def escaped_name(name: str) -> str:
-    """Return a name escaped for a quoted string in graphviz's language."""
+    """Escape a name for a quoted string in graphviz's language."""
     return name.replace("\\", "\\\\").replace('"', '\\"')
 
 

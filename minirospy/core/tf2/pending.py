@@ -39,7 +39,7 @@ class TransformSample(NamedTuple):
 
 
 class Arrival(NamedTuple):
-    """A stored message: its number in order of arrival, its sender, and its bytes."""
+    """A stored message: its sequence number of arrival, its sender, and its bytes."""
 
     number: int
     authority: str
@@ -56,7 +56,7 @@ class _Offsets(NamedTuple):
 
 
 def read_transforms(data: bytes) -> list[TransformSample]:
-    """Return the transforms in a serialized tf2_msgs/TFMessage (tf/tfMessage is the same).
+    """Parse the transforms in a serialized tf2_msgs/TFMessage, or tf/tfMessage, which has the same format.
 
     Raise DeserializationError if the bytes are not a TFMessage.
     """
@@ -155,7 +155,7 @@ class Layouts:
                 yield layout
 
     def find(self, data: bytes) -> Layout | None:
-        """Return a message's layout, or None if it is unknown or the message is invalid."""
+        """Return a message's layout, or None if the layout is unknown or the message is invalid."""
         if data[:4] == b"\1\0\0\0":
             return self._single.get(data[16:-56])
         candidates = self._several.get(len(data))
@@ -168,7 +168,10 @@ class Layouts:
         return None
 
     def add(self, data: bytes) -> Layout | None:
-        """Add a layout for a message and return it; return None if there are no frames, a duplicate, or too many layouts."""
+        """Add a layout for a message and return it.
+
+        Return None if there are no frames, a duplicate frame, or too many layouts.
+        """
         found = _find_transforms(data)
         children = {offsets.child for offsets in found}
         if not found or len(children) < len(found) or self._count >= _MAX_LAYOUTS:

@@ -1,4 +1,4 @@
-"""Operations on quaternions (x, y, z, w), vectors and rigid transforms as plain floats, without an array library.
+"""Operations on quaternions (x, y, z, w), vectors and rigid transforms in plain floats, without an array library.
 
 A quaternion's length need not be exactly one: tf2 accepts a squared length within 0.01 of 1 and never
 normalizes, and neither do the functions here. Source: Shoemake, "Animating rotation with quaternion curves" (1985).

@@ -130,7 +130,7 @@ class FrameTree:
         authority: str,
         is_static: bool,
     ) -> bool:
-        """Insert a transform; earlier transforms of the same frame must have been inserted before."""
+        """Insert a transform. Earlier transforms of the same frame must already be inserted."""
         if child in self._lazy:
             self._settle(self._frames[child])
         return self._take(parent, child, stamp, translation, rotation, authority, is_static)

@@ -28,7 +28,7 @@ def tree_lines(robot: Robot) -> Iterator[str]:
 
 
 def _numbered(robot: Robot, link: str) -> list[tuple[int, str]]:
-    """Return a link's children with their numbers, in reverse order."""
+    """Return a link's children and their numbers, in reverse order."""
     return [*enumerate((joint.child for joint in robot.child_joints(link)), 1)][::-1]
 
 

@@ -11,7 +11,7 @@ __all__ = ["Element", "parse_xml"]
 
 
 def parse_xml(text: str | bytes, file: str) -> Element:
-    """Return the root of an XML text; ``file`` is its name in errors. Raise UrdfError if the text is not accepted."""
+    """Parse XML text and return its root. ``file`` is its name in errors. Raise UrdfError if the text is not accepted."""
     if not text.strip():
         raise UrdfError(file, 0, "Error document empty.")
     try:

@@ -38,7 +38,10 @@ class ElementError(ValueError):
 
 
 def read_link(element: Element, problems: list[Problem]) -> Link:
-    """Return a link without its invalid parts, which are added to ``problems``. Raise ElementError if the link is unusable."""
+    """Parse a ``<link>`` element.
+
+    Its invalid parts are left out, and added to ``problems``. Raise ElementError if the link is unusable.
+    """
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "No name given for the link.")
@@ -60,7 +63,10 @@ def read_link(element: Element, problems: list[Problem]) -> Link:
 
 
 def read_material(element: Element, problems: list[Problem]) -> Material:
-    """Return a material; a reference by name has neither colour nor texture. Raise ElementError if it has no name."""
+    """Parse a ``<material>`` element.
+
+    A reference by name has neither colour nor texture. Raise ElementError if it has no name.
+    """
     name = element.attributes.get("name")
     if name is None:
         raise ElementError(element.line, "Material must contain a name attribute")

@@ -35,7 +35,7 @@ class Pose(NamedTuple):
 
 
 class Segment:
-    """A joint and the link below it: computes the link's pose in the parent link from the joint's position.
+    """A joint and its child link. Computes the child's pose in the parent link from the joint's position.
 
     As in KDL, a planar joint does not move.
     """

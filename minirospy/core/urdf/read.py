@@ -28,7 +28,7 @@ def read_robot(path: str | Path) -> Robot:
 
 
 def parse_robot(text: str | bytes, file: str = "robot_description") -> Robot:
-    """Return the robot in a description; ``file`` is its name in errors. Raise UrdfError if the description is invalid."""
+    """Parse a robot description. ``file`` is its name in errors. Raise UrdfError if the description is invalid."""
     root = parse_xml(text, file)
     if root.tag != "robot":
         raise UrdfError(file, root.line, "Could not find the 'robot' element in the xml file")

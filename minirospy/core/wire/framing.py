@@ -35,7 +35,7 @@ __all__ = [
 
 CHUNK = 64 * 1024  # bytes per receive while messages are small
 
-LENGTH_BYTES = 4  # bytes in the length prefix of a frame or of a connection header
+LENGTH_BYTES = 4  # bytes in the length prefix of a frame or connection header
 
 MAX_FRAME = 1024 * 1024 * 1024  # bytes; a longer frame is rejected as invalid
 
@@ -52,12 +52,12 @@ def serialize_frame(body: bytes) -> bytes:
 
 
 def parse_length(data: bytes) -> int:
-    """Return the length in the first :data:`LENGTH_BYTES` of ``data``."""
+    """Parse the length in the first :data:`LENGTH_BYTES` of ``data``."""
     return int.from_bytes(data[:LENGTH_BYTES], "little")
 
 
 class LargeFrame(NamedTuple):
-    """A message to send whose pieces are too large to be joined: the pieces, in order, and their total size."""
+    """A message to send in pieces that are too large to be joined: the pieces, in order, and their total size."""
 
     pieces: tuple[bytes, ...]
     size: int
@@ -71,7 +71,7 @@ class LargeFrame(NamedTuple):
 
 
 class Pieces(list[Any]):
-    """The target for a message's ``serialize``: joins small byte strings once, and does not join large ones."""
+    """The target for a message's ``serialize``: joins small byte strings once, and keeps large ones separate."""
 
     __slots__ = ()
     write = list.append
@@ -144,7 +144,7 @@ Frame = memoryview | bytes  # a message's bytes as delivered
 
 
 def may_split(head: bytes, tail: int) -> bool:
-    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes, so that it may be split there."""
+    """Return whether ``head`` ends with the length of a byte array of ``tail`` bytes. If so, the message may be split there."""
     return tail >= CHUNK and len(head) >= 4 and int.from_bytes(head[-4:], "little") == tail
 
 
@@ -178,7 +178,7 @@ class FrameReader:
         self._start = 0
         self._end = 0
         self._large: bytearray | None = None
-        # The number of bytes received from the large frame, and its total size.
+        # The number of bytes received of the large frame, and the frame's total size.
         self._filled: int
         self._wanted = 0
         # The number of bytes in a skipped frame that have not been received yet.
@@ -195,7 +195,7 @@ class FrameReader:
         self._small[: self._end] = data
 
     def space(self) -> memoryview:
-        """Return the memory for the next bytes, which is never empty."""
+        """Return the memory for the next bytes. It is never empty."""
         if self._large is not None:
             if self._filled == len(self._large):
                 # Grow the buffer as bytes arrive, so that a length prefix alone cannot allocate all the memory in

@@ -20,7 +20,7 @@ _LENGTH = struct.Struct("<I")
 
 
 def serialize_header(fields: Mapping[str, str]) -> bytes:
-    """Return the header with its length prefix; the fields are sorted as in rospy and roscpp."""
+    """Serialize the header with its length prefix. The fields are sorted as in rospy and roscpp."""
     pairs = [f"{name}={fields[name]}".encode() for name in sorted(fields)]
     body = b"".join(_LENGTH.pack(len(pair)) + pair for pair in pairs)
     return _LENGTH.pack(len(body)) + body

@@ -39,7 +39,7 @@ _REASONS = {
 }
 
 
-# A message's body; a long one is not copied from the buffer in which it was collected
+# a message's body; a long one is not copied from the buffer that collected it
 Body = bytes | bytearray
 
 
@@ -83,7 +83,7 @@ class HttpMessage(NamedTuple):
 
 
 class HttpReader:
-    """A parser that splits received bytes into complete messages; several messages may be pipelined.
+    """A parser that splits received bytes into complete messages. Several messages may be pipelined.
 
     Optimized for the usual case: a single message in one piece, or its head and then its body.
     """
@@ -197,7 +197,7 @@ class HttpReader:
         return _CONTINUE
 
     def _parse(self, head: HttpHead | None) -> Generator[HttpMessage | None, None, None]:
-        """Yield the messages in the buffer, and None when more bytes are needed; ``head``, if given, has already been removed."""
+        """Yield the messages in the buffer, and None when more bytes are needed. ``head``, if given, has already been removed."""
         while True:
             if head is None:
                 head = _parse_head((yield from self._until(_end_of_head)))
@@ -218,7 +218,7 @@ class HttpReader:
         length = head.headers.get("content-length")
         if length is None:
             if head.start.startswith("HTTP/"):
-                # A response without a length extends to the end of the connection.
+                # A response without a length extends until the connection ends.
                 while not self._ended:
                     self._check(len(self._buffer))
                     yield None
@@ -319,12 +319,12 @@ def _before_return(data: bytearray, at: int) -> int:
 
 
 def serialize_request(host: str, path: str, body: bytes) -> bytes:
-    """Return a POST request with ``body``."""
+    """Serialize a POST request with ``body``."""
     return serialize_request_head(host, path, len(body)) + body
 
 
 def serialize_request_head(host: str, path: str, length: int) -> bytes:
-    """Return the part of a POST request that precedes its body."""
+    """Serialize the part of a POST request that precedes its body."""
     head = (
         f"POST {path or '/'} HTTP/1.1\r\nHost: {host}\r\nUser-Agent: minirospy\r\n"
         f"Content-Type: text/xml\r\nContent-Length: {length}\r\n\r\n"
@@ -333,12 +333,12 @@ def serialize_request_head(host: str, path: str, length: int) -> bytes:
 
 
 def serialize_response(body: bytes, *, keep_alive: bool = True) -> bytes:
-    """Return a successful response with ``body``."""
+    """Serialize a successful response with ``body``."""
     return serialize_response_head(len(body), keep_alive=keep_alive) + body
 
 
 def serialize_response_head(length: int, *, keep_alive: bool = True) -> bytes:
-    """Return the part of a successful response that precedes its body of ``length`` bytes."""
+    """Serialize the part of a successful response that precedes its body of ``length`` bytes."""
     connection = "" if keep_alive else "Connection: close\r\n"
     return (
         f"HTTP/1.1 200 OK\r\nContent-Type: text/xml\r\n{connection}Content-Length: {length}\r\n\r\n".encode()
@@ -346,7 +346,7 @@ def serialize_response_head(length: int, *, keep_alive: bool = True) -> bytes:
 
 
 def serialize_error(status: int, text: str) -> bytes:
-    """Return an error response, after which the connection is closed."""
+    """Serialize an error response, after which the connection is closed."""
     body = (text + "\n").encode()
     return (
         f"HTTP/1.1 {status} {_REASONS[status]}\r\nContent-Type: text/plain; charset=utf-8\r\n"

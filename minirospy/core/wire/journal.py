@@ -106,7 +106,7 @@ def _taken(packer: msgpack.Packer) -> bytes:
 
 
 def unpack(data: bytes) -> object:
-    """Return the value packed by :func:`pack_in_steps`. Raise ValueError if the data is invalid."""
+    """Unpack the value packed by :func:`pack_in_steps`. Raise ValueError if the data is invalid."""
     try:
         return msgpack.unpackb(data, ext_hook=_decode_other, strict_map_key=False)
     except (msgpack.UnpackException, TypeError) as error:
@@ -114,7 +114,7 @@ def unpack(data: bytes) -> object:
 
 
 def parse_journal(data: bytes) -> Recovered:
-    """Return the records in ``data``, up to the first incomplete one."""
+    """Parse the records in ``data``, up to the first incomplete one."""
     if not data.startswith(HEAD):
         return Recovered([], 0, "it does not start as a journal" if data else "it is empty")
     records: list[list[object]] = []

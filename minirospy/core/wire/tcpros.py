@@ -28,7 +28,7 @@ __all__ = [
 
 _NOT_A_NAME = "field [callerid] contains illegal chars"
 
-ANY = "*"  # type and md5sum that a peer sends if it accepts any type
+ANY = "*"  # type and md5sum sent by a peer that accepts any type
 
 
 class InterfaceType(NamedTuple):
@@ -65,7 +65,7 @@ def subscriber_header(
 def publisher_header(
     topic: str, type_: InterfaceType, caller_id: str, *, latch: bool, extra: Mapping[str, str] | None = None
 ) -> Header:
-    """Return the header with which a publisher replies; ``extra`` are the user's fields.
+    """Return a publisher's reply header; ``extra`` are the user's fields.
 
     As in rospy, the user's fields override others: for example, a relay of AnyMsg sends the type of the relayed messages.
     """
@@ -137,7 +137,7 @@ def service_client_header(
 def service_header(
     service: str, type_: InterfaceType, caller_id: str, request_type: str, response_type: str
 ) -> Header:
-    """Return the header with which a service replies: rospy's fields, and roscpp's request and response types."""
+    """Return a service's reply header: rospy's fields, and roscpp's request and response types."""
     return {
         "callerid": caller_id,
         "md5sum": type_.md5sum,

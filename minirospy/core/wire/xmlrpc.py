@@ -54,7 +54,7 @@ class Serialized:
 
 
 def serialize_call(method: str, args: Sequence[object]) -> bytes:
-    """Return a call as XML. Raise RpcProtocolError if XML-RPC has no type for a value."""
+    """Serialize a call as XML. Raise RpcProtocolError if XML-RPC has no type for a value."""
     parts = [_HEAD, "<methodCall><methodName>", escape(method), "</methodName><params>"]
     for value in args:
         parts.append("<param>")
@@ -65,7 +65,7 @@ def serialize_call(method: str, args: Sequence[object]) -> bytes:
 
 
 def serialize_response(value: object) -> bytes:
-    """Return a successful response as XML."""
+    """Serialize a successful response as XML."""
     if type(value) is Serialized:
         return b"".join(value.pieces)
     parts = [_HEAD, "<methodResponse><params><param>"]
@@ -75,7 +75,7 @@ def serialize_response(value: object) -> bytes:
 
 
 def serialize_fault(code: int, text: str) -> bytes:
-    """Return a fault as XML."""
+    """Serialize a fault as XML."""
     parts = [_HEAD, "<methodResponse><fault>"]
     write({"faultCode": code, "faultString": text}, parts, 0)
     parts.append("</fault></methodResponse>\n")
@@ -83,7 +83,7 @@ def serialize_fault(code: int, text: str) -> bytes:
 
 
 def serialize_call_in_steps(method: str, args: Sequence[object], most: int) -> Steps[list[bytes]]:
-    """Return a call as XML in pieces, as :func:`serialize_response_in_steps` does for a response."""
+    """Serialize a call as XML in pieces; see :func:`serialize_response_in_steps`."""
     out = Output(most)
     out.parts += [_HEAD, "<methodCall><methodName>", escape(method), "</methodName><params>"]
     for value in args:
@@ -95,7 +95,7 @@ def serialize_call_in_steps(method: str, args: Sequence[object], most: int) -> S
 
 
 def serialize_response_in_steps(value: object, most: int) -> Steps[list[bytes]]:
-    """Return a successful response as XML in pieces. Raise RpcProtocolError if it exceeds ``most`` bytes."""
+    """Serialize a successful response as XML in pieces. Raise RpcProtocolError if it exceeds ``most`` bytes."""
     out = Output(most)
     out.parts += [_HEAD, "<methodResponse><params><param>"]
     yield from write_in_steps(value, out, 0)
@@ -104,7 +104,7 @@ def serialize_response_in_steps(value: object, most: int) -> Steps[list[bytes]]:
 
 
 def parse_call_in_steps(body: bytes | bytearray) -> Steps[Call]:
-    """Return the call in a long ``body``. Raise RpcProtocolError if it is malformed."""
+    """Parse the call in a long ``body``. Raise RpcProtocolError if it is malformed."""
     plain = read_plain(body) if len(body) <= _PLAIN_BYTES else None
     if plain and plain[0] is not None:
         return Call(plain[0], plain[1])
@@ -120,7 +120,7 @@ def parse_call_in_steps(body: bytes | bytearray) -> Steps[Call]:
 
 
 def parse_call(body: bytes | bytearray) -> Call:
-    """Return the call in ``body``. Raise RpcProtocolError if it is malformed."""
+    """Parse the call in ``body``. Raise RpcProtocolError if it is malformed."""
     plain = read_plain(body)
     if plain and plain[0] is not None:
         return Call(plain[0], plain[1])
@@ -128,7 +128,7 @@ def parse_call(body: bytes | bytearray) -> Call:
 
 
 def parse_response(body: bytes | bytearray) -> Any:
-    """Return the value in a response. Raise RpcFault if the response is a fault, RpcProtocolError if it is malformed."""
+    """Parse a response and return its value. Raise RpcFault if the response is a fault, RpcProtocolError if it is malformed."""
     plain = read_plain(body)
     if plain and plain[0] is None and len(plain[1]) == 1:
         return plain[1][0]

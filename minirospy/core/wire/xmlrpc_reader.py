@@ -224,7 +224,7 @@ class Reader:
         return self._joined or "".join(self._text)
 
     def _join_text(self) -> None:
-        """Join the pieces of a long string received so far, because joining all at the end would take too long.
+        """Join the received pieces of a long string, because joining all of them at the end would take too long.
 
         Raise RpcProtocolError if the strings exceed the memory limit.
         """

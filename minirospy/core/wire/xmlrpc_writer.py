@@ -22,7 +22,7 @@ _ALONE_BYTES = 1024 * 1024
 
 
 def escape(text: str) -> str:
-    """Return a string escaped for XML."""
+    """Escape a string for XML."""
     if "&" in text:
         text = text.replace("&", "&amp;")
     if "<" in text:
@@ -144,7 +144,7 @@ class Output:
         return ALONE
 
     def finish(self) -> list[bytes]:
-        """Return the pieces."""
+        """Complete the last piece and return all pieces."""
         self.step()
         return self._pieces
 

@@ -74,8 +74,8 @@ def check_frames(environment: Environment, state: SystemState) -> Iterator[Findi
         yield problem(
             "frames", f"no transforms, but other bytes: {names}", "publish tf2_msgs/TFMessage there"
         )
-    # The workers have stopped together with the node, so ``seen`` does not change any more. With simulated time,
-    # stamps and arrival times cannot be compared.
+    # The workers have stopped together with the node, so ``seen`` no longer changes. With simulated time, stamps and
+    # arrival times cannot be compared.
     yield from frame_findings([*seen.values()], is_simulated=bool(state.publishers.get("/clock")))
 
 
@@ -151,7 +151,7 @@ def _loops(seen: Sequence[Observation]) -> Iterator[Finding]:
 
 
 def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
-    """Yield a warning if there are several trees; suggest a similar frame name for a root that may be misspelt."""
+    """Yield a warning if there are several trees. For a root that may be misspelt, suggest a similar frame name."""
     children = {each.child for each in seen}
     parent = {each.child: sorted(each.parents)[0] for each in seen if each.parents}
     roots = sorted({above for above in parent.values() if above not in children})
@@ -185,7 +185,7 @@ def _trees(seen: Sequence[Observation]) -> Iterator[Finding]:
 
 
 def _similar(name: str, others: Iterable[str]) -> str:
-    """Return the most similar name, or "" if there is none; ignore names that differ only in their digits."""
+    """Return the most similar name, or "" if there is none. Names that differ only in their digits are ignored."""
 
     def plain(text: str) -> str:
         return text.strip("/").lower().replace("-", "_")

@@ -151,7 +151,7 @@ def node_trouble(host: str, trouble: Trouble, place: MasterLocation) -> tuple[st
 
 
 def check_topics(state: SystemState, answers: Answers) -> Iterator[Finding]:
-    """Yield findings for topics whose nodes report different types, and for topics without publishers."""
+    """Yield findings for topics whose nodes report different types, and for topics that have no publishers."""
     differing = differing_types(state, answers)
     for topic, types in differing.items():
         found = "; ".join(f"{type_}: {_names(nodes)}" for type_, nodes in sorted(types.items()))

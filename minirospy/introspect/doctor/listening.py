@@ -44,8 +44,7 @@ _PADDING = "x" * 16384
 
 
 def listen(own: DoctorNode, graph: Graph, report: Callable[[Finding], object]) -> None:
-    """Start serving check requests: connect back to each doctor that sends one, and call ``report`` with each result in a
-    separate thread.
+    """Start serving doctors that request a check: connect back, and call ``report`` with the result in a separate thread.
 
     Raise MasterUnreachableError if no master responds, or RpcError if a call fails.
     """

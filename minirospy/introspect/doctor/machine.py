@@ -97,7 +97,7 @@ def _host_findings(
     own = known[host]
     by_ip, is_address = bool(ip and not hostname), _is_address(host)
     if by_ip and own and not is_address:
-        # Strings such as `192.168.1` resolve too, here to 192.168.0.1.
+        # Strings such as `192.168.1` also resolve, here to 192.168.0.1.
         is_name = not ip.replace(".", "").isdigit()
         yield warning(
             "variables",
@@ -163,7 +163,7 @@ def _other_findings(environ: Mapping[str, str], environment: Environment) -> Ite
     if config and not Path(config).is_file():
         yield warning("variables", f"ROS_PYTHON_LOG_CONFIG_FILE={config} is not a file", "unset it")
 
-    # If a folder does not exist yet, check its nearest existing parent.
+    # If a folder does not exist yet, check its nearest existing parent folder.
     for folder, variable in ((environment.home, "ROS_HOME"), (environment.log_dir, "ROS_LOG_DIR")):
         there = next((each for each in (folder, *folder.absolute().parents) if each.exists()), folder)
         if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):

@@ -54,7 +54,7 @@ def check_master(master: MasterProxy, place: MasterLocation) -> Iterator[Finding
 
 
 def check_clock(master: MasterProxy, place: MasterLocation) -> Iterator[Finding]:
-    """Yield a finding on the difference between the master's clock and the local one; yield nothing if the master is local."""
+    """Yield a finding on the difference between the master's clock and the local one. Yield nothing if the master is local."""
     if place.is_local:
         return
     before = time.time()

@@ -1,4 +1,4 @@
-"""The doctor's own node, for checking whether other machines, the master's first, reach nodes on this machine.
+"""The doctor's own node, for checking whether other machines, above all the master's, reach nodes on this machine.
 
 It is a normal node while the doctor runs: peers that reach it also reach the user's nodes.
 """
@@ -169,9 +169,7 @@ def check_own_address(own: DoctorNode) -> Iterator[Finding]:
 
 
 def check_way_back(own: DoctorNode, master_host: str, log_listeners: Collection[str]) -> Iterator[Finding]:
-    """Yield findings on whether the master calls this node, and whether /rosout's subscribers (``log_listeners``) connect to
-    it.
-    """
+    """Yield findings on whether the master calls this node, and whether /rosout's subscribers (``log_listeners``) connect."""
     if not own.told_by_master.wait(CONNECT_SECONDS):
         yield unreached_finding(own, f"the master's machine ({master_host})", master_host, None)
         return

@@ -267,7 +267,7 @@ class Journal:
         return len(data)
 
     def _put_in_place(self, file: int) -> int:
-        """Rename the new, synced file to the journal's name; return its open descriptor. Raise OSError if renaming fails."""
+        """Rename the new, synced file to the journal's name. Return its open descriptor. Raise OSError if renaming fails."""
         if sys.platform == "win32":
             # Windows can neither replace an open file nor rename one.
             self._close_file()
@@ -297,7 +297,7 @@ class Journal:
                 self._new_path.unlink()
 
     def retry(self) -> None:
-        """Write the current state if writing failed at least half a minute ago. Never raises."""
+        """Write the current state if the last failed attempt was at least half a minute ago. Never raises."""
         if self.trouble and self._clock() - self._failed_at >= RETRY_SECONDS:
             self.start()
             if not self.trouble:
@@ -416,7 +416,7 @@ def _write_all(file: int, data: bytes) -> None:
 
 
 def _locked(path: Path, journal: Path) -> int:
-    """Return the descriptor of a lock file, which contains the process id; the system releases the lock when this process exits.
+    """Lock a file that contains the process id; return its descriptor. The system releases the lock when this process exits.
 
     Raise JournalBusyError if another master has locked it, OSError if it cannot be locked.
     """

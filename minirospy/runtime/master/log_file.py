@@ -1,4 +1,4 @@
-"""A master's log files. Lines are collected and written twice a second, so that thousands per second cost little."""
+"""A master's log files. Lines are buffered and written twice a second, so that thousands per second cost little."""
 
 from __future__ import annotations
 

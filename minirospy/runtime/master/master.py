@@ -141,7 +141,7 @@ class Master(MasterApi):
 
     @property
     def omits_topics(self) -> bool:
-        """Return whether rosout.log omits the topic lists, as the parameter /rosout/omit_topics specifies."""
+        """Return whether the parameter /rosout/omit_topics makes rosout.log omit the topic lists."""
         key = "/rosout/omit_topics"
         return self.parameters.has(key) and self.parameters.get(key) is True
 
@@ -209,7 +209,7 @@ class Master(MasterApi):
         if self.registry.is_large:
             yield ALONE
         if self._state[0] == self.registry.changes:
-            # Another client's request serialized the state while this request was queued.
+            # Another client's request has serialized the state while this request was queued.
             return self._state[1]
 
         changes = self.registry.changes
@@ -221,7 +221,7 @@ class Master(MasterApi):
         return state
 
     def notify(self, action: Notice) -> None:
-        """Send the notification to its node."""
+        """Send the notification to the node that it is for."""
         if isinstance(action, NodeShutdown):
             self.parameters.unsubscribe_node(action.name, action.uri)
             self._replaced.warning("another node took the name %s: %s is stopped", action.name, action.uri)
@@ -464,7 +464,7 @@ async def _lives(rpc: AsyncRpcClient, name: str, uri: str, timeout: float, tries
             if isinstance(error.__cause__, (ConnectionRefusedError, EOFError)):
                 return False
         except RpcError:
-            # roscpp has no getName and returns an error, so an error is a response too.
+            # roscpp has no getName and returns an error, so an error counts as a response.
             return True
         else:
             return not (

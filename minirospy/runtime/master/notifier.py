@@ -40,7 +40,7 @@ _SECONDS_PER_TURN = 0.003  # time limit in seconds per loop iteration for starti
 # Maximum pending parameter notifications per node; beyond that, one notification per subscribed key replaces them
 MAX_PARAMETERS = 32
 
-# maximum total size in bytes of large calls in progress; further ones are queued
+# maximum total size in bytes of large calls in progress; the others are queued
 _LARGE_BYTES = 32 * 1024 * 1024
 
 # maximum size in bytes of a node's response to a notification; its contents are ignored
@@ -114,7 +114,7 @@ class Notifier:
         # The last serialized large update, of a topic or a parameter.
         self._last_large: tuple[str, object, list[bytes]] = ("", None, [])
 
-        # The queued large calls; the bytes of those in progress; whether one is being serialized.
+        # The queued large calls, the bytes of those in progress, and whether one is being serialized.
         self._large: deque[Callable[[], None]] = deque()
         self._large_bytes = 0
         self._is_writing = False
@@ -122,7 +122,7 @@ class Notifier:
     def defer(self, uri: str, topic: str) -> None:
         """Delay notifications to a node whose pending response contains the current state of a topic, or of PARAMETERS.
 
-        Otherwise a rospy node might receive the update first and then the response, and apply the response, which is older.
+        Otherwise a rospy node might receive the update before the response, and apply the older response last.
         """
         now = asyncio.get_running_loop().time()
         while self._held and next(iter(self._held.values())) <= now:

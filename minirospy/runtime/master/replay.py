@@ -78,7 +78,7 @@ class Replay:
 def changes_to(registry: Registry, parameters: ParameterTree) -> Iterator[list[object]]:
     """Return the changes that lead from an empty state to the current one, preserving the order of every table.
 
-    The state is copied immediately: the returned changes may be read while the state changes further.
+    The state is copied immediately, so it may change while the returned changes are read.
     """
     uris, types = registry.nodes(), registry.topic_types()
     # Each of these results is a copy.

@@ -33,7 +33,7 @@ _log = logging.getLogger(__name__)
 _FLUSH_SECONDS = 0.5
 MAX_IDLE = 200  # maximum number of idle connections to the Slave API; a node's peers keep about one each
 
-# seconds after an unsubscription in which the master may still send lists of publishers
+# seconds after an unsubscription during which the master may still send lists of publishers
 _STALE_SECONDS = 5.0
 
 _REQUEST_AGAIN_SECONDS = 0.5
@@ -68,7 +68,7 @@ class Node:
         self.services: dict[str, ServiceServer] = {}
         # topics unsubscribed from recently, each with its timer
         self._left: dict[str, asyncio.TimerHandle] = {}
-        # Topics whose publishers will be requested from the master again
+        # Topics whose publishers will be requested again from the master
         self._requesting: dict[str, asyncio.TimerHandle] = {}
 
         self.uri = ""
@@ -149,7 +149,7 @@ class Node:
     async def close(self, *, announces: bool = True) -> None:
         """Leave the graph: unregister from the master, flush the links, close everything. Idempotent.
 
-        Waits for the master as :meth:`Registrations.close` does, or until :meth:`stop_unregistering` is called. If the master
+        Waits for the master (see :meth:`Registrations.close`), or until :meth:`stop_unregistering` is called. If the master
         does not respond, the remaining registrations stay in it. With ``announces``, a line is logged if this takes long.
         """
         if self._closed:
@@ -339,7 +339,7 @@ class Node:
             sock.close()
 
     def _open_unix_listener(self) -> None:
-        """Serve topics and services through a Unix socket too, if the system supports it."""
+        """Also serve topics and services through a Unix socket, if the system supports it."""
         sock = local.bind(self.environment.uri_host, self.tcpros_port)
         if sock:
             self.this_host = local.this_host()

@@ -147,7 +147,7 @@ class Registrations:
         return answer
 
     async def _look(self, method: str, name: str) -> object:
-        """Look up this node's address, or that of one of its services.
+        """Look up this node's address, or one of its services' addresses.
 
         Raise MasterUnreachableError or RpcError if the look-up fails.
         """
@@ -162,7 +162,7 @@ class Registrations:
         return found
 
     def request_again(self, topic: str) -> None:
-        """Register a subscription again, because the master's last list of publishers may be outdated."""
+        """Register a subscription again, because the last list of publishers from the master may be outdated."""
         key = ("Subscriber", topic)
         if self._known.get(key):
             self._known[key] = None

@@ -150,7 +150,7 @@ class ServiceClient:
 
 
 def parse_service_uri(uri: str) -> tuple[str, int]:
-    """Return (host, port) of ``rosrpc://host:port``. Raise WireError if the URI is invalid."""
+    """Parse ``rosrpc://host:port`` into (host, port). Raise WireError if the URI is invalid."""
     try:
         host, port, _ = split_uri(uri, "rosrpc")
     except ValueError:
@@ -203,7 +203,7 @@ class Reader:
         try:
             return self._receive(min(count, _MOST), flags)
         except ConnectionResetError:
-            # The peer closed a connection with unread data, which counts as end of file too.
+            # The peer closed a connection with unread data, which also counts as end of file.
             return b""
 
     def _take_large(self, data: bytes, count: int) -> bytes:

@@ -119,7 +119,7 @@ class ServiceServer:
             sock.close()
 
     def close(self) -> None:
-        """Stop serving. Clients with a call in progress still get their responses; all others are disconnected."""
+        """Stop serving. Clients with a call in progress still get their responses; all other clients are disconnected."""
         with self._lock:
             self._closed = True
             for connection in self._open:

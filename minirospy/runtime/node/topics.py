@@ -56,14 +56,14 @@ SETTLE_SECONDS = 10.0  # seconds within which all nodes register again with a ma
 # exited before that
 _WARN_AFTER = 3
 
-# maximum number of log lines about publishers with invalid responses; further ones are only counted
+# maximum number of log lines about publishers with invalid responses; the rest are only counted
 _REFUSALS_LOGGED = 10
 
 # seconds within which a publisher's unreachable topics are combined in one log line
 TOGETHER_SECONDS = 0.25
 MAX_TOPICS_SHOWN = 5  # maximum number of topics named in one log line about an unreachable publisher
 _LEAVE_SECONDS = 10.0
-# a link counts as working once it has received a message or has been open for this many seconds
+# a link counts as working once it has received a message, or has been open for this many seconds
 _WORKED_SECONDS = 5.0
 
 Deliver = Callable[[Frame, Header], None]
@@ -139,8 +139,7 @@ class Publication:
                 link.wait()
 
     def accept(self, sock: socket.socket, fields: Header, caller_id: str, peer: str) -> str | None:
-        """Reply to a subscriber's header as node ``caller_id`` and start sending, or return the reason for refusing the
-        subscriber.
+        """Reply to a subscriber's header as node ``caller_id`` and start sending to it. If refused, return the reason.
 
         Call this on the loop.
         """
@@ -249,11 +248,11 @@ class Unreachable:
         # A list may contain a thousand publishers that refuse: logging all of them would block the loop for 0.2 s.
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self._waiting: dict[str, tuple[list[str], Exception, str]] = {}
-        """Dict from a publisher's URI to its topics, and the error and advice for the first of them."""
+        """Dict from a publisher's URI to its topics, and to the error and the advice for the first topic."""
         self._timer: asyncio.TimerHandle | None = None
 
     def add(self, uri: str, topic: str, error: Exception, advice: str) -> None:
-        """Log an unreachable publisher a moment later, in one line with its other unreachable topics."""
+        """Log an unreachable publisher after a moment, in one line with its other unreachable topics."""
         self._waiting.setdefault(uri, ([], error, advice))[0].append(topic)
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(TOGETHER_SECONDS, self._report)
@@ -459,8 +458,8 @@ class Subscription:
             if self.lists == lists:
                 self.plan.refused(uri)
             else:
-                # A newer list arrived after this refusal, and there may be no further list, so retry now: the
-                # publisher may accept.
+                # A newer list arrived after this refusal, and it may be the last one, so retry now: the publisher may
+                # accept.
                 self.retry(uri, error)
         except _NoPublisher as error:
             self._limited_log.warning("no connection for %s: %s", self.topic, error)
@@ -592,7 +591,7 @@ class Subscription:
             return
         fault = link.fault or EOFError("the publisher closed the connection")
         if isinstance(fault, WireError):
-            # Log one line and disconnect: everything after the error in such a stream is invalid too.
+            # Log one line and disconnect, because everything after the error in such a stream is also invalid.
             _log.warning("connection to %s for %s ended: %s", link.uri, self.topic, fault)
         elif link.received or time.monotonic() - link.since > _WORKED_SECONDS:
             self.plan.worked(link.uri)

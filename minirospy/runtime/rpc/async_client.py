@@ -37,7 +37,7 @@ KEEP_SECONDS = 10.0
 # 10035 is WSAEWOULDBLOCK, which Windows reports while connecting.
 _UNDER_WAY = {errno.EINPROGRESS, errno.EWOULDBLOCK, 10035}
 
-# Matches nearly all node URIs, because a complete parse costs as much as the call
+# Matches nearly all node URIs and avoids a complete parse, which costs as much as the call
 _USUAL_URI = re.compile(r"http://([A-Za-z0-9._-]+):([1-9][0-9]{0,3}|[1-5][0-9]{4})(/[A-Za-z0-9._/-]*)?")
 
 _Address = tuple[str, int]
@@ -99,7 +99,7 @@ class AsyncRpcClient:
         self.under_way.close()
 
     def acquire(self, address: _Address) -> _Connection | None:
-        """Take an idle connection to the server at ``address`` out of the pool, or return None if there is none."""
+        """Take an idle connection to the server at ``address``, or return None if there is none."""
         kept = self.idle.get(address)
         if not kept:
             return None
@@ -109,7 +109,7 @@ class AsyncRpcClient:
         return connection
 
     def keep(self, connection: _Connection) -> None:
-        """Return a connection to the pool of idle ones, so that the next call can use it."""
+        """Keep a connection as idle, so that the next call can use it."""
         if self.closed:
             connection.close()
             return
@@ -127,7 +127,7 @@ class AsyncRpcClient:
             self._sweep = loop.call_later(KEEP_SECONDS, self._close_idle)
 
     def drop(self, connection: _Connection) -> None:
-        """Remove an idle connection that has closed from the pool."""
+        """Remove a connection that has closed from the idle ones."""
         connection.close()
         kept = self.idle[connection.address]
         kept.remove(connection)
@@ -170,7 +170,7 @@ class _Connection:
             self._loop.add_reader(self._fd, self._readable)
 
     def write_on(self, function: Callable[[], None]) -> None:
-        """Call ``function`` when the socket is writable."""
+        """Call ``function`` whenever the socket is writable."""
         self._loop.add_writer(self._fd, function)
 
     def stop_writing(self) -> None:
@@ -178,7 +178,7 @@ class _Connection:
         self._loop.remove_writer(self._fd)
 
     def close(self) -> None:
-        """Close the connection."""
+        """Close the connection's socket."""
         if self._is_watched:
             self._loop.remove_reader(self._fd)
         self.sock.close()
@@ -483,7 +483,7 @@ def _settle(answer: asyncio.Future[Body], found: Body | RpcError) -> None:
 
 
 def _parts(uri: str) -> tuple[str, int, str]:
-    """Return host, port and path. Raise RpcUnreachable if the URI is invalid."""
+    """Split a URI into host, port and path. Raise RpcUnreachable if it is invalid."""
     usual = _USUAL_URI.fullmatch(uri)
     return (usual[1], int(usual[2]), usual[3] or "/") if usual else parse_http_uri(uri)
 

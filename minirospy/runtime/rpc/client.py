@@ -125,7 +125,7 @@ class RpcClient:
 
 
 def parse_http_uri(uri: str) -> tuple[str, int, str]:
-    """Return (host, port, path) of ``http://host:port/path``. Raise RpcUnreachable if the URI is invalid."""
+    """Parse ``http://host:port/path`` into (host, port, path). Raise RpcUnreachable if the URI is invalid."""
     try:
         return split_uri(uri)
     except ValueError as error:

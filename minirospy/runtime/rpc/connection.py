@@ -60,7 +60,7 @@ The first value is small, because all pipelined requests in one receive are pars
 
 _END_OF_HEAD = b"\r\n\r\n"
 
-# Number of requests processed immediately if several arrive together; the remaining ones are processed in steps
+# Number of requests processed immediately if several arrive together; the rest are processed in steps
 _ANSWERS_AT_ONCE = 1
 
 
@@ -99,7 +99,7 @@ class Connection:
         self._state: State = _OPEN
 
         self._out = Outbox(sock)
-        # The next request to process; further requests that arrived with it are still unparsed bytes.
+        # The next request to process. Other requests that arrived with it are still unparsed bytes.
         self._message: HttpMessage | None = None
         self._has_deadline = False
         self._has_requested = False
@@ -221,7 +221,7 @@ class Connection:
         self._server.turns.start(self._read_much(reading))
 
     def _read_much(self, reading: object) -> Steps[None]:
-        """Read until nothing more is available, or until other code has stopped or restarted reading."""
+        """Read until nothing is left to read, or until other code has stopped or restarted reading."""
         while self._reading is reading:
             data = self._receive(_RECEIVE if self._reader.in_chunks else _RECEIVE_MORE)
             if data is None:
@@ -246,7 +246,7 @@ class Connection:
             return
 
         if self._state is _REFUSED:
-            # The client was refused, so ignore all further data.
+            # The client was refused, so ignore all data from now on.
             if not data:
                 self.end()
             return
@@ -419,7 +419,7 @@ class Connection:
         self._server.log_refusal(self._sock, why)
 
     def _drop_request(self) -> None:
-        """Discard the current request."""
+        """Discard the current request and its data."""
         self._message = None
         self._reader.close()
         self._work_bytes = 0

@@ -64,7 +64,7 @@ def master_unreachable(error: RpcUnreachable) -> MasterUnreachableError:
 
 
 class MasterProxy:
-    """A proxy for the master at ``uri``; calls are made as the node ``caller_id``.
+    """A proxy for the master at ``uri``. Calls are made as the node ``caller_id``.
 
     Each method raises MasterUnreachableError if the master does not respond, RpcRefused if it refuses the call.
     """
@@ -129,7 +129,7 @@ class MasterProxy:
         return list(self.call("registerPublisher", topic, type_, caller_api))
 
     def unregister_publisher(self, topic: str, caller_api: str) -> int:
-        """Unregister a publisher; return how many there were (0 or 1)."""
+        """Unregister a publisher; return the number of registrations removed (0 or 1)."""
         return int(self.call("unregisterPublisher", topic, caller_api))
 
     def register_subscriber(self, topic: str, type_: str, caller_api: str) -> list[str]:
@@ -137,7 +137,7 @@ class MasterProxy:
         return list(self.call("registerSubscriber", topic, type_, caller_api))
 
     def unregister_subscriber(self, topic: str, caller_api: str) -> int:
-        """Unregister a subscriber; return how many there were (0 or 1)."""
+        """Unregister a subscriber; return the number of registrations removed (0 or 1)."""
         return int(self.call("unregisterSubscriber", topic, caller_api))
 
     def register_service(self, name: str, service_api: str, caller_api: str) -> None:
@@ -145,7 +145,7 @@ class MasterProxy:
         self.call("registerService", name, service_api, caller_api)
 
     def unregister_service(self, name: str, service_api: str) -> int:
-        """Unregister a service; return how many there were (0 or 1)."""
+        """Unregister a service; return the number of registrations removed (0 or 1)."""
         return int(self.call("unregisterService", name, service_api))
 
     def get_param(self, key: str) -> Any:

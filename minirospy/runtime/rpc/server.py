@@ -96,7 +96,7 @@ class RpcServer:
         self.dispatch = dispatch
         self.port = port
         self.refused = 0  # number of connections refused by ``access``
-        self.held = 0  # total bytes of requests that are incomplete or being read
+        self.held = 0  # total bytes of requests that are incomplete or are being read
         self.holders: dict[Connection, int] = {}  # dict from connection to its share of ``held``, in bytes
         self.unread = 0  # total bytes of responses that clients have not read yet
         self.slow: OrderedDict[Connection, None] = OrderedDict()
@@ -121,7 +121,7 @@ class RpcServer:
         self._reads = 0
         self._reads_end = 0.0
         self._reads_over = False
-        # Connections to read from in the next iteration: new ones, and those that have made a request before.
+        # Connections to read in the next iteration: new ones, and those that have made a request before.
         self._late_new: OrderedDict[Connection, None] = OrderedDict()
         self._late: OrderedDict[Connection, None] = OrderedDict()
 
@@ -145,7 +145,7 @@ class RpcServer:
             return
         sock = tcp.bind(self._bind_host, self.port, self._ports)
         try:
-            # Accepted sockets inherit this option.
+            # Accepted sockets inherit this option from the listening one.
             sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             # Listen here, because two sockets may be bound to one port as long as neither listens.
             sock.listen(_BACKLOG)
@@ -202,7 +202,7 @@ class RpcServer:
         self._late.pop(connection, None)
 
     def _may_read(self) -> bool:
-        """Return whether one more connection may be read in this loop iteration.
+        """Return whether another connection may be read in this loop iteration.
 
         Occasionally, accept new connections first.
         """
@@ -226,8 +226,8 @@ class RpcServer:
         self._reads, self._reads_over = 0, False
         number = 0
         while (self._late_new or self._late) and self._may_read():
-            # Alternate between new and other connections, so that many of one kind do not delay the other kind. The
-            # kinds are new connections, idle ones that disconnect, and busy ones.
+            # Alternate between new and other connections (idle ones that disconnect, and busy ones), so that many
+            # connections of one kind do not delay the other kind.
             if self._late_new and (number % 3 or not self._late):
                 connection, _ = self._late_new.popitem(last=number % 2 == 0)
             else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from minirospy.base.errors import UsageError
 
 if TYPE_CHECKING:
-    # Imported only for type checking; otherwise imported only if networks are given, which is rare.
+    # Imported for type checking; at run time only if networks are given, which is rare.
     from ipaddress import IPv4Network, IPv6Network
 
 __all__ = ["Access", "listening_lines"]

@@ -14,14 +14,14 @@ _T = TypeVar("_T")
 class Deadlines(Generic[_T]):
     """The time limit of each operation in progress.
 
-    ``late`` is called on the loop with each operation that has passed its limit, in the order of the limits.
+    ``late`` is called on the loop with each overdue operation, in the order of the limits.
     """
 
     def __init__(self, late: Callable[[_T], object]) -> None:
         self._late = late
         self._ends: dict[_T, float] = {}
         self._timer: asyncio.TimerHandle | None = None
-        # The time at which the timer fires, which is no later than the earliest limit.
+        # The time at which the timer fires, no later than the earliest limit.
         self._next = 0.0
 
     def __len__(self) -> int:

@@ -22,7 +22,7 @@ def naming_thread_limit() -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:
-        # Let other errors pass: while it exits, Python also raises RuntimeError here; since 3.13 it raises a separate
+        # Let other errors pass: Python also raises RuntimeError here while it exits; since 3.13 it raises a separate
         # class.
         if sys.is_finalizing() or type(error) is not RuntimeError:
             raise

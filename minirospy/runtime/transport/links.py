@@ -171,7 +171,7 @@ class OutLink:
             if not outbox:
                 return False
         if self._is_full():
-            # The first frame may be partly sent, so it must not be dropped.
+            # The first frame may have been partly sent, so it must not be dropped.
             del outbox[1 if self._begun else 0]
             self.dropped += 1
         outbox.append(frame)

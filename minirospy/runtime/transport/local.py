@@ -32,7 +32,7 @@ class UnixAddress(NamedTuple):
 
 
 def this_host() -> str:
-    """Return a string that is the same in two processes if, and only if, abstract sockets can connect them. "" if unsupported."""
+    """Return a string that is equal in two processes if and only if abstract sockets can connect them; "" if unsupported."""
     if sys.platform != "linux":
         return ""
     try:
@@ -82,7 +82,7 @@ def reach(host: str, port: int) -> socket.socket | None:
 
 
 def parse_answer(answer: object) -> UnixAddress | None:
-    """Return the address from a publisher's response to requestTopic, or None if it is for another protocol."""
+    """Parse the address in a publisher's response to requestTopic. Return None if it is for another protocol."""
     match answer:
         # A peer must not be able to choose any other socket on this machine, such as a display's or a message bus's.
         case [1, _, ["UNIXROS", str(name), str(host), int(port), *_]] if name.startswith(_PREFIX):

@@ -56,7 +56,7 @@ class LoopThread:
         return self.start(coroutine)(timeout)
 
     def start(self, coroutine: Coroutine[object, object, _T]) -> Callable[[float | None], _T]:
-        """Start ``coroutine`` as :meth:`run` does, without waiting; coroutines start in the order of the calls.
+        """Like :meth:`run`, but do not wait. Coroutines start in the order of the calls.
 
         Return a function that waits for the result; call it once.
         """
@@ -98,7 +98,7 @@ class LoopThread:
             raise
 
     def post(self, function: Callable[..., object], *args: object) -> None:
-        """Call ``function`` on the loop soon; no effect once the loop is closed."""
+        """Call ``function`` on the loop soon. No effect once the loop is closed."""
         with contextlib.suppress(RuntimeError):
             self.loop.call_soon_threadsafe(function, *args)
 

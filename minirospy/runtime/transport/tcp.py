@@ -45,7 +45,7 @@ _log = logging.getLogger(__name__)
 
 
 def bind(host: str, port: int = 0, ports: range | None = None) -> socket.socket:
-    """Return a socket bound to an address on this machine; port 0 means any free port, from ``ports`` if given.
+    """Bind a socket to an address on this machine and return it. Port 0 means any free port, from ``ports`` if given.
 
     Raise OSError if it cannot be bound.
     """
@@ -119,7 +119,7 @@ async def receive_header(
 
 
 async def send_header(sock: socket.socket, fields: Header) -> None:
-    """Send a connection header."""
+    """Send a connection header with these fields."""
     data = serialize_header(fields)
     try:
         # This does not block, because the header is short, and a new socket's buffer is empty.
@@ -146,13 +146,13 @@ class Listener:
         self._accept = accept
         self._allows = allows
         self._sock: socket.socket | None = None
-        # Dict from handshake task to the peer's address, in the order in which the tasks started.
+        # Dict from handshake task to the peer's address, in starting order.
         self.handshakes: dict[asyncio.Task[None], str] = {}
         self._limited_log = RateLimitedLogger(_log, _REFUSALS_LOGGED)
         self.port = 0
 
     def open(self, host: str, port: int = 0, ports: range | None = None) -> None:
-        """Listen on ``host``; port 0 means any free port, from ``ports`` if given. Raise OSError if that fails."""
+        """Listen on ``host``. Port 0 means any free port, from ``ports`` if given. Raise OSError if that fails."""
         sock = bind(host, port, ports)
         self.listen(sock)
         self.port = sock.getsockname()[1]
@@ -188,7 +188,10 @@ class Listener:
             asyncio.get_running_loop().add_reader(self._sock, self._take_one, self._sock)
 
     def _take_one(self, sock: socket.socket) -> None:
-        """Accept one connection. The loop calls this again for the next one, so that the accepted one is served in between."""
+        """Accept one connection.
+
+        The loop calls this again for the next one, so that the accepted connection is served in between.
+        """
         try:
             peer, address = sock.accept()
         except (BlockingIOError, InterruptedError):

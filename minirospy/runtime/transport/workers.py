@@ -32,7 +32,10 @@ class Workers:
         self._idle = 0
 
     def start(self, function: Callable[..., object], *args: object) -> None:
-        """Run ``function(*args)`` in a worker; log an uncaught exception. Raise ThreadLimitError if no thread can be started."""
+        """Run ``function(*args)`` in a worker, and log an uncaught exception.
+
+        Raise ThreadLimitError if no thread can be started.
+        """
         with self._lock:
             if self._idle:
                 # A claimed worker always takes an entry, because a worker that exits without one first removes itself
@@ -66,7 +69,7 @@ class Workers:
 
 
 class InOrder:
-    """Runs functions in workers, one at a time, in the order in which they were started."""
+    """Runs functions in workers, one at a time, in the order of the calls to :meth:`start`."""
 
     def __init__(self, workers: Workers) -> None:
         self._workers = workers
@@ -75,7 +78,7 @@ class InOrder:
         self._is_running = False
 
     def start(self, function: Callable[..., object], *args: object) -> None:
-        """Run ``function(*args)`` after the functions that were passed earlier; log an uncaught exception."""
+        """Run ``function(*args)`` after the functions passed earlier. Log an uncaught exception."""
         with self._lock:
             self._waiting.append((function, args))
             if self._is_running:

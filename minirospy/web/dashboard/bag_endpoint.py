@@ -68,7 +68,7 @@ class BagEndpoint(JsonEndpoint["BagSession"]):
         is_starting = self._starting and not self._starting.done()
         if is_starting or (self.recording and not self.recording.state().is_ended):
             raise UsageError("there is a recording already: stop it first")
-        # The page may be closed while the recording starts, and the child process must then be stopped and not lost.
+        # The page may be closed while the recording starts. The child process must then be stopped, not lost.
         self._starting = self.spawn(self._start(name, suffix, topics, compression))
         await asyncio.shield(self._starting)
 
@@ -128,7 +128,7 @@ class BagSession(JsonSession):
         super().__init__(client, handlers)
 
     async def follow(self) -> float | None:
-        """Send the states of the recording and the player, the current messages of shown topics, and a pending thumbnail."""
+        """Send the state of the recording and of the player, the current messages of shown topics, and a pending thumbnail."""
         recording = self._endpoint.recording
         state = recording.state() if recording else None
         self._send_changed("recording", state._asdict() if state else None)
@@ -214,7 +214,7 @@ class BagSession(JsonSession):
         self._sent.pop("state", None)
         if bag:
             bag.output.close()
-            # If the client leaves now, only the waiting is cancelled, not the closing of the bag.
+            # If the client leaves now, cancel only the wait, not the closing of the bag.
             await asyncio.shield(asyncio.wrap_future(self._thread.submit(bag.close)))
 
     async def _play(self, fields: Fields) -> None:
@@ -254,7 +254,7 @@ class BagSession(JsonSession):
         for line in bag.output.switch(bag.timeline, topics, clock=bool(fields.get("clock"))):
             self.send_error(line)
         bag.player.control(has_clock=bag.output.has_clock)
-        # Publish earlier messages from latched topics, because new subscribers would not receive them otherwise.
+        # Publish earlier messages on latched topics, because new subscribers would not receive them otherwise.
         time = bag.state.time
         for topic, body in await self.in_thread(lambda: bag.latched_before(new, time)):
             bag.output.send(topic, body)

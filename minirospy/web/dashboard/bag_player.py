@@ -1,4 +1,4 @@
-"""One opened bag: its timeline, and the player of `rosbag play`, which publishes to the dashboard's graph."""
+"""One opened bag: its timeline, and `rosbag play`'s player, which publishes to the dashboard's graph."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class GraphOutput:
 
     @property
     def published(self) -> list[str]:
-        """Return the enabled topics."""
+        """Return the topics that are enabled."""
         return sorted(self._publications)
 
     @property

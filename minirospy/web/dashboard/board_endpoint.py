@@ -35,7 +35,7 @@ _LOOK_SECONDS = 0.02
 
 
 class BoardEndpoint(JsonEndpoint["BoardSession"]):
-    """Serves the boards of this machine; each client selects its board with ``?board=NAME``."""
+    """Serves this machine's boards. Each client selects its board with ``?board=NAME``."""
 
     def __init__(self) -> None:
         super().__init__(SUBPROTOCOL, BoardSession)

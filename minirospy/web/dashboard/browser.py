@@ -26,7 +26,7 @@ SNAPS = (Path("/snap/bin/firefox"), Path("/snap/bin/chromium"))
 
 
 def has_screen(environ: Mapping[str, str], platform: str = sys.platform) -> bool:
-    """Return whether a browser has a display; without a display, a text browser would take over the terminal."""
+    """Return whether a browser has a display. Without a display, a text browser would take over the terminal."""
     if platform in ("win32", "darwin"):
         return True
     return any(environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME", "BROWSER"))
@@ -46,8 +46,8 @@ class LinkFile:
     """A link's page in a folder that only this user can access."""
 
     def __init__(self, link: str) -> None:
-        """Create the file. Raise OSError if that fails."""
-        # mkdtemp makes the folder accessible only to this user; on Windows it does so by an access control list.
+        """Create the link's file. Raise OSError if that fails."""
+        # mkdtemp makes the folder accessible only to this user; on Windows, it uses an access control list.
         self._folder = Path(tempfile.mkdtemp(prefix="minirospy-browser-", dir=_parent()))
         self.path = self._folder / "dashboard.html"
         try:
@@ -86,7 +86,7 @@ def _open(address: str, remove: Callable[[], object]) -> Callable[[], object]:
 
 
 def _parent() -> Path | None:
-    """Return the folder in which to create the file's own folder, or None for the system's temporary folder."""
+    """Return the parent for the file's folder, or None to use the system's temporary folder."""
     home = Path.home()
     if any(each.exists() for each in SNAPS) and os.access(home, os.W_OK):
         return home

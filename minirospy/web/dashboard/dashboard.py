@@ -38,8 +38,8 @@ class Dashboard:
         """Create the dashboard.
 
         ``options.foxglove_port`` is the port of the page and its data; the 3D view opens ``rviz_file``. ``bags``: the
-        bags that may be opened, by default all bags in the working folder. ``publishes_joints``: publish joints as
-        joint_state_publisher_gui does, even if no page is open.
+        bags that may be opened, by default all bags in the working folder. ``publishes_joints``: publish joints like
+        joint_state_publisher_gui, even if no page is open.
         """
         master_uri = node.master_uri
         self.codes = Codes()

@@ -45,7 +45,7 @@ __all__ = [
 SUBPROTOCOL = "minirospy.drive.v1"
 
 SILENT_SECONDS = 0.5
-"""A client that holds a control and sends nothing for this many seconds is considered lost, and its topics are stopped."""
+"""A client that holds a control but sends nothing for this many seconds is considered lost; its topics are stopped."""
 
 _log = logging.getLogger(__name__)
 
@@ -156,7 +156,7 @@ class DriveEndpoint:
         self._guard = StopGuard()
 
     def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError if none of ``offered`` is supported."""
+        """Choose one of the offered sub-protocols. Raise LookupError if none of ``offered`` is supported."""
         if SUBPROTOCOL in offered:
             return SUBPROTOCOL
         raise LookupError(f"sub-protocol {SUBPROTOCOL} is required")
@@ -291,7 +291,7 @@ class _Driven:
             if self._deadline > time.monotonic():
                 return  # a command has just arrived, or the topic was released
             self._deadline = math.inf
-            # If the node has been shut down, the topic is closed, and no message can be published on it any more.
+            # If the node has been shut down, the topic is closed, and no further messages can be published on it.
             with contextlib.suppress(ROSException):
                 self._publish(self._last.zero())
         with contextlib.suppress(RuntimeError):  # the loop has been closed

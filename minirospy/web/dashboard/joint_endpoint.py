@@ -367,7 +367,7 @@ def _positions(fields: Fields) -> dict[str, float]:
 def _described(
     parameters: JointParameters, warn: Callable[[str], None]
 ) -> tuple[JointStates, str, dict[str, str]]:
-    """Return the description's joints, the robot's name and the joints' types.
+    """Parse a description; return the joints, the robot's name, and the joints' types.
 
     Raise UrdfError or JointError if the description is invalid.
     """

@@ -52,7 +52,7 @@ class JsonSession:
     """The subject of the operations, for error messages."""
 
     owners_only: ClassVar[str] = ""
-    """A description of the operations that require the token, for error messages; "" if other clients may use some of them."""
+    """The operations that require the token, as described in error messages; "" if other clients may use some of them."""
 
     longest: ClassVar[int] = 256_000
     """Maximum number of characters in an operation, because parsing it delays all clients."""
@@ -88,11 +88,11 @@ class JsonSession:
         return ""
 
     def parse(self, fields: Fields) -> tuple[str, Fields]:
-        """Return an operation's name and fields. Raise ValueError, TypeError or LookupError if they are invalid."""
+        """Parse an operation into its name and fields. Raise ValueError, TypeError or LookupError if they are invalid."""
         return str(fields["op"]), fields
 
     async def started(self) -> None:
-        """Send the first messages."""
+        """Send the first messages after the session has started."""
         self.send({"writes": not self.refusal()})
         if self.owners_only and (why := self.refusal()):
             self.send_error(why)
@@ -102,7 +102,7 @@ class JsonSession:
         return None
 
     async def left(self) -> None:
-        """Release the client's resources."""
+        """Release the client's resources after it has left."""
 
     def dispatch(self, name: str, fields: Fields) -> None:
         """Queue an operation."""
@@ -122,7 +122,7 @@ class JsonSession:
         return await self._loop.run_in_executor(self._thread, work)
 
     def send(self, fields: Fields) -> None:
-        """Send a response."""
+        """Send a response with these fields."""
         self.client.send_text(json.dumps(fields))
 
     def send_error(self, text: str, fields: Fields | None = None) -> None:
@@ -262,7 +262,7 @@ class JsonEndpoint(Generic[_S]):
         self._is_change_posted = False
 
     def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError if none of ``offered`` is supported."""
+        """Choose one of the offered sub-protocols. Raise LookupError if none of ``offered`` is supported."""
         if self._subprotocol in offered:
             return self._subprotocol
         raise LookupError(f"sub-protocol {self._subprotocol} is required")

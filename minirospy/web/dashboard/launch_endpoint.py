@@ -110,7 +110,7 @@ class _Tail:
         self._count = 0
 
     def read(self) -> str:
-        """Return the new lines. Blocks."""
+        """Return the log's new lines. Blocks."""
         if not self.node:
             lines, self._count = self.run.output.since(self._count)
             return "".join(f"{line}\n" for line in lines)
@@ -162,7 +162,7 @@ class LaunchSession(JsonSession):
         super().__init__(client, handlers)
 
     async def follow(self) -> float | None:
-        """Send the launches, if one has changed, and new lines of the log."""
+        """Send the launches, if any of them has changed, and the log's new lines."""
         # Query this before sending, so that a change in the meantime triggers another call.
         is_stopping = any(run.is_stopping for run in self._endpoint.runs.values())
         self._send_launches()

@@ -40,7 +40,10 @@ _PLAIN = re.compile(r"[A-Za-z0-9_/(](?:[A-Za-z0-9_/.;,()+=-]| (?=[^ #])|:(?=[^ ]
 
 
 def parse_rviz(text: str, name: str = "the file") -> dict[str, object]:
-    """Parse a .rviz file into JSON-compatible values. Raise RvizFileError with ``name`` and the line."""
+    """Parse a .rviz file into JSON-compatible values.
+
+    Raise RvizFileError, which contains ``name`` and the line, if it is invalid.
+    """
     if len(text) > MAX_CHARACTERS:
         raise RvizFileError(name, 0, f"more than {MAX_CHARACTERS} characters")
     try:

@@ -68,7 +68,7 @@ class ToolsEndpoint(JsonEndpoint["ToolsSession"]):
         self._processes = ProcessLoads()
 
     async def close(self) -> None:
-        """Cancel running requests."""
+        """Cancel the running requests. Idempotent."""
         await super().close()
         reporting, self._reporting = self._reporting, None
         if reporting:

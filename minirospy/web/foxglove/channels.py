@@ -29,7 +29,7 @@ class Channels:
         self._definitions: dict[str, set[str]] = {}
 
     def clear(self) -> None:
-        """Remove all channels, but do not reuse their ids."""
+        """Remove all channels, without reusing their ids."""
         for table in (self.by_id, self._by_topic, self._types, self._declared, self._definitions):
             table.clear()
 
@@ -113,7 +113,7 @@ class Services:
         self._ids = itertools.count(1)
 
     def clear(self) -> None:
-        """Remove all services, but do not reuse their ids."""
+        """Remove all services, without reusing their ids."""
         self.by_id.clear()
         self.infos.clear()
 

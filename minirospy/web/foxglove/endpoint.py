@@ -75,7 +75,7 @@ class FoxgloveEndpoint:
     # --- Endpoint
 
     def select(self, offered: Sequence[str]) -> str:
-        """Return the sub-protocol to use. Raise LookupError if none of ``offered`` is supported."""
+        """Choose one of the offered sub-protocols. Raise LookupError if none of ``offered`` is supported."""
         for name in protocol.SUBPROTOCOLS:
             if name in offered:
                 return name
@@ -116,7 +116,7 @@ class FoxgloveEndpoint:
     # --- called by sessions
 
     def capabilities_of(self, client: WebClient) -> list[str]:
-        """Return a client's capabilities."""
+        """Return the capabilities that a client has."""
         found = list(self._options.capabilities)
         if self.graph.node.simulated or self.playback:
             found.append("time")

@@ -71,7 +71,7 @@ class FoxgloveServer(Protocol):
     parameters: Parameters
 
     def capabilities_of(self, client: WebClient) -> list[str]:
-        """Return a client's capabilities."""
+        """Return the capabilities that a client has."""
 
     def definition_differs(self, channel: Channel, header: Header) -> None:
         """Replace a channel if its publisher's definition differs from that of the installed type."""
@@ -84,7 +84,7 @@ class FoxgloveServer(Protocol):
 
 
 class FoxgloveSession:
-    """One client's state. The client's connection calls the methods on the loop."""
+    """One client's session. The client's connection calls the methods on the loop."""
 
     def __init__(self, endpoint: FoxgloveServer, client: WebClient) -> None:
         self.client = client
@@ -180,7 +180,7 @@ class FoxgloveSession:
         self._dropped = dropped
 
     def parameters_changed(self, changed: list[Parameter]) -> None:
-        """Report changes of parameters."""
+        """Send changed parameters to the client."""
         self.send(serializing.parameter_values(changed))
 
     # --- internals
@@ -203,7 +203,7 @@ class FoxgloveSession:
         self.send(serializing.status(level, text, id_))
 
     def _require(self, capability: str, doing: str) -> None:
-        """Raise BridgeError if the client lacks a capability."""
+        """Raise BridgeError, whose message names what the client is ``doing``, if the client lacks a capability."""
         if capability not in self._endpoint.capabilities_of(self.client):
             why = (
                 "this token is read-only" if not self.client.may_write else f"'{capability}' is switched off"

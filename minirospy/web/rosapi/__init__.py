@@ -1,1 +1,1 @@
-"""rosapi: services that report about the graph, for rosbridge clients, which cannot query the master."""
+"""rosapi: services that report on the graph, for rosbridge clients, which cannot query the master."""

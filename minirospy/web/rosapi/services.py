@@ -117,7 +117,7 @@ class Rosapi:
         }
 
     async def start(self) -> None:
-        """Offer the services."""
+        """Start offering the services."""
         for name, (class_, handler) in self._offers.items():
             self._served.append(self.node.serve(f"/rosapi/{name}", class_, _guarded(handler)))
         for service in self._served:

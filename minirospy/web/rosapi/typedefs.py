@@ -25,7 +25,10 @@ _NOT_AN_ARRAY = -1
 
 @dataclass
 class TypeDefinition:
-    """A type's fields and constants. ``lengths`` has -1 for a field that is not an array, 0 for an array of any length."""
+    """A type's fields and constants.
+
+    In ``lengths``, -1 means that a field is not an array, and 0 means an array of any length.
+    """
 
     type: str
     names: list[str] = field(default_factory=list)
@@ -36,7 +39,7 @@ class TypeDefinition:
 
 
 def describe(class_: type[Message], find: Callable[[str], type[Message]]) -> list[TypeDefinition]:
-    """Return the definitions of a type and of all types that it uses, each once. ``find`` maps a name to a class."""
+    """Describe a type and all types that it uses, each once. ``find`` maps a name to a class."""
     return list(_walk(_described(class_), find, {_name_of(class_)}))
 
 

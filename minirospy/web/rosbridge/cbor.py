@@ -27,7 +27,7 @@ TYPED_ARRAYS = {
     "float32": (85, "f"),
     "float64": (86, "d"),
 }
-"""Dict from element type to the tag and format character of its arrays."""
+"""Dict from element type to (tag, format character) of its arrays."""
 
 _MAX_VALUES = 1_000_000
 """Maximum number of values in a client's message; a tagged array counts as one."""

@@ -47,7 +47,7 @@ class ClientPublications:
         self._published: dict[str, _Published] = {}
 
     def close(self) -> None:
-        """Stop publishing all topics."""
+        """Stop publishing all of the client's topics."""
         for published in self._published.values():
             self._release(published)
         self._published.clear()

@@ -79,7 +79,7 @@ class ClientServices:
         self._session.send_encoded(messages)
 
     async def _encoded(self, event: protocol.CallService, response: Response) -> list[str | bytes]:
-        """Return the messages that contain a response; a large response is encoded in a thread."""
+        """Encode a response as the messages that contain it. A large response is encoded in a thread."""
         shared = self._session.shared
         size = event.fragment_size or shared.options.fragment_size
 

@@ -27,7 +27,7 @@ class ClientSubscriptions:
         self._subscribed: dict[str, ClientTopic] = {}
 
     def close(self) -> None:
-        """Cancel all subscriptions."""
+        """Cancel all of the client's subscriptions."""
         for topic in self._subscribed.values():
             topic.close()
         self._subscribed.clear()

@@ -1,4 +1,4 @@
-"""The topics on which rosbridge_server publishes its clients: /client_count and /connected_clients, both latched.
+"""The topics on which rosbridge_server reports its clients: /client_count and /connected_clients, both latched.
 
 Source: http://wiki.ros.org/rosbridge_server, and the output of the real rosbridge_websocket in branch ros1.
 """
@@ -20,7 +20,7 @@ __all__ = ["ClientTopics"]
 
 
 class ClientTopics:
-    """Publishes the number of clients, their addresses and the times when they connected, after each change."""
+    """Publishes the number of clients, their addresses, and their connection times, after each change."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -29,7 +29,7 @@ class ClientTopics:
         self._clients: Publisher[Message] | None = None
 
     async def start(self) -> None:
-        """Publish the connected clients.
+        """Start publishing the connected clients.
 
         Raise MasterUnreachableError if the master does not respond, RpcError if the call fails.
         """
@@ -51,7 +51,7 @@ class ClientTopics:
                 await publisher.close()
 
     def changed(self, sessions: Sequence[RosbridgeSession]) -> None:
-        """Publish the connected clients."""
+        """Publish the list of connected clients."""
         self._sessions = sessions
         self._publish()
 

@@ -1,4 +1,4 @@
-"""Common parts of the handlers for clients' operations: their view of the session, results, limits and errors to report."""
+"""Common parts of the handlers for clients' operations: their view of the session, results, limits, and the errors to report."""
 
 from __future__ import annotations
 

@@ -205,7 +205,7 @@ def is_quick(data: str | bytes) -> bool:
 
 
 def decode(data: str | bytes) -> Fields:
-    """Return the object in a message: JSON as a string, or CBOR as bytes. Raise OperationError if the data is invalid."""
+    """Decode the object in a message: JSON in a string, or CBOR in bytes. Raise OperationError if the data is invalid."""
     return _decode(data, load_json)
 
 
@@ -268,7 +268,7 @@ def _shown(value: object) -> str:
 
 
 def _text_of(value: object, most: int) -> str:
-    """Return ``str(value)``, or a longer string with the same first ``most`` characters."""
+    """Return ``str(value)``, or a longer string that starts with the same ``most`` characters."""
     return value if isinstance(value, str) else str(_cut(value, most, itertools.count()))
 
 
@@ -457,7 +457,7 @@ OPERATIONS = (
     *("call_service", "advertise", "unadvertise", "publish", "subscribe", "unsubscribe", "fragment"),
     *("advertise_service", "service_response", "unadvertise_service", "png", "set_level", "auth"),
 )
-"""The operations that clients may send, in the order in which errors list them."""
+"""The operations that clients may send, in the order used in error messages."""
 
 
 # --- encoding

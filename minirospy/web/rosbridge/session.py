@@ -31,7 +31,7 @@ __all__ = ["RosbridgeSession"]
 
 _log = logging.getLogger(__name__)
 
-# memory of a parsed operation relative to that of its text, for objects and lists of numbers
+# ratio of a parsed operation's memory to that of its text, for objects and lists of numbers
 _VALUE_FACTOR = 4
 
 # maximum bytes from a read-only client, which only subscribes and needs less; each byte may become a value
@@ -65,7 +65,7 @@ class RosbridgeSession:
         self.connected = shared.graph.node.now()  # time when the client connected, for /connected_clients
         self.budget = Budget()  # budget of bytes for queued messages on topics whose rate the client limits
         self.operation_size = 0  # bytes of memory of the current operation
-        # True if the current operation's message is large: a thread then creates the ROS message, too
+        # True if the current operation's message is large; a thread then also creates the ROS message
         self.is_large = False
         self._on_end = on_end
         self._level = StatusLevel.ERROR  # maximum level of the status messages that the client receives

@@ -108,7 +108,7 @@ class RosbridgeShared:
         asyncio.get_running_loop().call_later(self.options.unregister_timeout, publication.close)
 
     def close_service(self, service: ClientService, why: str) -> asyncio.Task[None]:
-        """Start to close a client's service; return the task."""
+        """Start closing a client's service; return the task."""
         name = service.name
         del self.services[name]
         task = self._closing[name] = self.graph.spawn(service.close(why))

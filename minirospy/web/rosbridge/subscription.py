@@ -72,12 +72,12 @@ class Pacer(Generic[_T]):
         self._waiting: deque[_T] = deque()
 
     def set(self, throttle: float, queue_length: int) -> None:
-        """Change the interval and the length of the queue; the newest messages are kept."""
+        """Change the interval and the queue length. The newest messages are kept."""
         self.throttle, self._length = throttle, queue_length
         self._trim()
 
     def arrived(self, message: _T, now: float) -> bool:
-        """Return whether to send a message now; otherwise it is queued or dropped."""
+        """Return whether to send a message now. Otherwise it is queued or dropped."""
         if not self._waiting and now >= self._last + self.throttle:
             self._last = now
             return True
@@ -141,7 +141,7 @@ class Fragments:
         """Total bytes of memory of the fragments."""
 
     def add(self, fragment: Fragment, now: float) -> str | None:
-        """Return the message that a fragment completes, or None.
+        """Add a fragment. Return the message that it completes, or None if the message is still incomplete.
 
         Raise OperationError if the fragment is invalid or too large.
         """

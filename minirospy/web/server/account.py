@@ -28,7 +28,7 @@ Piece = bytes | memoryview | bytearray
 
 
 class Share:
-    """The memory that one client uses."""
+    """One client's memory use."""
 
     def __init__(self, account: Account, address: str, shed: Callable[[], object]) -> None:
         self.address = address
@@ -66,7 +66,7 @@ class Share:
 
 
 class Account:
-    """The memory that all clients of a server use. Runs on the loop."""
+    """The memory use of all of a server's clients. Runs on the loop."""
 
     def __init__(self, limit: int = MAX_BYTES) -> None:
         self.limit = limit

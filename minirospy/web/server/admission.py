@@ -43,7 +43,7 @@ class Rank(IntEnum):
 
 
 def rank_of(grant: Grant) -> Rank:
-    """Return the rank that corresponds to a client's rights."""
+    """Return the rank for a client's rights."""
     return {Grant.READ: Rank.READ, Grant.WRITE: Rank.WRITE, Grant.OWN: Rank.OWN}[grant]
 
 

@@ -254,7 +254,7 @@ class Exchange:
         self.request = request
         self.grant = grant
         self.on_end: Callable[[], None] = lambda: None
-        """Called when the client has disconnected."""
+        """Called once the client has disconnected."""
         self._connection = connection
 
     @property

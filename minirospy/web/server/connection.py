@@ -56,7 +56,7 @@ _log = logging.getLogger(__name__)
 
 _PONG = 0x8A  # first byte of a pong frame, and the key under which a pong is queued
 _WEIGHTS = {Grant.READ: 1.0, Grant.WRITE: 4.0, Grant.OWN: 64.0}
-"""Weights of clients when the loop's time is shared.
+"""Clients' weights in the sharing of the loop's time.
 
 On loopback any program may write; the dashboard's page has the owner's token.
 """
@@ -109,7 +109,7 @@ class _Phase(IntEnum):
 
 
 class Connection:
-    """The state of one connection, which receives the events from its pipe."""
+    """The state of one connection. Receives the events from the connection's pipe."""
 
     def __init__(self, site: Site, pipe: Pipe, peer: str, loop: asyncio.AbstractEventLoop) -> None:
         limits = site.limits
@@ -140,16 +140,16 @@ class Connection:
         self._phase = _Phase.OPEN
         self._is_held_back = False  # True if the client has used up its frame quota for the current second
         self._is_paused = False  # True while the session works on an earlier message, see hold()
-        self._worked_on = 0  # bytes of that message
-        self._are_jobs_held = False  # True while a job continues in a thread, see hold_jobs()
-        self._held = 0  # bytes that the session uses for the client, see session_holds()
+        self._worked_on = 0  # bytes of the message that the session works on
+        self._are_jobs_held = False  # True while a job continues in a thread; see hold_jobs()
+        self._held = 0  # bytes that the session uses for the client; see session_holds()
         self._is_in_turn = False  # True while _work() runs
         # Calls _handshake_late at first, later the check of an open connection, and finally _abort for a closing one.
         self._timer = loop.call_later(limits.handshake_seconds, self._handshake_late)
 
     @property
     def queue(self) -> SendQueue:
-        """Return the output queue."""
+        """Return the queue of output for the client."""
         return self._output.queue
 
     @property
@@ -217,7 +217,7 @@ class Connection:
         """Send a message that must not be dropped."""
         if not self.is_open:
             return
-        # Check the limit before appending, because a single response, such as a mesh, may be larger than the limit.
+        # Check the limit before appending, because a single response, such as a mesh, may exceed the limit.
         if self.queue.is_overrun:
             _log.warning("%s reads no answers: disconnected", self.peer)
             self._abort()
@@ -271,7 +271,7 @@ class Connection:
     # --- called by the session
 
     def hold(self, *, is_held: bool) -> None:
-        """Stop or continue handling frames while the session is processing one; unread data stays in the client's socket."""
+        """Stop or continue handling frames while the session processes one. Unread data stays in the client's socket."""
         self._is_paused = is_held
         if is_held:
             self._pipe.pause()

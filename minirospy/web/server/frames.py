@@ -56,7 +56,7 @@ class FrameByFrame(ServerProtocol):
 
 
 class _GatedReader(StreamReader):
-    """Stops the parser before each frame unless ``is_open`` is set."""
+    """Stops the parser before each frame, unless ``is_open`` is set."""
 
     is_open = False
 

@@ -31,7 +31,7 @@ class Jobs:
         self.size = 0  # bytes of memory used only for this client's queued work
         self._max_bytes = max_bytes
         self._share = share
-        self._message_bytes = 0  # total bytes of all messages that the work refers to
+        self._message_bytes = 0  # total bytes of all messages to which the work refers
         self._waiting: deque[_Job] = deque()
 
     def __len__(self) -> int:

@@ -142,7 +142,7 @@ class Listener:
     # --- Site
 
     def check(self, credentials: Credentials, *, is_page: bool) -> Grant | Refusal:
-        """Return a request's rights, or the reason for refusing it."""
+        """Return the rights of a request's sender, or the reason for refusing the request."""
         if is_page and unquote(urlsplit(credentials.target).path) in self._public_pages:
             return self._access.check_host(credentials.host) or Grant.READ
         return self._access.check(credentials)

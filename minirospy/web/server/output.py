@@ -1,4 +1,4 @@
-"""The output of one connection: the queue, and the transfer from the queue to the pipe."""
+"""One connection's output: the queue, and the transfer from the queue to the pipe."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Output:
 
     @property
     def size(self) -> int:
-        """Return the bytes queued for this client alone, without large pieces, which are counted in its share."""
+        """Return the bytes queued for this client only. Large pieces are not included: the client's share counts them."""
         queue = self.queue
         size = queue.size + queue.answers - queue.large
         if self._pipe.is_full:

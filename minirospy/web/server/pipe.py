@@ -209,7 +209,7 @@ class TlsPipe(asyncio.Protocol):
     def __init__(self, connected: Callable[[TlsPipe, str], PipeEvents | None]) -> None:
         """Create a connection. ``connected(pipe, peer_address)`` returns the object that receives the events.
 
-        ``connected`` may return None to refuse the connection, after writing a response.
+        To refuse the connection, ``connected`` writes a response and returns None.
         """
         self._connected = connected
         self.read_bytes = LARGE_READ  # asyncio's own receive size

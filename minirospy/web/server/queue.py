@@ -52,7 +52,7 @@ class _Waiting:
 
 
 class SendQueue:
-    """The output queue of one client, in the order of arrival."""
+    """One client's output queue, in the order of arrival."""
 
     def __init__(
         self, limit: int = DEFAULT_LIMIT, entry_bytes: int = ENTRY_BYTES, share: Share | None = None
@@ -147,7 +147,7 @@ class SendQueue:
         return entry.pieces
 
     def discard(self, key: Hashable) -> None:
-        """Remove the messages of a key that is no longer used; they do not count as dropped."""
+        """Remove the messages of a key that is no longer used. They do not count as dropped."""
         self.dropped_of.pop(key, None)
         waiting = self._waiting.pop(key, None)
         if waiting:
@@ -156,13 +156,13 @@ class SendQueue:
             self.size -= waiting.size
 
     def drop_messages(self) -> None:
-        """Drop all messages, but no responses."""
+        """Drop all messages, but keep the responses."""
         for key in list(self._waiting):
             while key in self._waiting:
                 self._drop_oldest(key)
 
     def clear(self) -> None:
-        """Remove all messages and responses; they do not count as dropped."""
+        """Remove all messages and responses. They do not count as dropped."""
         if self.large:
             for entry in self._entries.values():
                 self._release(entry)

@@ -18,7 +18,7 @@ class _Bucket(NamedTuple):
 
 
 class ConnectionRate:
-    """The rate limit for new connections."""
+    """The rate limiter for new connections."""
 
     def __init__(self, a_second: float, burst: int, clock: Callable[[], float]) -> None:
         """Create the rate limiter.

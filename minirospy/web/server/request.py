@@ -48,7 +48,7 @@ class RequestHead(NamedTuple):
         )
 
     def parsed(self, peer: str, endpoints: Endpoints) -> HttpRequest:
-        """Return the request as sessions and pages receive it.
+        """Convert the request to the form that sessions and pages receive.
 
         Raise ValueError if the target is not a URL, or has too many fields.
         """

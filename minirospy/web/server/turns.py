@@ -121,7 +121,7 @@ class FairTurns:
     ) -> None:
         """Create the scheduler. ``call_soon`` schedules a call in the next loop iteration; ``clock`` returns seconds.
 
-        ``meter`` returns the seconds by which clients' use is measured, by default those of ``clock``.
+        ``meter`` returns the seconds used to measure clients' use (default: ``clock``).
         """
         self._call_soon = call_soon
         self._clock = clock
@@ -199,7 +199,7 @@ class FairTurns:
         return burst <= INTERACTIVE_SLICES * self._slice
 
     def _push(self, share: Share, start: float) -> None:
-        # If several clients would end at the same tag, serve the client that has used less time first.
+        # If several clients would end at the same tag, serve the one that has used less time first.
         end = self._end_of(share, start)
         heapq.heappush(share.queue.entries, _Entry(end, share.tag, next(self._numbers), start, share))
 
@@ -240,7 +240,7 @@ class FairTurns:
         self._bulk_credit = max(-MAX_DEBT_TURNS * most, min(most, self._bulk_credit + change))
 
     def _run(self, share: Share, start: float) -> bool:
-        """Run some of a client's work, which starts at the tag ``start``; return whether more is left."""
+        """Run some of a client's work, which starts at the tag ``start``. Return whether any is left."""
         if share.is_closed:
             return False
         end, before = self._clock() + self._slice, self._meter()

@@ -1,4 +1,4 @@
-"""A limit on the total size of concurrent work; further work waits in order."""
+"""A limit on the total size of concurrent work. Work that exceeds the limit waits in order."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ def _number(query: Mapping[str, str], name: str, default: int | None, low: int, 
 
 
 def part(data: bytes, content_type: str, nanoseconds: int) -> bytes:
-    """Return the header of an image in a stream; ``data`` and :data:`END` follow it."""
+    """Return the header of an image in a stream. ``data`` and :data:`END` follow it."""
     seconds, rest = divmod(nanoseconds, 1_000_000_000)
     return (
         f"Content-Type: {content_type}\r\nX-Timestamp: {seconds}.{rest:09d}\r\nContent-Length: {len(data)}\r\n\r\n"

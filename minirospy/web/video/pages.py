@@ -24,7 +24,7 @@ SNAPSHOT_SECONDS = 10.0
 _MAX_FEEDS = 32
 """Maximum number of concurrent feeds (a topic in one encoding), because each image is encoded once per feed."""
 _MAX_KEPT = 32_000_000
-"""Maximum total bytes of the encoded images that feeds store for new clients; further images are not stored."""
+"""Maximum total bytes of the encoded images that feeds store for new clients. Images that exceed it are not stored."""
 _HTML = "text/html; charset=utf-8"
 
 
@@ -201,7 +201,7 @@ class VideoPages:
     # --- internals
 
     async def _look(self, exchange: Exchange) -> Snapshot | None:
-        """Return the graph; if it cannot be read, send an error response and return None."""
+        """Return the graph. If it cannot be read, send an error response and return None."""
         try:
             found = await fetch(self._graph.node.call_master)
         except (MasterUnreachableError, RpcError) as error:

@@ -33,7 +33,7 @@ _MAGIC = {b"\xff\xd8\xff": "image/jpeg", b"\x89PN": "image/png", b"RIF": "image/
 
 
 def encoded(type_: str, body: bytes, picture: Picture) -> tuple[bytes, str]:
-    """Return a serialized message's image as an encoded file, and its content type.
+    """Encode a serialized message's image as a file; return the file and its content type.
 
     Raise BridgeError if it cannot be converted.
     """
@@ -131,7 +131,7 @@ def _by_opencv(image: Pixels, encoding: str) -> Pixels:
         return converted(image, encoding, "mono8")
     if encoding == "yuv422":
         return cv2.cvtColor(image, cv2.COLOR_YUV2BGR_UYVY)  # type: ignore[no-any-return]
-    # OpenCV names a pattern by the pixels in its second row and column.
+    # OpenCV names a Bayer pattern by the pixels in its second row and column.
     name = {"rggb": "BG", "bggr": "RG", "gbrg": "GR", "grbg": "GB"}[encoding[6:10]]
     found: Pixels = cv2.cvtColor(image, getattr(cv2, f"COLOR_Bayer{name}2BGR"))
     return converted(found, "bgr16", "bgr8") if encoding.endswith("16") else found
