@@ -87,9 +87,13 @@ class ApiLauncher(Launcher):
         return process
 
     def _on_end(self, process: processes.Process) -> None:
+        self.notify(process.name, process.exit_code or 0)
+
+    def notify(self, name: str, code: int) -> None:
+        """Notify all listeners that a process has exited; print the error of a listener that fails."""
         for listener in tuple(self.listeners):
             try:
-                listener.process_died(process.name, process.exit_code or 0)
+                listener.process_died(name, code)
             except Exception:  # noqa: BLE001 - the program's own; the nodes live on
                 self._output.warn(f"ERROR: a process listener failed\n{traceback.format_exc()}")
 
@@ -519,8 +523,7 @@ class ProcessMonitor:
             output.warn(f"[{process.name}] {text}")
         else:
             output.print(f"[{process.name}] {text}", bold=True)
-        for listener in tuple(self._launcher.listeners):
-            listener.process_died(process.name, process.exit_code or 0)
+        self._launcher.notify(process.name, process.exit_code or 0)
 
     def _remove_own(self, process: Process) -> None:
         with self.plock:
