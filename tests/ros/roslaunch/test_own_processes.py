@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+
+import pytest
 import roslaunch
 import roslaunch.pmon
 
@@ -77,3 +80,79 @@ def test_a_listener_that_fails_does_not_keep_a_process_from_being_restarted() ->
     finally:
         monitor.shutdown()
         monitor.join(30)
+
+
+def test_no_process_is_registered_once_a_shutdown_was_requested() -> None:
+    monitor = roslaunch.pmon.ProcessMonitor()
+    monitor.shutdown()
+    assert monitor.is_shutdown
+    with pytest.raises(roslaunch.RLException, match=r"cannot add process \[a\] after"):
+        monitor.register(Own("a"))
+    monitor.close()
+
+
+def test_no_process_is_registered_while_the_others_are_terminated() -> None:
+    """The monitor ends by itself here, without a shutdown()."""
+    refused: list[bool] = []
+
+    class Registering(Own):
+        def stop(self, errors: list[str] | None = None) -> None:
+            super().stop(errors)
+            with pytest.raises(roslaunch.RLException):
+                monitor.register(Own("late"))
+            refused.append(True)
+
+    monitor = roslaunch.pmon.ProcessMonitor()
+    monitor.register(Registering("a"))
+    monitor.close()
+    assert (refused, monitor.get_active_names()) == ([True], [])
+
+
+def test_no_process_is_restarted_once_a_shutdown_was_requested() -> None:
+    class Stopping(Own):
+        def stop(self, errors: list[str] | None = None) -> None:
+            super().stop(errors)
+            monitor.shutdown()
+
+    process = Stopping("a", alive=False, respawn=True)
+    monitor = watch(process)
+    monitor.join(30)
+    assert (monitor.done, process.spawn_count, process.alive) == (True, 0, False)
+
+
+def test_a_process_that_is_being_restarted_does_not_outlive_the_shutdown() -> None:
+    stopped = threading.Event()
+
+    class Starting(Own):
+        def start(self) -> bool:
+            stopped.clear()
+            monitor.shutdown()
+            # The process must not be terminated before it has started. If it is, this wait ends early.
+            stopped.wait(0.3)
+            return super().start()
+
+        def stop(self, errors: list[str] | None = None) -> None:
+            super().stop(errors)
+            stopped.set()
+
+    process = Starting("a", alive=False, respawn=True)
+    monitor = watch(process)
+    monitor.join(30)
+    assert (monitor.done, process.spawn_count, process.alive) == (True, 1, False)
+
+
+def test_a_listener_may_wait_for_the_shutdown() -> None:
+    """The wait returns immediately, because the shutdown waits for the listener."""
+
+    class Ending(roslaunch.pmon.ProcessListener):  # type: ignore[misc,unused-ignore]
+        def process_died(self, process_name: str, exit_code: int) -> None:
+            roslaunch.pmon.shutdown_process_monitor(monitor)
+
+    other = Own("b")
+    monitor = roslaunch.pmon.ProcessMonitor()
+    monitor.add_process_listener(Ending())
+    monitor.register(Own("a", alive=False))
+    monitor.register(other)
+    monitor.start()
+    monitor.join(30)
+    assert (monitor.done, other.alive) == (True, False)
