@@ -156,3 +156,30 @@ def test_a_listener_may_wait_for_the_shutdown() -> None:
     monitor.start()
     monitor.join(30)
     assert (monitor.done, other.alive) == (True, False)
+
+
+def test_the_shutdown_ends_although_terminating_the_nodes_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> None:
+        raise OSError("a fault")
+
+    monitor = roslaunch.pmon.ProcessMonitor()
+    monkeypatch.setattr(monitor._launcher, "close", fail)
+    with pytest.raises(OSError, match="a fault"):
+        monitor.close()
+    assert monitor.done
+
+
+def test_the_nodes_are_terminated_although_terminating_an_own_process_fails(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Exiting(Own):
+        def stop(self, errors: list[str] | None = None) -> None:
+            raise SystemExit(3)
+
+    closed: list[bool] = []
+    monitor = roslaunch.pmon.ProcessMonitor()
+    monkeypatch.setattr(monitor._launcher, "close", lambda: closed.append(True))
+    monitor.register(Exiting("a"))
+    with pytest.raises(SystemExit):
+        monitor.close()
+    assert (closed, monitor.done) == ([True], True)

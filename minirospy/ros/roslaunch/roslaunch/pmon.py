@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/roslaunch/API%20Usage.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
 import os
@@ -537,6 +538,14 @@ class ProcessMonitor:
 
     def close(self) -> None:
         """Terminate the remaining processes in the calling thread."""
+        # Call these even after an error: other threads wait for the end of the shutdown.
+        with contextlib.ExitStack() as stack:
+            stack.callback(self._ended.set)
+            stack.callback(self._launcher.close)
+            self._close_own()
+
+    def _close_own(self) -> None:
+        """Terminate the program's own processes, after the thread that restarts them has stopped."""
         with self.plock:
             self._is_stopping = True
             polling = self._own_thread
@@ -557,8 +566,6 @@ class ProcessMonitor:
             self._remove_own(process)
         for error in errors:
             Output(title=False).warn(error)
-        self._launcher.close()
-        self._ended.set()
 
     def is_alive(self) -> bool:
         """Return whether the monitor is watching."""
