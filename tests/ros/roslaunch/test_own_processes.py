@@ -183,3 +183,19 @@ def test_the_nodes_are_terminated_although_terminating_an_own_process_fails(
     with pytest.raises(SystemExit):
         monitor.close()
     assert (closed, monitor.done) == ([True], True)
+
+
+def test_the_exited_processes_can_be_listed_while_another_node_is_started() -> None:
+    class Launched:
+        """An exited process; while it is examined, another process is stored."""
+
+        name = "a"
+
+        @property
+        def started(self) -> bool:
+            monitor._launcher.known["b"] = Launched()
+            return True
+
+    monitor = roslaunch.pmon.ProcessMonitor()
+    monitor._launcher.known["a"] = Launched()
+    assert [each.name for each in monitor.dead_list] == ["a"]

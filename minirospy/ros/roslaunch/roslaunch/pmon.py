@@ -377,9 +377,8 @@ class ProcessMonitor:
     def dead_list(self) -> list[Process]:
         """The exited processes."""
         watched = self.get_active_names()
-        launched = [
-            each for each in self._launcher.known.values() if each.started and each.name not in watched
-        ]
+        known = tuple(self._launcher.known.values())
+        launched = [each for each in known if each.started and each.name not in watched]
         return [*launched, *self._own_dead]
 
     def get_active_names(self) -> list[str]:
