@@ -12,7 +12,7 @@ import os
 import sys
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import yaml
 
@@ -44,8 +44,6 @@ _DEFAULTS: dict[str, object] = {
 }
 _CLASSES = {"time": "std_msgs/Time", "duration": "std_msgs/Duration", "Header": "std_msgs/Header"}
 
-_in_order = [False]
-
 
 class RosMsgProtoException(Exception):
     """Raised if the prototype's type or mode does not exist."""
@@ -58,8 +56,10 @@ class RosMsgProtoArgsException(Exception):
 class _Dumper(yaml.SafeDumper):
     """Writes objects with `__slots__`, such as messages, as dictionaries."""
 
+    keeps_order: ClassVar[bool] = False  # else the fields are sorted by name
+
     def represent_mapping(self, tag: str, mapping: Any, flow_style: bool | None = None) -> yaml.MappingNode:
-        if _in_order[0]:
+        if self.keeps_order:
             return represent_ordered_mapping(self, tag, mapping, flow_style)
         return super().represent_mapping(tag, mapping, flow_style)
 
@@ -138,7 +138,7 @@ def init_rosmsg_proto() -> None:
 
     ROS's function also changes PyYAML for the whole process; with Python 3.10 or later, loading YAML then fails.
     """
-    _in_order[0] = True
+    _Dumper.keeps_order = True
 
 
 def construct_ordered_mapping(self: Any, node: Any, deep: bool = False) -> OrderedDict[Any, Any]:

@@ -80,6 +80,13 @@ class Listener(roslaunch.pmon.ProcessListener):
         note("died", process_name, exit_code)
 
 
+class Faulty(roslaunch.pmon.ProcessListener):
+    """Fails."""
+
+    def process_died(self, process_name, exit_code):
+        raise RuntimeError("a fault")
+
+
 def monitored():
     monitor = roslaunch.pmon.ProcessMonitor()
     show(monitor.name, monitor.daemon, monitor.is_alive(), monitor.done, monitor.is_shutdown)
@@ -145,6 +152,20 @@ def monitored():
     show(eventually(lambda: monitor.done), monitor.is_shutdown, events, monitor.get_active_names())
 
 
+def shut_down():
+    """Return a monitor after the exit of a required process, and one whose shutdown was requested."""
+    faulty = roslaunch.pmon.ProcessMonitor()
+    faulty.add_process_listener(Faulty())
+    required = Mine("required", required=True)
+    faulty.register(required)
+    faulty.start()
+    required.exit(0)
+    eventually(lambda: faulty.done)
+    requested = roslaunch.pmon.ProcessMonitor()
+    requested.shutdown()
+    return faulty, requested
+
+
 # ROS's roslaunch prints in colours on everything.
 told, sys.stdout = sys.stdout, io.StringIO()
 with contextlib.redirect_stderr(io.StringIO()):
@@ -153,6 +174,14 @@ out, sys.stdout = sys.stdout.getvalue(), told
 for line in out.splitlines():
     if not line.startswith("all processes"):
         show(re.sub(r"\x1b\[\d+m", "", line))
+
+show("# a required process, and a listener that fails")
+with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+    faulty, requested = shut_down()
+show(faulty.done, faulty.is_shutdown, faulty.get_active_names())
+show("# a shutdown that has not ended")
+show(requested.is_shutdown)
+outcome("late", lambda: requested.register(Mine("late")))
 
 show("# while shutting down")
 show(roslaunch.pmon._shutting_down)

@@ -144,3 +144,7 @@ for words in (
     ["msg", "std_msgs/Bool", "-z"],
 ):
     call("prototype", lambda w=words: rosmsg.rosmsg_cmd_prototype(w), *words)
+
+# The prototypes have called init_rosmsg_proto().
+for style in (None, 0, 1):
+    outcome(f"in order {style}", lambda f=style: rosmsg.get_yaml_for_msg(PoseStamped(), flow_style_=f))

@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/roslaunch/API%20Usage.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
 import os
@@ -87,9 +88,13 @@ class ApiLauncher(Launcher):
         return process
 
     def _on_end(self, process: processes.Process) -> None:
+        self.notify(process.name, process.exit_code or 0)
+
+    def notify(self, name: str, code: int) -> None:
+        """Notify all listeners that a process has exited; print the error of a listener that fails."""
         for listener in tuple(self.listeners):
             try:
-                listener.process_died(process.name, process.exit_code or 0)
+                listener.process_died(name, code)
             except Exception:  # noqa: BLE001 - the program's own; the nodes live on
                 self._output.warn(f"ERROR: a process listener failed\n{traceback.format_exc()}")
 
@@ -318,6 +323,8 @@ class ProcessMonitor:
     def __init__(self, name: str = "ProcessMonitor", *, launcher: ApiLauncher | None = None) -> None:
         self.name = name
         self._launcher = launcher or ApiLauncher(LaunchSpec(), Environment.read())
+        self._is_stopping = False  # set by shutdown() and close(): start no more processes
+        self._closing = threading.Event()
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
         self.is_watching = False  # set once watch() has been called
@@ -357,8 +364,8 @@ class ProcessMonitor:
 
     @property
     def is_shutdown(self) -> bool:
-        """Return whether a shutdown was requested."""
-        return bool(self._launcher.stopped_by)
+        """Return whether a shutdown was requested or has begun."""
+        return self._is_stopping
 
     @property
     def procs(self) -> list[Process]:
@@ -370,9 +377,8 @@ class ProcessMonitor:
     def dead_list(self) -> list[Process]:
         """The exited processes."""
         watched = self.get_active_names()
-        launched = [
-            each for each in self._launcher.known.values() if each.started and each.name not in watched
-        ]
+        known = tuple(self._launcher.known.values())
+        launched = [each for each in known if each.started and each.name not in watched]
         return [*launched, *self._own_dead]
 
     def get_active_names(self) -> list[str]:
@@ -407,12 +413,12 @@ class ProcessMonitor:
 
         Raise RLException if another process has its name, or after a shutdown.
         """
-        if self.done:
-            raise RLException(f"cannot add process [{p.name}] after process monitor has been shut down")
-        if isinstance(p, LaunchedProcess):
-            p.register(self._launcher)
-            return
         with self.plock:
+            if self.is_shutdown:
+                raise RLException(f"cannot add process [{p.name}] after process monitor has been shut down")
+            if isinstance(p, LaunchedProcess):
+                p.register(self._launcher)
+                return
             if self.has_process(p.name):
                 text = f"cannot add process with duplicate name '{p.name}'"
                 logging.getLogger("roslaunch.pmon").error(
@@ -476,7 +482,7 @@ class ProcessMonitor:
     def _run_own(self) -> None:
         """Poll the program's own processes until the monitor stops."""
         respawning: set[Process] = set()
-        while not self._ended.wait(_POLL_SECONDS) and not self.is_shutdown:
+        while not self._closing.wait(_POLL_SECONDS) and not self.is_shutdown:
             for process in tuple(self._own):
                 try:
                     self._poll_own(process, respawning)
@@ -504,7 +510,9 @@ class ProcessMonitor:
             respawning.discard(process)
             Output(title=False).print(f"[{process.name}] restarting process")
             process.stop([])
-            process.start()
+            # If the shutdown begins after this check, close() waits for start() and then terminates the process.
+            if not self.is_shutdown:
+                process.start()
         else:
             respawning.add(process)
 
@@ -519,8 +527,7 @@ class ProcessMonitor:
             output.warn(f"[{process.name}] {text}")
         else:
             output.print(f"[{process.name}] {text}", bold=True)
-        for listener in tuple(self._launcher.listeners):
-            listener.process_died(process.name, process.exit_code or 0)
+        self._launcher.notify(process.name, process.exit_code or 0)
 
     def _remove_own(self, process: Process) -> None:
         with self.plock:
@@ -530,6 +537,22 @@ class ProcessMonitor:
 
     def close(self) -> None:
         """Terminate the remaining processes in the calling thread."""
+        # Call these even after an error: other threads wait for the end of the shutdown.
+        with contextlib.ExitStack() as stack:
+            stack.callback(self._ended.set)
+            stack.callback(self._launcher.close)
+            self._close_own()
+
+    def _close_own(self) -> None:
+        """Terminate the program's own processes, after the thread that restarts them has stopped."""
+        with self.plock:
+            self._is_stopping = True
+            polling = self._own_thread
+        self._closing.set()
+        # Wait without the lock, because the program's methods that this thread calls may use the monitor.
+        if polling and polling is not threading.current_thread():
+            polling.join()
+
         errors: list[str] = []
         # Terminate the core's processes last, the others in the reverse order of their registration.
         others = [each for each in reversed(self._own) if each not in self.core_procs]
@@ -542,8 +565,6 @@ class ProcessMonitor:
             self._remove_own(process)
         for error in errors:
             Output(title=False).warn(error)
-        self._launcher.close()
-        self._ended.set()
 
     def is_alive(self) -> bool:
         """Return whether the monitor is watching."""
@@ -551,7 +572,7 @@ class ProcessMonitor:
 
     def join(self, timeout: float | None = None) -> None:
         """Wait up to ``timeout`` seconds until all processes have exited. Return immediately if called in a listener's thread."""
-        if threading.current_thread() is self._thread:
+        if threading.current_thread() in (self._thread, self._own_thread):
             return
         end = math.inf if timeout is None else time.monotonic() + timeout
         # Wait in slices, because on Windows a wait without timeout ignores signals.
@@ -568,6 +589,8 @@ class ProcessMonitor:
 
     def shutdown(self) -> None:
         """Terminate all processes without waiting for their exit."""
+        # Take no lock, also not that of an Event: a signal handler, which may interrupt this method, calls it, too.
+        self._is_stopping = True
         self._launcher.stop("shutdown")
 
     @classmethod
