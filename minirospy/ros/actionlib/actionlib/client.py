@@ -13,6 +13,7 @@ from actionlib_msgs.msg import GoalID, GoalStatusArray
 
 from minirospy import client as rospy
 from minirospy.base import times
+from minirospy.base.numpy_names import add_numpy_note
 from minirospy.client.connection import Connection
 from minirospy.client.session import current_session
 from minirospy.core.idl.protocols import Action, ActionFeedback, ActionResult, Message
@@ -96,9 +97,10 @@ class ActionClient:
 
         ``transition_cb(handle)`` is called on each state change, and ``feedback_cb(handle, feedback)`` for each feedback
         message.
-        Both are called in the library's threads, never concurrently.
+        Both are called in the library's threads: one at a time for each goal, but concurrently for different goals.
         """
-        subscription = self.status_sub.impl and self.status_sub.impl.subscription
+        impl = self.status_sub.impl
+        subscription = impl and impl.subscription
         if subscription and self._status_link_ended not in subscription.on_ended:
             subscription.on_ended.append(self._status_link_ended)
         return self.manager.init_goal(goal, transition_cb, feedback_cb)
@@ -151,10 +153,11 @@ class ActionClient:
 
     def _check_server(self, goals: list[CommStateMachine], last: GoalStatusArray | None) -> None:
         """End ``goals`` as LOST, unless a server lists them in a newer status message than ``last``."""
-        if rospy.is_down() or self.status_sub.impl is None:
+        impl = self.status_sub.impl  # read once, because stop() in another thread sets it to None
+        if rospy.is_down() or impl is None:
             return
         statuses = self.last_status_msg
-        is_connected = self.status_sub.impl.get_num_connections() > 0
+        is_connected = impl.get_num_connections() > 0
         if is_connected and (statuses is last or statuses is None):
             self._check_later(goals)
             return
@@ -162,7 +165,7 @@ class ActionClient:
         for goal in goals:
             goal_id = goal.action_goal.goal_id.id
             is_listed = is_connected and statuses is not None and find_status(statuses, goal_id) is not None
-            if not is_listed and goal.lose():
+            if not is_listed and _lose(goal):
                 rospy.logerr(
                     "The action server [%s] has died or is unreachable: goal %s is LOST",
                     rospy.resolve_name(self.ns),
@@ -190,6 +193,19 @@ class ActionClient:
 
     def _feedback_cb(self, msg: ActionFeedback) -> None:
         self.manager.update_feedbacks(msg)
+
+
+def _lose(goal: CommStateMachine) -> bool:
+    """End ``goal`` as LOST; return False if it had already ended. Log the error if its callback raises one."""
+    try:
+        return goal.lose()
+    except BaseException as error:  # noqa: BLE001 - user code failed, but the goal has ended
+        add_numpy_note(error)
+        session = current_session()
+        # As in a Subscriber's callback, ignore errors during a shutdown.
+        if not session.lifecycle.is_shutdown_requested:
+            session.callback_errors.log(goal.transition_cb, error)
+        return True
 
 
 class _Listener(rospy.SubscribeListener):
