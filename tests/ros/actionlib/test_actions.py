@@ -363,3 +363,40 @@ handles.append(client.send_goal(TestGoal(1), None, heard))
 print(over.wait(60))
 """)
         assert said == "True\nTrue\n"
+
+    def test_another_thread_stops_the_client_in_between(self) -> None:
+        said = run("""
+class Stopped:
+    # A subscriber that another thread unregisters after the first access.
+    def __init__(self, subscriber):
+        self._impls = [subscriber.impl]
+    @property
+    def impl(self):
+        return self._impls.pop() if self._impls else None
+actions = client.action_client
+status, result = actions.status_sub, actions.result_sub
+actions.status_sub = Stopped(status)
+actions._check_server([], None)
+actions.status_sub = Stopped(status)
+handle = actions.send_goal(TestGoal(4))
+actions.status_sub, actions.result_sub = status, Stopped(result)
+print(actions.wait_for_server(rospy.Duration.from_sec(0.1)))
+actions.result_sub = Stopped(result)
+print(actions._is_connected())
+""")
+        assert said == "False\nTrue\n"
+
+    def test_a_stopped_client_leaves_nothing_in_a_shared_subscription(self) -> None:
+        said = run("""
+actions = actionlib.ActionClient("server", TestAction)
+assert actions.wait_for_server(second)
+subscriptions = [each.impl.subscription for each in (actions.status_sub, actions.result_sub, actions.feedback_sub)]
+before = [(len(each.on_ended), len(each.on_connected)) for each in subscriptions]
+handle = actions.send_goal(TestGoal(4))
+print(before, len(subscriptions[0].on_ended))
+actions.stop()
+actions.stop()
+print([(len(each.on_ended), len(each.on_connected)) for each in subscriptions])
+print(client.send_goal_and_wait(TestGoal(4), second))
+""")
+        assert said == "[(0, 0), (0, 2), (0, 2)] 1\n[(0, 0), (0, 1), (0, 1)]\n3\n"

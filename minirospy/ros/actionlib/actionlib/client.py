@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/actionlib/DetailedDescription.
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable
 from typing import TypeVar
@@ -84,6 +85,12 @@ class ActionClient:
 
     def stop(self) -> None:
         """Unregister from the action's topics."""
+        # Other clients in this process may keep the subscriptions, so remove this client's functions from them.
+        for subscriber in (self.status_sub, self.result_sub, self.feedback_sub):
+            impl = subscriber.impl
+            if impl and (subscription := impl.subscription):
+                _remove(subscription.on_ended, self._status_link_ended)
+                _remove(subscription.on_connected, self._news.notify)
         for end in (self.pub_goal, self.pub_cancel, self.status_sub, self.result_sub, self.feedback_sub):
             end.unregister()
 
@@ -126,7 +133,8 @@ class ActionClient:
         if session.is_fork_without_node:
             raise rospy.ROSException(session.why_fork_has_no_effect(f"the action client of {self.ns}"))
         for subscriber in (self.result_sub, self.feedback_sub):
-            subscription = subscriber.impl and subscriber.impl.subscription
+            impl = subscriber.impl
+            subscription = impl and impl.subscription
             if subscription and self._news.notify not in subscription.on_connected:
                 subscription.on_connected.append(self._news.notify)
         return self._news.wait_for(self._is_connected, timeout)
@@ -136,8 +144,10 @@ class ActionClient:
             return False
         server = self.last_status_msg._connection_header["callerid"]
         return all(
-            end.impl is not None and any(_peer(link) == server for link in end.impl.connections)
-            for end in (self.pub_goal, self.pub_cancel, self.result_sub, self.feedback_sub)
+            impl is not None and any(_peer(link) == server for link in impl.connections)
+            for impl in (
+                end.impl for end in (self.pub_goal, self.pub_cancel, self.result_sub, self.feedback_sub)
+            )
         )
 
     def _status_link_ended(self) -> None:
@@ -193,6 +203,12 @@ class ActionClient:
 
     def _feedback_cb(self, msg: ActionFeedback) -> None:
         self.manager.update_feedbacks(msg)
+
+
+def _remove(functions: list[Callable[[], object]], function: Callable[[], object]) -> None:
+    """Remove ``function`` from ``functions`` if it is there; another thread may remove it at the same time."""
+    with contextlib.suppress(ValueError):
+        functions.remove(function)
 
 
 def _lose(goal: CommStateMachine) -> bool:
