@@ -499,7 +499,7 @@ class Subscription:
                     self.retry(uri, error)
                     return
 
-            for notify in self.on_connected:
+            for notify in self.on_connected.copy():
                 notify()
 
     async def open_link(self, uri: str) -> InLink:

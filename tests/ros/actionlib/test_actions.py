@@ -302,3 +302,101 @@ client.cancel_goal()
 print(client.wait_for_result(second), client.get_state() == GoalStatus.PREEMPTED)
 """)
         assert said == "True\nTrue True\n"
+
+    def test_all_goals_are_lost_although_a_callback_raises(self) -> None:
+        said = run(f"""
+import subprocess, sys
+from minirospy.ros.actionlib.actionlib import client as client_module
+client_module.SERVER_SECONDS = 0.2
+other = subprocess.Popen([sys.executable, "-c", {SERVER_THAT_DIES!r}], stdout=subprocess.PIPE, text=True)
+assert other.stdout.readline() == "ready\\n"
+client = actionlib.ActionClient("other", TestAction)
+assert client.wait_for_server(second)
+check, checked = client._check_server, threading.Event()
+def check_server(goals, last):
+    try:
+        check(goals, last)
+    finally:
+        if goals[0].state == actionlib.CommState.DONE:
+            checked.set()
+client._check_server = check_server
+def changed(handle):
+    if handle.get_comm_state() == actionlib.CommState.DONE and handle in handles[:2]:
+        raise SystemExit if handle == handles[0] else ValueError("bad callback of a lost goal")
+handles = []
+for _ in range(3):
+    handles.append(client.send_goal(TestGoal(3), changed))
+    assert other.stdout.readline() == "got 3\\n"
+other.kill()
+other.wait()
+print(checked.wait(60), [handle.get_goal_status() for handle in handles])
+""")
+        assert said.startswith("True [9, 9, 9]\n")
+        assert said.count("is LOST\n") == 3
+        assert said.count("bad callback: <function changed at ") == 2
+        assert "SystemExit\n" in said
+        assert "ValueError: bad callback of a lost goal\n" in said
+
+    def test_a_callback_waits_for_the_end_of_another_goal(self) -> None:
+        """As in actionlib, one goal's callback does not block those of other goals."""
+        said = run("""
+def got(handle):
+    handle.set_accepted()
+    if handle.get_goal().goal == 1:
+        handle.publish_feedback(TestFeedback(1))
+    else:
+        handle.set_succeeded(TestResult(2))
+other = actionlib.ActionServer("other", TestAction, got, auto_start=False)
+other.start()
+client = actionlib.ActionClient("other", TestAction)
+assert client.wait_for_server(second)
+ended, over, handles = threading.Event(), threading.Event(), []
+def changed(handle):
+    if handle.get_comm_state() == actionlib.CommState.DONE:
+        ended.set()
+def heard(handle, feedback):
+    handles.append(client.send_goal(TestGoal(2), changed))
+    print(ended.wait(30))
+    client.stop()
+    over.set()
+handles.append(client.send_goal(TestGoal(1), None, heard))
+print(over.wait(60))
+""")
+        assert said == "True\nTrue\n"
+
+    def test_another_thread_stops_the_client_in_between(self) -> None:
+        said = run("""
+class Stopped:
+    # A subscriber that another thread unregisters after the first access.
+    def __init__(self, subscriber):
+        self._impls = [subscriber.impl]
+    @property
+    def impl(self):
+        return self._impls.pop() if self._impls else None
+actions = client.action_client
+status, result = actions.status_sub, actions.result_sub
+actions.status_sub = Stopped(status)
+actions._check_server([], None)
+actions.status_sub = Stopped(status)
+handle = actions.send_goal(TestGoal(4))
+actions.status_sub, actions.result_sub = status, Stopped(result)
+print(actions.wait_for_server(rospy.Duration.from_sec(0.1)))
+actions.result_sub = Stopped(result)
+print(actions._is_connected())
+""")
+        assert said == "False\nTrue\n"
+
+    def test_a_stopped_client_leaves_nothing_in_a_shared_subscription(self) -> None:
+        said = run("""
+actions = actionlib.ActionClient("server", TestAction)
+assert actions.wait_for_server(second)
+subscriptions = [each.impl.subscription for each in (actions.status_sub, actions.result_sub, actions.feedback_sub)]
+before = [(len(each.on_ended), len(each.on_connected)) for each in subscriptions]
+handle = actions.send_goal(TestGoal(4))
+print(before, len(subscriptions[0].on_ended))
+actions.stop()
+actions.stop()
+print([(len(each.on_ended), len(each.on_connected)) for each in subscriptions])
+print(client.send_goal_and_wait(TestGoal(4), second))
+""")
+        assert said == "[(0, 0), (0, 2), (0, 2)] 1\n[(0, 0), (0, 1), (0, 1)]\n3\n"

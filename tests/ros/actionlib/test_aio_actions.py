@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import struct
 import subprocess
 import sys
 from collections.abc import Awaitable, Callable
@@ -11,7 +12,7 @@ from typing import Any
 
 import pytest
 from actionlib import msg
-from actionlib_msgs.msg import GoalID
+from actionlib_msgs.msg import GoalID, GoalStatus
 
 from minirospy import Node
 from minirospy.base.errors import ROSException, ROSInterruptException
@@ -20,6 +21,7 @@ from minirospy.ros.actionlib.actionlib.aio import ActionClient, ActionServer, Go
 from minirospy.ros.actionlib.actionlib.aio import client as client_module
 from minirospy.ros.actionlib.actionlib.aio import server as server_module
 from minirospy.ros.actionlib.actionlib.spec import ActionException
+from minirospy.ros.actionlib.actionlib.statuses import StatusList, status_bytes
 from tests.waiting import until
 
 pytestmark = pytest.mark.usefixtures("master")
@@ -323,6 +325,33 @@ def test_a_server_that_ends_aborts_and_one_that_forgot_loses() -> None:
             await goal
 
     run(forgetful)
+
+
+def test_wrong_messages_do_not_stop_the_client(caplog: pytest.LogCaptureFixture) -> None:
+    async def main(client: Client, server: Server) -> None:
+        goal = client.send(msg.TestGoal(3))
+        await started(goal)
+        async with (
+            Node("other", rosout=False) as other,
+            other.advertise("act/status", StatusList) as statuses,
+            other.advertise("act/result", msg.TestActionResult) as results,
+        ):
+            await statuses.wait_for_subscribers()
+            await results.wait_for_subscribers()
+            # A list that ends after the goal's id.
+            await statuses.publish(StatusList([struct.pack("<3I", 0, 0, len(goal.id)) + goal.id.encode()]))
+            unknown = GoalStatus(goal_id=GoalID(id=goal.id), status=200)
+            await statuses.publish(StatusList([status_bytes(unknown)]))
+            await results.publish(status=unknown)
+            await until(
+                lambda: caplog.messages.count("Got an unknown status from the ActionServer: 200") == 2
+            )
+        assert any("a message on /act/status is ignored: " in line for line in caplog.messages)
+        server.goals.clear()
+        with pytest.raises(GoalError, match="lost"):
+            await goal
+
+    run(main)
 
 
 SERVER = """

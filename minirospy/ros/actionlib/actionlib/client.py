@@ -5,6 +5,7 @@ Source: http://wiki.ros.org/actionlib/DetailedDescription.
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable
 from typing import TypeVar
@@ -13,6 +14,7 @@ from actionlib_msgs.msg import GoalID, GoalStatusArray
 
 from minirospy import client as rospy
 from minirospy.base import times
+from minirospy.base.numpy_names import add_numpy_note
 from minirospy.client.connection import Connection
 from minirospy.client.session import current_session
 from minirospy.core.idl.protocols import Action, ActionFeedback, ActionResult, Message
@@ -83,6 +85,12 @@ class ActionClient:
 
     def stop(self) -> None:
         """Unregister from the action's topics."""
+        # Other clients in this process may keep the subscriptions, so remove this client's functions from them.
+        for subscriber in (self.status_sub, self.result_sub, self.feedback_sub):
+            impl = subscriber.impl
+            if impl and (subscription := impl.subscription):
+                _remove(subscription.on_ended, self._status_link_ended)
+                _remove(subscription.on_connected, self._news.notify)
         for end in (self.pub_goal, self.pub_cancel, self.status_sub, self.result_sub, self.feedback_sub):
             end.unregister()
 
@@ -96,9 +104,10 @@ class ActionClient:
 
         ``transition_cb(handle)`` is called on each state change, and ``feedback_cb(handle, feedback)`` for each feedback
         message.
-        Both are called in the library's threads, never concurrently.
+        Both are called in the library's threads: one at a time for each goal, but concurrently for different goals.
         """
-        subscription = self.status_sub.impl and self.status_sub.impl.subscription
+        impl = self.status_sub.impl
+        subscription = impl and impl.subscription
         if subscription and self._status_link_ended not in subscription.on_ended:
             subscription.on_ended.append(self._status_link_ended)
         return self.manager.init_goal(goal, transition_cb, feedback_cb)
@@ -124,7 +133,8 @@ class ActionClient:
         if session.is_fork_without_node:
             raise rospy.ROSException(session.why_fork_has_no_effect(f"the action client of {self.ns}"))
         for subscriber in (self.result_sub, self.feedback_sub):
-            subscription = subscriber.impl and subscriber.impl.subscription
+            impl = subscriber.impl
+            subscription = impl and impl.subscription
             if subscription and self._news.notify not in subscription.on_connected:
                 subscription.on_connected.append(self._news.notify)
         return self._news.wait_for(self._is_connected, timeout)
@@ -134,8 +144,10 @@ class ActionClient:
             return False
         server = self.last_status_msg._connection_header["callerid"]
         return all(
-            end.impl is not None and any(_peer(link) == server for link in end.impl.connections)
-            for end in (self.pub_goal, self.pub_cancel, self.result_sub, self.feedback_sub)
+            impl is not None and any(_peer(link) == server for link in impl.connections)
+            for impl in (
+                end.impl for end in (self.pub_goal, self.pub_cancel, self.result_sub, self.feedback_sub)
+            )
         )
 
     def _status_link_ended(self) -> None:
@@ -151,10 +163,11 @@ class ActionClient:
 
     def _check_server(self, goals: list[CommStateMachine], last: GoalStatusArray | None) -> None:
         """End ``goals`` as LOST, unless a server lists them in a newer status message than ``last``."""
-        if rospy.is_down() or self.status_sub.impl is None:
+        impl = self.status_sub.impl  # read once, because stop() in another thread sets it to None
+        if rospy.is_down() or impl is None:
             return
         statuses = self.last_status_msg
-        is_connected = self.status_sub.impl.get_num_connections() > 0
+        is_connected = impl.get_num_connections() > 0
         if is_connected and (statuses is last or statuses is None):
             self._check_later(goals)
             return
@@ -162,7 +175,7 @@ class ActionClient:
         for goal in goals:
             goal_id = goal.action_goal.goal_id.id
             is_listed = is_connected and statuses is not None and find_status(statuses, goal_id) is not None
-            if not is_listed and goal.lose():
+            if not is_listed and _lose(goal):
                 rospy.logerr(
                     "The action server [%s] has died or is unreachable: goal %s is LOST",
                     rospy.resolve_name(self.ns),
@@ -190,6 +203,25 @@ class ActionClient:
 
     def _feedback_cb(self, msg: ActionFeedback) -> None:
         self.manager.update_feedbacks(msg)
+
+
+def _remove(functions: list[Callable[[], object]], function: Callable[[], object]) -> None:
+    """Remove ``function`` from ``functions`` if it is there; another thread may remove it at the same time."""
+    with contextlib.suppress(ValueError):
+        functions.remove(function)
+
+
+def _lose(goal: CommStateMachine) -> bool:
+    """End ``goal`` as LOST; return False if it had already ended. Log the error if its callback raises one."""
+    try:
+        return goal.lose()
+    except BaseException as error:  # noqa: BLE001 - user code failed, but the goal has ended
+        add_numpy_note(error)
+        session = current_session()
+        # As in a Subscriber's callback, ignore errors during a shutdown.
+        if not session.lifecycle.is_shutdown_requested:
+            session.callback_errors.log(goal.transition_cb, error)
+        return True
 
 
 class _Listener(rospy.SubscribeListener):

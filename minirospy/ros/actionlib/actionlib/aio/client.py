@@ -12,9 +12,10 @@ from actionlib_msgs.msg import GoalID, GoalStatus
 
 from minirospy import Node
 from minirospy.aio import Publisher, Subscription
-from minirospy.base.errors import ROSException, ROSInterruptException
+from minirospy.base.errors import DeserializationError, ROSException, ROSInterruptException
 from minirospy.core.graph.goals import TERMINAL, GoalState
 from minirospy.core.idl.protocols import ActionFeedback, ActionGoal, ActionResult, Message
+from minirospy.core.idl.protocols import GoalStatus as AnyGoalStatus
 from minirospy.ros.actionlib.actionlib.aio.common import WAITING, ActionClass, ActionEnd, GoalError
 from minirospy.ros.actionlib.actionlib.spec import SERVER_SECONDS, TAKES_FAST_ANSWERS
 from minirospy.ros.actionlib.actionlib.statuses import StatusList, find_status
@@ -209,7 +210,10 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
 
     async def _read(self, subscription: Subscription[_M], take: Callable[[_M], None]) -> None:
         async for message in subscription:
-            take(message)
+            try:
+                take(message)
+            except DeserializationError as error:  # from a StatusList, which is parsed on demand
+                self._node.log.error("a message on %s is ignored: %s", subscription.topic, error)
         for goal in list(self._goals.values()):
             goal._interrupt()
 
@@ -217,9 +221,20 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
         self._heard.set()
         self._statuses = statuses
         for goal in list(self._goals.values()):
-            goal._take_status(find_status(statuses, goal.id))
+            status = find_status(statuses, goal.id)
+            if status is None or self._is_valid(status):
+                goal._take_status(status)
             if goal.done:
                 del self._goals[goal.id]
+
+    def _is_valid(self, status: AnyGoalStatus) -> bool:
+        """Return whether ``status`` is one of the known statuses; log an error otherwise."""
+        try:
+            GoalState(status.status)
+        except ValueError:
+            self._node.log.error("Got an unknown status from the ActionServer: %i", status.status)
+            return False
+        return True
 
     def _status_link_ended(self) -> None:
         """Check after SERVER_SECONDS whether the server is gone."""
@@ -248,7 +263,7 @@ class ActionClient(ActionEnd, Generic[_G, _R, _F]):
     def _take_result(self, message: ActionResult) -> None:
         status = message.status
         goal = self._goals.get(status.goal_id.id)
-        if goal is not None:
+        if goal is not None and self._is_valid(status):
             # Feedback arrives on a separate connection, so process the feedback that has already arrived first.
             end = (goal, GoalState(status.status), status.text, cast("_R", message.result))
             asyncio.get_running_loop().call_soon(self._end_goal, *end)
