@@ -24,7 +24,7 @@ _FOREVER = 1e12
 
 
 class PlayArguments(NamedTuple):
-    """The command line of rosbag play."""
+    """The parsed command line of rosbag play."""
 
     bagfiles: list[str]
     prefix: str

@@ -110,7 +110,7 @@ def _rewrite(
     *,
     unindexed: bool = False,
 ) -> int:
-    """Rewrite each bag with ``write(source, target)``, either into a folder, or in place with a backup of the original.
+    """Rewrite each bag with ``write(source, target)``, into a folder, or in place with a backup of the original.
 
     Return the exit status.
     """

@@ -33,9 +33,9 @@ def main(name: str, argv: Sequence[str] | None = None) -> int:
 def copying(
     usage: str, count: int, change: Callable[[list[str]], Callable[[Connection], Connection]]
 ) -> Script:
-    """Return a program that copies a bag.
+    """Return a program that copies a bag with changes.
 
-    The bags are its first and second argument or, of four arguments, the second and last.
+    The bags are its first two arguments or, if there are four, the second and the last.
     """
 
     def script(words: list[str]) -> int:

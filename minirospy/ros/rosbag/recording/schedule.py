@@ -48,7 +48,7 @@ class State(enum.Enum):
 
 
 class Status(NamedTuple):
-    """The contents of the status line: the bag time, and how much of the total length has been played."""
+    """The contents of the status line: the bag time, and how much of the bag has been played."""
 
     state: State
     time: int
@@ -136,7 +136,7 @@ class Schedule:
                 self._delayed = True
 
     def poll(self, wall: int) -> int | None:
-        """Return None if the message is due now, or the wall time until which to wait before the next poll.
+        """Return None if the message is due now, else the wall time of the next poll.
 
         Poll earlier if another method is called in the meantime.
         """
@@ -175,7 +175,7 @@ class Schedule:
         return True
 
     def step(self) -> None:
-        """If paused, make the current message due now or, if there is no current message, the next one to be offered."""
+        """If paused, make the current message due now, or the next one offered if there is no current message."""
         if self._paused:
             self._steps += 1
 

@@ -195,7 +195,7 @@ class _Index(Sequence[_IndexEntry]):
 
 
 _message_types: dict[str, type[Message]] = {}
-"""Message classes by md5sum; the dict has the same name in ROS's rosbag."""
+"""Message classes keyed by md5sum. The name is the same as in ROS's rosbag."""
 
 
 def _get_message_type(info: _ConnectionInfo) -> type[Message]:

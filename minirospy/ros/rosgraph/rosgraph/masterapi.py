@@ -1,7 +1,8 @@
 """The Master API for Python programs: blocking calls that return lists as in ROS. Source: http://wiki.ros.org/ROS/Master_API."""
 
 # mypy: disable-error-code="no-any-return"
-# The annotations state what a master returns; the values are returned unchanged, because a program may replace the master.
+# The annotations state what a master should return. Values are returned unchanged, because a program may replace the
+# master.
 
 from __future__ import annotations
 
@@ -69,7 +70,7 @@ class Master:
 
     @cached_property
     def handle(self) -> Any:
-        """Return the master as Python's `xmlrpc.client.ServerProxy`, whose methods return (code, text, value).
+        """Return the master as an `xmlrpc.client.ServerProxy`, with methods that return (code, text, value).
 
         From then on, all calls use this proxy, because a program may replace the proxy or one of its methods.
         """
@@ -95,7 +96,7 @@ class Master:
             raise MasterException(str(error)) from error
 
     def _succeed(self, args: tuple[int, str, Any]) -> Any:
-        """Return the value in a response. Raise MasterError or MasterFailure if the call failed."""
+        """Return the value from a response. Raise MasterError or MasterFailure if the call failed."""
         code, text, value = args
         if code == 1:
             return value
@@ -154,7 +155,7 @@ class Master:
         return self._call("deleteParam", key)
 
     def searchParam(self, key: str) -> str:
-        """Return the name of the closest parameter called ``key``, searching upwards from the caller's namespace."""
+        """Search upwards from the caller's namespace for a parameter called ``key``; return its full name."""
         return self._call("searchParam", key)
 
     def getParamNames(self) -> list[str]:

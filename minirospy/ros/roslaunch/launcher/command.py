@@ -61,7 +61,7 @@ def node_folder(node: NodeSpec, packages: Packages, environment: Environment) ->
 
 
 def shell_line(node: NodeSpec, packages: Packages) -> str:
-    """Return a node's command as `roslaunch --args` prints it, with the environment variables that it sets.
+    """Format a node's command like `roslaunch --args`, with the environment variables that it sets.
 
     Raise MinirospyError as node_command does.
     """
@@ -74,6 +74,6 @@ def shell_line(node: NodeSpec, packages: Packages) -> str:
 
 
 def _fault(node: NodeSpec, text: str) -> MinirospyError:
-    """Return an error about a node, with the file and line if a launch file declares the node."""
+    """Return an error about a node. Include the file and line if a launch file declares the node."""
     message = f"node [{node.base_name}]: {text}"
     return LaunchError(node.file, node.line, message) if node.file else MinirospyError(message)

@@ -38,12 +38,12 @@ class NodeSpec:
 
     @property
     def base_name(self) -> str:
-        """The name without its namespace."""
+        """Return the name without its namespace."""
         return self.name.rpartition("/")[2]
 
     @property
     def namespace(self) -> str:
-        """The namespace, with a trailing slash."""
+        """Return the namespace, with a trailing slash."""
         return self.name.rpartition("/")[0] + "/"
 
     def named(self) -> NodeSpec:
@@ -124,9 +124,9 @@ class ArgDoc:
 class LaunchSpec:
     """The combined content of all files.
 
-    ``params``: values by name; ``clear``: namespaces to delete; ``commands``: run at the parameter server
-    before the parameters are set; ``files``: the files that were read, each once; ``includes``: (file, included
-    file); ``args``: declarations of the first file; ``machines``: by name; ``warnings``: content that was ignored.
+    ``params``: values by name; ``clear``: namespaces to delete; ``commands``: <rosparam> commands to run before the
+    parameters are set; ``files``: all files read, without duplicates; ``includes``: (file, included file); ``args``:
+    declarations of the first file; ``machines``: by name; ``warnings``: content that was ignored.
     """
 
     nodes: list[NodeSpec] = field(default_factory=list)
@@ -143,7 +143,7 @@ class LaunchSpec:
     # --- adding: the loader calls these methods in the order of the tags
 
     def add_file(self, path: str, name: str) -> None:
-        """Add a file that is read now; ``name`` is its path as written."""
+        """Record that a file is being read; ``name`` is its path as written."""
         if path not in self.files:
             self.files.append(path)
 
