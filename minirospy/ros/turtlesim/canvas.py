@@ -1,4 +1,4 @@
-"""The canvas under the turtles: draws pen strokes, and returns pixel colours. Pure."""
+"""The turtles' canvas: draws pen strokes, and returns pixel colours. Pure."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Canvas:
     def stroke(
         self, start: tuple[float, float], end: tuple[float, float], color: Color, width: float
     ) -> None:
-        """Draw a straight line whose square ends extend ``width`` / 2 beyond its end points, clipped to the canvas."""
+        """Draw a straight line, clipped to the canvas. Its square ends extend ``width`` / 2 beyond the end points."""
         (x0, y0), (x1, y1) = start, end
         length = math.hypot(x1 - x0, y1 - y0)
         along_x, along_y = ((x1 - x0) / length, (y1 - y0) / length) if length else (1.0, 0.0)

@@ -431,7 +431,7 @@ class Bag(OpenedBag):
         return self._times()[1]
 
     def get_type_and_topic_info(self, topic_filters: str | list[str] | None = None) -> TypesAndTopicsTuple:
-        """Return (msg_types, topics):
+        """Return (msg_types, topics).
 
         dicts of md5sums by type, and of (msg_type, message_count, connections, frequency) by topic.
         """

@@ -116,7 +116,7 @@ class PrivateBag(ABC):
 
     @contextlib.contextmanager
     def _position_kept(self) -> Iterator[None]:
-        """Restore the file's position afterwards:
+        """Restore the file's position after the block.
 
         the program may be reading records there. The real module reads from memory instead.
         """

@@ -191,7 +191,7 @@ def _unpacked(data: bytes, name: str, unpack: Callable[[bytes], _T]) -> _T:
 
 
 def _read_sized(f: BinaryIO) -> bytes:
-    """Read a length prefix and return the bytes that follow it.
+    """Read a length prefix and return the bytes that follow.
 
     Raise ROSBagException or ROSBagFormatException at the end of the file.
     """

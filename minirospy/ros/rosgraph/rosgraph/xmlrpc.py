@@ -76,10 +76,10 @@ class XmlRpcHandler:
     """The base class of objects served by an :class:`XmlRpcNode`: all methods without a leading underscore."""
 
     def _ready(self, uri: str) -> None:
-        """Called when the server has started at ``uri``; subclasses override this method."""
+        """Respond to the server's start at ``uri``; subclasses override this method."""
 
     def _shutdown(self, reason: str) -> None:
-        """Called when the server shuts down; subclasses override this method."""
+        """Respond to the server's shutdown; subclasses override this method."""
 
 
 class XmlRpcNode:

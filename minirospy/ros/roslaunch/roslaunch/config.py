@@ -1,4 +1,4 @@
-"""The classes of roslaunch.core and roslaunch.config, through which programs read and change a LaunchSpec.
+"""The classes of roslaunch.core and roslaunch.config, through which programs read a LaunchSpec.
 
 Source: http://wiki.ros.org/roslaunch/API%20Usage.
 """

@@ -48,7 +48,7 @@ def is_verbose() -> bool:
 
 
 def set_verbose(v: bool) -> None:
-    """Store a value for :func:`is_verbose`; the value has no other effect here."""
+    """Set the value that :func:`is_verbose` returns. It has no other effect."""
     _Verbosity.is_on = bool(v)
 
 

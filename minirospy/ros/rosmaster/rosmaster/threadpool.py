@@ -1,4 +1,4 @@
-"""rosmaster.threadpool: threads for calls to nodes. No two tasks with the same marker run at the same time."""
+"""rosmaster.threadpool: threads for calls to nodes. At most one task per marker runs at a time."""
 
 from __future__ import annotations
 

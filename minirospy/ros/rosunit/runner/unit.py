@@ -92,7 +92,7 @@ def create_xml_runner(
 
 
 def begin_results(file: Path) -> None:
-    """Create the results file's folder, delete the file from an earlier run, and print the file's path."""
+    """Create the results file's folder, delete an earlier run's file, and print the file's path."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.unlink(missing_ok=True)
     print(f"[ROSUNIT] Outputting test results to {file.absolute()}", flush=True)
@@ -128,7 +128,7 @@ def print_unittest_summary(result: unittest.TestResult) -> None:
 def print_runner_summary(
     runner_results: unittest.TestResult, junit_results: Result, runner_name: str = "ROSUNIT"
 ) -> None:
-    """Print each case in the results that tests have written, then the counts, which include the runner's own errors."""
+    """Print each case in the tests' results, then the counts, including the runner's own errors."""
     print(report(junit_results, runner_name, len(runner_results.errors), names_of(runner_results.failures)))
 
 

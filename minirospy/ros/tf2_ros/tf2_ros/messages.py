@@ -1,4 +1,4 @@
-"""Converts between messages and the buffer's numbers: TransformStamped, times, and /tf messages that stay undecoded."""
+"""Converts TransformStamped messages, times and undecoded /tf messages to and from the buffer's numbers."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def transform_stamped(target: str, source: str, found: StampedTransform) -> Tran
 
 
 class LazyTFMessage(TFMessage):
-    """A TFMessage that stores its bytes (``raw``) for the buffer, and is decoded only when ``transforms`` is read."""
+    """A TFMessage that stores its bytes (``raw``) for the buffer. Decoded only when ``transforms`` is read."""
 
     __slots__ = ["raw"]
     _slot_types = TFMessage._slot_types

@@ -168,7 +168,7 @@ class Joint(Object):
 
     @property
     def joint_type(self) -> str | None:
-        """The former name of ``type``."""
+        """Return ``type``; this is its former name."""
         return self.type
 
     @joint_type.setter
