@@ -433,7 +433,7 @@ class Bag(OpenedBag):
     def get_type_and_topic_info(self, topic_filters: str | list[str] | None = None) -> TypesAndTopicsTuple:
         """Return (msg_types, topics).
 
-        dicts of md5sums by type, and of (msg_type, message_count, connections, frequency) by topic.
+        ``msg_types`` maps types to md5sums, ``topics`` maps topics to (msg_type, message_count, connections, frequency).
         """
         if self._file is None and self._filename is not None:
             with Bag(self._filename, skip_index=self._skip_index) as bag:

@@ -118,7 +118,7 @@ class PrivateBag(ABC):
     def _position_kept(self) -> Iterator[None]:
         """Restore the file's position after the block.
 
-        the program may be reading records there. The real module reads from memory instead.
+        The program may be reading records there; the real module has this data in memory.
         """
         position = self._file.tell() if self._file else 0
         yield
